@@ -127,7 +127,7 @@ def listed(folder: Path) -> dict[str, Any]:
 def external(folder: Path) -> dict[str, Any]:
     """Gravity, an electric field, a rotating magnetic field and Newtonian attraction, open space."""
     forces = [
-        sand.Contact(), sand.Dipoles(cut="sharp"), sand.Attraction(), sand.Gravity("9.81 m/s^2"),
+        sand.Contact(), sand.Dipoles(), sand.Attraction(), sand.Gravity("9.81 m/s^2"),
         sand.ElectricField("1 kV/m"), sand.Field(0, shape="rotating", amplitude=["10 mT", 0, 0], frequency="100 MHz",
                                                  axis=[0, 0, 1]),
     ]  # fmt: skip

@@ -31,8 +31,8 @@ import { nearestFrame, TimeLine } from "./ui/timeline";
 
 /** Settings that do not change the colours, positions or visibility of what is drawn. */
 const NO_REFRESH = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "field", "ortho", "size"]);
-/** Width of the page [pixels] below which the panel of settings is hidden at first. */
-const NARROW = 720;
+/** Width and height of the page [pixels] below which the panel of settings is hidden at first. */
+const [NARROW, LOW] = [720, 480];
 
 const CONTEXT_LOST = "The browser lost the graphics card (WebGL context); if the picture does not return, reload.";
 
@@ -108,8 +108,8 @@ export class App implements FrameDisplay, LiveRun {
     this.actions = actionsOf({ playback, camera, selection, exports: exporter, page: commands });
     this.keys = new Keys(state, this.actions);
     page.header.append(headerButtons({
-      ...commands, centre: () => camera.centre(), savePicture: () => exporter.openDialog("png"),
-    }));
+      ...commands, showLargest: () => camera.showCluster(selection.largestCluster()), showAll: () => camera.reset(),
+      centre: () => camera.centre(), savePicture: () => exporter.openDialog("png") }));
     this.fillPage();
     this.connectStage();
     onClick(page.canvas, (x, y) => this.selection.clickAt(x, y));
@@ -139,7 +139,7 @@ export class App implements FrameDisplay, LiveRun {
     page.bottom.append(this.timeline.element, this.plot.element);
     this.timeline.setFrames(this.manifest.times, this.series.events);
     this.showStatus();
-    if (page.root.clientWidth < NARROW) this.togglePanel();
+    if (page.root.clientWidth < NARROW || page.root.clientHeight < LOW) this.togglePanel();
   }
 
   private connectStage(): void {
@@ -163,23 +163,23 @@ export class App implements FrameDisplay, LiveRun {
     };
   }
 
-  /** Show the first frame; the settings are those of the address. */
-  async start(look: string): Promise<void> {
+  /** Show the first picture: the settings are those of the address; without one, the largest cluster is in view. */
+  async start(look: string, showLargest: boolean): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
     this.picture.setFrame(await this.frames.nearest(first, this.manifest.times.length));
     this.picture.update(false);
     this.applyViewSettings();
     this.setTheme();
     await this.navigation.go(first);
-    this.setInitialLook(look);
+    this.setInitialLook(look, showLargest);
     this.address?.connect();
   }
 
-  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview. */
-  private setInitialLook(text: string): void {
+  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview or the largest cluster. */
+  private setInitialLook(text: string, showLargest = false): void {
     const look = lookFromText(text);
     if (look) this.stage.look = look;
-    else this.camera.reset();
+    else this.camera.showCluster(showLargest ? this.selection.largestCluster() : null);
     this.selection.anchor();
     this.stage.draw();
   }

@@ -20,12 +20,12 @@ async function build(parent: HTMLElement, source: Source, ownsAddress: boolean):
   state.offer("palette", palettes.map((p) => [p, p]));
   offerChoices(state, dataset, series);
   state.setting("grain").to = manifest.grains - 1;
-  // a run that continues: start at the newest frame
-  if (manifest.running) state.set("frame", manifest.times.length - 1);
-  if (ownsAddress && location.hash.length > 1) state.fromAddress(location.hash);
+  const isShared = ownsAddress && location.hash.length > 1; // an address with settings
+  if (isShared) state.fromAddress(location.hash);
+  else state.set("frame", manifest.times.length - 1);
   const stage = new Stage(page.canvas);
   const app = new App(source, state, stage, dataset, series, page, ownsAddress);
-  await app.start(state.get<string>("look"));
+  await app.start(state.get<string>("look"), !isShared);
   return app;
 }
 

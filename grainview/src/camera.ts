@@ -63,6 +63,16 @@ export class CameraController {
     else this.camera.look = { ...look, target: centre as Vector3 };
   }
 
+  /**
+   * Aim at a cluster (a mask of its grains) from the overview's side, at twice the distance at which it fills the view,
+   * so that its surroundings stay visible, and not from farther than the overview; without a cluster show everything.
+   */
+  showCluster(cluster: Uint8Array | null): void {
+    const everything = this.overview();
+    const near = cluster && this.overview(everything.from, everything.up, cluster);
+    this.camera.look = near ? { ...near, height: Math.min(2 * near.height, everything.height) } : everything;
+  }
+
   /** Fit the isolated cluster to the view, if it differs from the grains shown before (a mask; null: all). */
   fitIsolated(before: Uint8Array | null): void {
     const { shown } = this.grains;

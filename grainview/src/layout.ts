@@ -9,8 +9,8 @@ export interface Layout {
   title: HTMLElement;
   status: HTMLElement;
   canvas: HTMLCanvasElement;
-  view: HTMLElement; // canvas with legend, inspector and overlay
-  legend: HTMLElement;
+  view: HTMLElement; // canvas with inspector and overlay
+  legend: HTMLElement; // over the canvas, or beside it on a small screen
   bottom: HTMLElement;
   side: HTMLElement;
   note: HTMLElement;
@@ -23,11 +23,12 @@ export function layout(parent: HTMLElement): Layout {
   const canvas = h("canvas", { class: "gv-canvas", role: "img", tabindex: 0, "aria-label": "Grains" });
   const legend = h("section", { class: "gv-legend", "aria-label": "Legend" });
   const note = h("p", { class: "gv-note", role: "alert", hidden: true });
-  const view = h("div", { class: "gv-view" }, canvas, legend, note);
+  const view = h("div", { class: "gv-view" }, canvas, note);
+  const scene = h("div", { class: "gv-scene" }, view, legend);
   const bottom = h("div", { class: "gv-bottom" });
   const side = h("div", { class: "gv-side" });
   const header = h("header", {}, h("div", { class: "gv-names" }, title, status));
-  const root = h("div", { class: "gv", tabindex: -1 }, header, h("main", {}, view, side), bottom);
+  const root = h("div", { class: "gv", tabindex: -1 }, header, h("main", {}, scene, side), bottom);
   parent.replaceChildren(root);
   return { root, header, title, status, canvas, view, legend, bottom, side, note };
 }
@@ -40,6 +41,8 @@ export function showFailure(parent: HTMLElement, message: string): void {
 }
 
 export interface HeaderCommands {
+  showLargest: () => void;
+  showAll: () => void;
   centre: () => void;
   savePicture: () => void;
   copyAddress: (() => void) | null; // null: no button
@@ -57,6 +60,8 @@ export function headerButtons(commands: HeaderCommands): HTMLElement {
   return h(
     "nav",
     { "aria-label": "Page" },
+    button("cluster", "Largest cluster", commands.showLargest, "Y"),
+    button("box", "Whole box", commands.showAll, "r"),
     button("centre", "Centre", commands.centre, "z"),
     button("camera", "Picture or movie", commands.savePicture, "s"),
     ...(copyAddress ? [button("link", "Copy the address of this view", copyAddress, "j")] : []),

@@ -57,14 +57,16 @@ export class Picture {
   /** Content of the legend. */
   get key(): KeyPart[] {
     const { painted, bondScale: scale } = this;
-    if (!painted || !scale) return [];
-    return keyOf(this.quantity, painted, this.dataset, { kind: this.settings.get("bonds"), scale });
+    if (!painted || !scale || !this.frame) return [];
+    const bonds = { kind: this.settings.get<string>("bonds"), scale };
+    return keyOf(this.quantity, painted, this.frame.position, this.dataset, bonds);
   }
 
   /** The content in words, for screen readers. */
   get description(): string {
     const contacts = (this.frame?.pair.length ?? 0) / 2;
-    return `${this.dataset.manifest.grains} grains, ${contacts} contacts, coloured by ${this.quantity.label}`;
+    const grains = this.frame?.position.filter((x, e) => e % 3 === 0 && !Number.isNaN(x)).length ?? 0;
+    return `${grains} grains, ${contacts} contacts, coloured by ${this.quantity.label}`;
   }
 
   setFrame(frame: Frame): void {

@@ -117,10 +117,16 @@ export class Selection {
   }
 
   selectLargestCluster(): void {
+    const grain = this.largestCluster()?.indexOf(1) ?? -1;
+    if (grain >= 0) this.selectGrain(grain);
+  }
+
+  /** The grains of the largest cluster of the frame; null if there is none. */
+  largestCluster(): Uint8Array | null {
     const { frame } = this.context.picture;
-    if (!frame) return;
+    if (!frame) return null;
     const [name] = [...clusterSizes(frame)].sort((a, b) => b[1] - a[1] || a[0] - b[0])[0] ?? [SINGLE];
-    if (name !== SINGLE) this.selectGrain(frame.cluster.indexOf(name));
+    return name === SINGLE ? null : Uint8Array.from(frame.cluster, (own) => Number(own === name));
   }
 
   measureFromSelected(): void {

@@ -34,12 +34,16 @@ _MODULES = {
     **FORCES,
     "external_force": "forces.own",
     "pair_force": "forces.own",
+    "Ramp": "ramps",
     **INTEGRATORS,
     "Neighbours": "neighbours.settings",
     "Simulation": "simulation.simulation",
+    "Wall": "simulation.walls",
     "resume": "config.build",
     "open": "results",
+    "Driven": "simulation.driven",
     "Observer": "simulation.observers",
+    "Updater": "simulation.updater",
     "set_threads": "threads",
     "Outcome": "simulation.outcome",
     "Result": "simulation.outcome",
@@ -85,11 +89,15 @@ if TYPE_CHECKING:
     from .material import SILICA as SILICA
     from .material import Material as Material
     from .neighbours.settings import Neighbours as Neighbours
+    from .ramps import Ramp as Ramp
     from .results import open as open
+    from .simulation.driven import Driven as Driven
     from .simulation.observers import Observer as Observer
     from .simulation.outcome import Outcome as Outcome
     from .simulation.outcome import Result as Result
     from .simulation.simulation import Simulation as Simulation
+    from .simulation.updater import Updater as Updater
+    from .simulation.walls import Wall as Wall
     from .threads import set_threads as set_threads
 
 

@@ -14,10 +14,11 @@ import numbers
 import os
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
-from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
+from .descriptions import described
+from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 
 MOST_GRAINS = 100_000_000
 """Largest number of grains of one simulation. The state takes about a kilobyte per grain, 100 GB in all."""
@@ -39,7 +40,8 @@ def checked(thing: T) -> T:
 
     Types are taken from the annotations int, bool, str, paths, arrays (lists of numbers are converted), functions,
     lists, tuples of fixed length and classes; Any and float are not checked. Assignment to an attribute of a decorated
-    frozen dataclass raises a one-line NoSuchAttribute.
+    frozen dataclass raises a one-line NoSuchAttribute; its representation is that of `descriptions.described`,
+    unless the dataclass has one of its own (`repr=False`).
     """
     if not isinstance(thing, type):
         return typing.cast(T, _wrapped(typing.cast(Callable, thing)))
@@ -49,6 +51,8 @@ def checked(thing: T) -> T:
     if settings:
         for name in ("__setattr__", "__delattr__"):
             setattr(thing, name, _refuse_assignment)
+        if thing.__dataclass_params__.repr:  # type: ignore[attr-defined]
+            thing.__repr__ = described  # type: ignore[method-assign,assignment]
     return thing
 
 
@@ -200,6 +204,40 @@ def _read(allowed: list[_TypeCheck], value: Any, name: str) -> Any:
         words.remove("text")
     wanted = f" must be {' or '.join(words)}" if words else f"; give {' or '.join(constructors)}"
     raise BadInput(f"{name} = {shown(value)}{wanted}")
+
+
+def objects_with(
+    value: Any, name: str, base: str, methods: Sequence[str], check: Callable[[Any], object] = id
+) -> list[Any]:
+    """A list of objects that have these methods, such as observers.
+
+    Parameters
+    ----------
+    name, base : str
+        Name of the argument, and of the base class of the objects, for messages.
+    check : callable, optional
+        Called with each object that has the methods; may raise BadInput.
+
+    Raises
+    ------
+    BadInput
+        If it is no list, an entry is a class, or a method is missing; one line for each entry.
+    """
+    try:
+        objects = list(value)
+    except TypeError:
+        raise BadInput(f"{name} = {shown(value)}; give a list of {base} objects") from None
+    errors = ErrorCollector()
+    for one in objects:
+        if isinstance(one, type):
+            errors.problems.append(f"{name}: {shown(one)} is a class; write {shown(one)}()")
+        elif not all(callable(getattr(one, method, None)) for method in methods):
+            listed = " or ".join([", ".join(methods[:-1]), methods[-1]] if len(methods) > 1 else methods)
+            errors.problems.append(f"{name}: {shown(one)} is not a {base}: it lacks {listed}")
+        else:
+            errors.take(check, one)
+    errors.done()
+    return objects
 
 
 def _mismatch(

@@ -10,7 +10,7 @@ import numpy as np
 from .arguments import checked
 from .compiler.jit import formula
 from .errors import BadInput, shown
-from .units import format_quantity, si
+from .units import exact_quantity, format_quantity, si
 
 ALL_PAIRS_UP_TO = 200
 """Number of points up to which `Box.close_pairs` examines all pairs."""
@@ -41,7 +41,7 @@ def nearest_image(v, span):
 
 
 @checked
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Box:
     """Simulation box, created with `Box.open` or `Box.periodic`.
 
@@ -65,6 +65,11 @@ class Box:
             for length in self.lengths
         ):
             raise BadInput(f"lengths = {shown(self.lengths)} must be lengths in m or None; see sand.Box.periodic")
+
+    def __repr__(self) -> str:
+        given = [None if length is None else exact_quantity(float(length), "m") for length in self.lengths]
+        texts = ", ".join(map(repr, given[:1] if len(set(given)) == 1 else given))
+        return "Box.open()" if self.is_open else f"Box.periodic({texts})"
 
     @classmethod
     def open(cls) -> Box:

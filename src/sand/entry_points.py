@@ -17,6 +17,9 @@ def _figure(simulation: Any) -> Any:
 
 
 def _save_figure(simulation: Any, path: Path) -> None:
+    from .compiler.progress import announce
+
+    announce("drawing the figure")
     from .plotting.run_figure import run_figure, save
 
     save(run_figure(simulation), path)

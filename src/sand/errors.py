@@ -55,6 +55,10 @@ class FilesFailed(SandError, OSError):
     """A file or folder could not be read or written; earlier contents are unchanged."""
 
 
+class NoSuchGrain(BadInput, IndexError):
+    """The requested grain does not exist; an IndexError, so that loops over grains end."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A run was stopped by Ctrl-C or SIGTERM after writing its checkpoint.
 
@@ -95,6 +99,12 @@ class ErrorCollector:
         """Raise BadInput if there were errors."""
         if self.problems:
             raise BadInput(self.problems)
+
+
+def first_problems(problems: Sequence[str], total: int, kind: str) -> list[str]:
+    """The messages about the first of `total` problems, and how many more of this kind, such as "contacts", exist."""
+    rest = total - len(problems)
+    return [*problems, *([f"… and {rest} more {kind}"] if rest > 0 else [])]
 
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:

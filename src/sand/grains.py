@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +11,10 @@ import numpy as np
 from .arguments import checked
 from .box import Box
 from .constants import LIGHT
-from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
+from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
 from .schema import BY_NAME, FIELDS, OWN, public, stored
-from .units import in_unit
+from .units import format_quantity, in_unit
 
 ROUNDING = 1e-7
 """Largest gap of a contact without adhesion, relative to the sum of radii; allows for coordinates of seven digits."""
@@ -88,6 +88,8 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
 @checked
 class Grains:
     """N spherical grains. Their properties are read-only; a simulation works on a copy.
+
+    `grains[3]`, `grains[2:5]` and `grains[mask]` are new grains, copies of these; a loop gives one after the other.
 
     All numbers may be SI floats, text with a unit, or pint/astropy quantities.
 
@@ -195,9 +197,38 @@ class Grains:
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *NAMES]
 
+    def __getitem__(self, index: Any) -> Grains:
+        """Grains of this index, slice, mask (N,) or list of indices, as new grains with indices from 0.
+
+        Raises
+        ------
+        BadInput
+            If there are no such grains; it is also an IndexError, so that loops over grains end.
+        """
+        numbers = np.arange(len(self))
+        try:
+            chosen = np.atleast_1d(numbers[index])
+        except (IndexError, TypeError, ValueError):
+            chosen = numbers[:0]
+        if chosen.ndim != 1 or not chosen.size:
+            asked = shown(index)
+            raise NoSuchGrain(
+                f"grains[{asked}] names no grain: there are {len(self)}; give an index from 0, a slice, or a mask"
+            )
+        other = copy.copy(self)
+        own, material = materials_of([self.materials[k] for k in self.arrays.material[chosen]], chosen.size)
+        arrays = GrainArrays(*(array[..., chosen].copy() for array in self.arrays))
+        other.__dict__["materials"] = own
+        other.arrays = arrays._replace(material=material, id=np.arange(chosen.size, dtype=np.uint32))
+        return other
+
+    def __iter__(self) -> Iterator[Grains]:
+        return (self[k] for k in range(len(self)))
+
     def __repr__(self) -> str:
         names = ", ".join(m.name for m in self.materials)
-        return f"<{len(self)} grains of {names}>"
+        radii = " to ".join(format_quantity(r, "m") for r in sorted({self.radius.min(), self.radius.max()}))
+        return f"<{len(self)} {'grain' if len(self) == 1 else 'grains'} of {names}, radius {radii}>"
 
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
         """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""

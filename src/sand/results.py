@@ -1,10 +1,13 @@
-"""Results of a run, read from its folder: frames, ledger, contacts and summary."""
+"""Results of a run, or of several, read from its folder: frames, ledger, contacts and summary."""
 
 from __future__ import annotations
 
+import glob
+import re
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -13,16 +16,17 @@ from .analysis.ledger_columns import LedgerColumns
 from .arguments import checked
 from .config.build import simulate
 from .config.case import read_case
-from .errors import BadInput, import_optional
+from .errors import BadInput, ErrorCollector, import_optional, shown
 from .io import run_folder as files
 from .io.export import export_frames
+from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
 from .schema import BY_NAME, own_values
 from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
-from .units import si
+from .units import format_quantity, si
 from .viewer.external_field import read_field
 from .viewer.show import view_folder
 
@@ -72,8 +76,12 @@ class Run:
         """The frames, as a sequence; each is read on access.  Raises BadInput for a broken trajectory."""
         return Frames(self.folder / files.TRAJECTORY)
 
+    def arrays(self, name: str) -> FrameArrays:
+        """One array of each frame, such as "position", as a sequence that reads frames on access.  Raises BadInput."""
+        return self.frames.arrays(name)
+
     @cached_property
-    def ledger(self) -> dict[str, np.ndarray]:
+    def ledger(self) -> Columns:
         """Columns of the ledger by name, (K,), SI.  Raises BadInput."""
         ledger = LedgerColumns.from_rows(read_ledger(self.folder / files.LEDGER))
         return Columns({name: ledger[name] for name in ledger.columns})
@@ -89,7 +97,7 @@ class Run:
         return files.read_json(self.folder / files.SUMMARY)
 
     @checked
-    def contacts(self, frame: int = -1) -> dict[str, np.ndarray]:
+    def contacts(self, frame: int = -1) -> Columns:
         """Contacts of a frame: pair (C, 2), overlap [m], formed [s] (C,), force on the first grain [N] (C, 3)."""
         contacts = self.frames[frame]
         names = ("pair", "overlap", "formed", "force")
@@ -180,9 +188,17 @@ class Run:
         return export_frames(self.frames[frames], place, form, cluster_labels)
 
     def to_xarray(self) -> Any:
-        """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray."""
+        """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray.
+
+        Raises
+        ------
+        BadInput
+            If grains were removed or added in the run.
+        """
         xarray = import_optional("xarray", "to_xarray")
         whole: list[Frame] = list(self.frames)
+        if any(not np.array_equal(one.id, whole[0].id) for one in whole):
+            raise BadInput(f"to_xarray: the grains of {self.folder} change; use its frames one by one, and their id")
         vectors = ("position", "velocity", "moment", "spin")
         data = {
             name: (("frame", "grain", "axis"), np.array([getattr(one, name) for one in whole]), {"units": unit})
@@ -201,11 +217,138 @@ class Run:
 
     def to_pandas(self) -> Any:
         """Convert the ledger to a pandas DataFrame; needs pandas."""
-        return import_optional("pandas", "to_pandas").DataFrame(self.ledger)
+        return self.ledger.to_pandas()
 
     def __repr__(self) -> str:
         return f"<run in {self.folder}: {len(self.frames)} frames>"
 
 
-open = Run
-"""`sand.open(DIR)`: the results of the run in a folder."""
+class Runs(Sequence[Run]):
+    """The results of several runs, as returned by `sand.open(DIR, DIR, …)`, in the order given.
+
+    Parameters
+    ----------
+    folders : Iterable[str or Path]
+        Folders of the runs.
+
+    Raises
+    ------
+    BadInput
+        If one of them does not hold a run; one line for each.
+    """
+
+    def __init__(self, folders: Iterable[str | Path]):
+        errors = ErrorCollector()
+        self.runs = [errors.take(Run, folder) for folder in folders]
+        errors.done()
+        if not self.runs:
+            raise BadInput("there is no folder of a run; give some, such as sand.open('seed-1', 'seed-2')")
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @overload
+    def __getitem__(self, index: int) -> Run: ...
+    @overload
+    def __getitem__(self, index: slice) -> Runs: ...
+
+    def __getitem__(self, index: Any) -> Any:
+        return Runs(run.folder for run in self.runs[index]) if isinstance(index, slice) else self.runs[index]
+
+    def summary(self) -> Columns:
+        """One row for each run: folder, seed, grains, time [s], mean_cluster_size, contacts, outcome.
+
+        Runs that go on, or were killed, have the outcome "running" and the numbers of their last row of the ledger.
+        """
+        rows = [_summary_row(run) for run in self.runs]
+        return Columns({name: np.array([row[name] for row in rows]) for name in rows[0]})
+
+    @property
+    def ledger(self) -> Columns:
+        """Columns of all ledgers, one run below the other, and the number `run` of each row's run, from 0.
+
+        Columns that not all runs have, such as the energy of a force, are left out.
+        """
+        ledgers = [run.ledger for run in self.runs]
+        names = [name for name in ledgers[0] if all(name in one for one in ledgers)]
+        number = np.repeat(np.arange(len(ledgers)), [len(one["step"]) for one in ledgers])
+        return Columns({"run": number} | {name: np.concatenate([one[name] for one in ledgers]) for name in names})
+
+    def to_pandas(self) -> Any:
+        """Convert the ledgers to a pandas DataFrame with the column `run`; needs pandas."""
+        return self.ledger.to_pandas()
+
+    def __repr__(self) -> str:
+        table = self.summary()
+        texts = [[name, *(_cell(name, value) for value in column)] for name, column in table.items()]
+        widths = [max(map(len, column)) for column in texts]
+        lines = ["  ".join(t.ljust(w) for t, w in zip(row, widths, strict=True)) for row in zip(*texts, strict=True)]
+        return "\n".join([f"<{len(self)} runs>", *(line.rstrip() for line in lines)])
+
+
+def _cell(name: str, value: Any) -> str:
+    if name == "time":
+        return format_quantity(float(value), "s")
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _summary_row(run: Run) -> dict[str, Any]:
+    try:
+        found = run.summary
+    except BadInput:
+        found = {name: column[-1] for name, column in run.ledger.items()} | {"grains": len(run.frames[-1])}
+    seed = found.get("seed", run.case.get("run", {}).get("seed"))
+    numbers = {name: found[name] for name in ("grains", "time", "mean_cluster_size", "contacts")}
+    return {"folder": str(run.folder), "seed": seed, **numbers, "outcome": found.get("outcome", "running")}
+
+
+@overload
+def open(folder: Path) -> Run: ...
+@overload
+def open(folder: str) -> Any: ...
+@overload
+def open(folder: str | Path, other: str | Path, /, *others: str | Path) -> Runs: ...
+@overload
+def open(folder: Sequence[str | Path]) -> Runs: ...
+
+
+@checked
+def open(folder: Any, *others: Any) -> Any:
+    """Open the results of the run in a folder, or of several runs.
+
+    Parameters
+    ----------
+    folder : str or Path or sequence of these
+        Folder of a run; or a list of folders; or a pattern such as "runs/seed-*".
+    others : str or Path
+        Folders of further runs, or patterns.
+
+    Returns
+    -------
+    Run or Runs
+        `Run` for one folder, `Runs` for several folders, a list or a pattern.
+
+    Raises
+    ------
+    BadInput
+        If a folder does not hold a run, or no folder has such a name; one line for each.
+    """
+    several = bool(others) or isinstance(folder, (list, tuple))
+    folders: list[str | Path] = []
+    for one in (*(folder if isinstance(folder, (list, tuple)) else [folder]), *others):
+        if not isinstance(one, (str, Path)):
+            raise BadInput(f"folder = {shown(one)} must be a path, or several of them")
+        if isinstance(one, str) and glob.has_magic(one) and not Path(one).exists():
+            several = True
+            found = [name for name in glob.glob(one) if Path(name).is_dir()]
+            if not found:
+                raise BadInput(f"no folder has a name like {one}")
+            folders += sorted(found, key=lambda name: _natural(str(name)))
+        else:
+            folders.append(one)
+    return Runs(folders) if several else Run(folders[0])
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Key of an order in which seed-2 precedes seed-10."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]

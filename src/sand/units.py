@@ -249,6 +249,26 @@ def format_quantity(value: float, unit: str) -> str:
     """Format a number with an SI prefix: 1.2e-6 m → '1.2 um'."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g} {unit}"
-    prefixes = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-    exponent = min(max(3 * math.floor(math.log10(abs(value)) / 3 + 1e-12), -18), 9)
-    return f"{value / 10.0**exponent:.4g} {prefixes[exponent]}{unit}"
+    exponent = _prefix_exponent(value)
+    return f"{value / 10.0**exponent:.4g} {_SI_PREFIXES[exponent]}{unit}"
+
+
+def exact_quantity(value: float, unit: str) -> str:
+    """Format a number as text that is read as exactly this number: 1.2e-6 m → '1.2 um'."""
+    short = f"{value:.12g}"
+    if value != 0.0 and math.isfinite(value) and _TAKES_PREFIX.fullmatch(unit):
+        exponent = _prefix_exponent(value)
+        scaled = f"{value / 10.0**exponent:.12g}"
+        if float(Decimal(scaled).scaleb(exponent)) == value:
+            return f"{scaled} {_SI_PREFIXES[exponent]}{unit}"
+    return f"{short if float(short) == value else repr(value)} {unit}"
+
+
+_SI_PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_TAKES_PREFIX = re.compile("(?!kg|rad)[A-Za-z]+(/[a-z]+)?")
+"""Units whose prefix multiplies the whole unit, unlike that of m^2 or kg."""
+
+
+def _prefix_exponent(value: float) -> int:
+    """Exponent of the SI prefix for a number, a multiple of 3."""
+    return min(max(3 * math.floor(math.log10(abs(value)) / 3 + 1e-12), -18), 9)

@@ -63,17 +63,18 @@ class Driven:
     Args:
         tab: a tab of the browser.
         address: of the page; None: the tab has it open already.
+        bare: open the address as it is; otherwise one without settings opens at the first frame.
     """
 
-    def __init__(self, tab: Page, address: str | None = None):
+    def __init__(self, tab: Page, address: str | None = None, *, bare: bool = False):
         self.tab = tab
         if address is not None:
-            self.open(address)
+            self.open(address, bare=bare)
 
-    def open(self, address: str, ready: str = "yes") -> None:
+    def open(self, address: str, ready: str = "yes", *, bare: bool = False) -> None:
         """Open the address and wait for the first picture (`ready`: "no" for an error sentence instead)."""
         self.tab.goto("about:blank")
-        self.tab.goto(address)
+        self.tab.goto(address if bare or "#" in address else f"{address}#frame=0")
         self.tab.wait_for_selector(f"#grainview[data-ready={ready}]")
         self.settle()
 

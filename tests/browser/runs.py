@@ -40,6 +40,7 @@ class Body:
 
     def __post_init__(self) -> None:
         count, rng = len(self.radius), np.random.default_rng(self.seed)
+        self.id = np.arange(count)
         self.material = (np.arange(count) % 4 == 3).astype(np.uint32)
         self.internal_temperature = 100.0 + np.arange(count, dtype=float)
         density = np.array([one.density for one in self.materials])[self.material]

@@ -45,6 +45,11 @@ class Grains(SimpleNamespace):
     def __len__(self) -> int:
         return len(self.radius)
 
+    @property
+    def id(self) -> np.ndarray:
+        """Identities: the indices."""
+        return np.arange(len(self))
+
 
 def positions(k: int) -> np.ndarray:
     """Positions (12, 3) in radii, inside the box."""

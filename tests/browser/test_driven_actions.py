@@ -121,9 +121,19 @@ def centred(view: Driven) -> None:
     assert np.allclose(view.look()["target"], view.run("app.selection.centre()"), atol=1e-4)
 
 
+def sees_largest(view: Driven) -> None:
+    """The eye aims at the middle of the largest cluster, that of grain 0, and is not farther than for the whole box."""
+    members = view.run("Array.from(app.selection.largestCluster())")
+    assert members[0] == 1
+    positions = np.reshape(view.run("Array.from(app.picture.positions)"), (-1, 3))[np.array(members) == 1]
+    middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
+    assert np.allclose(view.look()["target"], middle, atol=1e-4)
+    assert view.look()["height"] <= view.run("app.camera.overview().height")
+
+
 def is_reset(view: Driven) -> None:
     assert np.allclose(view.look()["from"], np.array([0.52, -0.74, 0.43]) / np.linalg.norm([0.52, -0.74, 0.43]))
-    assert view.look()["height"] == pytest.approx(view.run("app.camera.overview().height"))
+    assert view.look()["height"] == pytest.approx(view.run("app.camera.overview().height"), rel=1e-6, abs=0.0)
 
 
 def copied(view: Driven) -> None:
@@ -159,6 +169,7 @@ ACTIONS: dict[str, tuple[dict, Check]] = {
     "measure-from": ({"grain": 10, "ends": "3"}, captions("grain 10", "distance")),
     "clear": ({"grain": 3, "isolate": True, "follow": True, "ends": "1-2"}, captions()),
     "centre": ({"grain": 5}, centred),
+    "view-largest": ({"frame": MERGED}, sees_largest),
     "reset": ({"look": "1,2,3,1,0,0,0,0,1,5"}, is_reset),
     "along-x": ({}, looks_along([1, 0, 0])),
     "along-y": ({}, looks_along([0, -1, 0])),
@@ -190,6 +201,8 @@ BUTTONS = {
     "previous-event": "Previous event",
     "clear": "Clear selection",
     "centre": "Centre",
+    "view-largest": "Largest cluster",
+    "reset": "Whole box",
     "picture": "Picture or movie",
     "link": "Copy the address of this view",
     "panel": "Settings",

@@ -86,7 +86,9 @@ def test_an_address_is_edited_in_place(tabs, address):
     assert (view.get("frame"), view.get("colour")) == (4, "radius")
     assert (view.get("bonds"), view.get("grain")) == ("plain", -1)
     assert view.control("colour").input_value() == "radius"
-    assert view.look()["target"] == pytest.approx([1, 2, 3]) and view.look()["height"] == pytest.approx(30)
+    assert view.look()["target"] == pytest.approx([1, 2, 3], rel=1e-6, abs=0.0) and view.look()[
+        "height"
+    ] == pytest.approx(30, rel=1e-6, abs=0.0)
     view.tab.evaluate("() => { location.hash = 'frame=4'; }")
     view.tab.wait_for_timeout(50)
     view.settle()

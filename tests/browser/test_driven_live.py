@@ -20,7 +20,7 @@ def run(tmp_path, bundle) -> SmallRun:
 def view(page, run) -> Iterator[Driven]:
     page.set_viewport_size({"width": 800, "height": 560})
     with served(run.folder) as server:
-        yield Driven(page, server.url)
+        yield Driven(page, server.url, bare=True)
 
 
 def until(view: Driven, words: str) -> None:
@@ -36,7 +36,7 @@ def test_new_frames_are_shown(view, run):
     run.append(2)
     until(view, "5 frames")
     assert view.get("frame") == 4 == view.run("app.picture.frame.frame")
-    assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(4.0)
+    assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(4.0, rel=1e-6, abs=0.0)
     assert [mark["frame"] for mark in view.run("app.timeline.events")] == [MERGED]
     line, over = (view.tab.locator(f".gv-plot {part}").bounding_box() for part in (".gv-cursor", ".u-over"))
     assert line["x"] == pytest.approx(over["x"] + view.run("app.plot.chart.valToPos(4, 'x')"), abs=1.5)

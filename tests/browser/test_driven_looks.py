@@ -76,7 +76,7 @@ def test_another_grain_of_the_cluster_that_stands_alone(view):
     view.put(grain=10)
     height = view.look()["height"]
     view.press("z")
-    assert view.look()["height"] == pytest.approx(height) and room(view, 10) < 0.2
+    assert view.look()["height"] == pytest.approx(height, rel=1e-6, abs=0.0) and room(view, 10) < 0.2
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_the_plots_have_what_the_ledger_has(view):
         assert view.text(".gv-plot .u-legend").count("\n") + 1 >= 1
     view.put(plot="contacts")
     assert view.run("app.plot.chart.data.slice(1).map((line) => line.at(-1))") == [7, 8, 1]
-    assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(FRAMES - 1)
+    assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(FRAMES - 1, rel=1e-6, abs=0.0)
     assert "time (ns)" in view.run("app.plot.chart.axes[0].label")
 
 
@@ -111,7 +111,9 @@ def test_dragging_turns(view):
     drag(view, view.pixel_of(11), (80, 30))
     after = view.look()
     assert np.linalg.norm(np.subtract(after["from"], before["from"])) > 0.1
-    assert np.allclose(after["target"], before["target"]) and after["height"] == pytest.approx(before["height"])
+    assert np.allclose(after["target"], before["target"]) and after["height"] == pytest.approx(
+        before["height"], rel=1e-6, abs=0.0
+    )
     assert view.get("grain") == -1
 
 
@@ -141,7 +143,7 @@ def test_the_wheel_goes_nearer(view):
         view.tab.mouse.wheel(0, 300)
         view.tab.wait_for_timeout(50)
         view.settle()
-        assert view.look()["height"] == pytest.approx(before["height"], rel=0.1)
+        assert view.look()["height"] == pytest.approx(before["height"], rel=0.1, abs=0.0)
 
 
 def test_a_click_chooses_what_is_under_it(view):

@@ -101,13 +101,13 @@ def test_a_cell_shows_the_run(cell, kernel):
 def test_keys_belong_to_the_cell_that_has_the_focus(cell):
     """In the cell they play; elsewhere they are the notebook's, and the notebook is asked to leave ours alone."""
     drawn(cell)
-    cell.tab.keyboard.press("ArrowRight")
-    assert "frame 0 of" in cell.text(".gv-time")
-    assert cell.tab.evaluate("() => pressed") == ["ArrowRight"]
+    cell.tab.keyboard.press("ArrowLeft")
+    assert "frame 7 of" in cell.text(".gv-time")
+    assert cell.tab.evaluate("() => pressed") == ["ArrowLeft"]
     cell.tab.locator("canvas.gv-canvas").focus()
-    cell.tab.keyboard.press("ArrowRight")
-    cell.tab.locator(".gv-time", has_text="frame 1 of").wait_for()
-    assert cell.tab.evaluate("() => pressed") == ["ArrowRight"]
+    cell.tab.keyboard.press("ArrowLeft")
+    cell.tab.locator(".gv-time", has_text="frame 6 of").wait_for()
+    assert cell.tab.evaluate("() => pressed") == ["ArrowLeft"]
     assert cell.tab.locator(".gv").get_attribute("data-lm-suppress-shortcuts") == "true"
 
 
@@ -147,5 +147,5 @@ def test_a_frame_that_cannot_be_had(cell, kernel, monkeypatch):
         raise BadInput(f"frame {k} is not whole")
 
     monkeypatch.setattr(kernel.story, "frame", broken)
-    cell.tab.get_by_role("button", name="Last frame").click()
-    cell.tab.locator(".gv-note", has_text="frame 7 is not whole").wait_for()
+    cell.tab.get_by_role("button", name="Previous frame").click()
+    cell.tab.locator(".gv-note", has_text="frame 6 is not whole").wait_for()

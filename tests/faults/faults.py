@@ -97,7 +97,7 @@ FAULTS = (
           "forces/pair/mesh_loops.py",
           "density[k, line, m] += density[k, line, columns + m]", "density[k, line, m] += density[k, line, m]",
           "unit/test_ewald_mesh.py::test_charges_on_the_same_mesh"),
-    Fault("second derivative along z of a tree with the wrong sign", "sign", "loop", "forces/pair/tree_loops.py",
+    Fault("second derivative along z of a tree with the wrong sign", "sign", "loop", "forces/pair/tree_operators.py",
           "x * xz + y * yz - z * (xx + yy)", "x * xz + y * yz + z * (xx + yy)",
           "unit/test_tree.py::test_loads_against_all_pairs"),
     Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "neighbours/cell_list.py",

@@ -331,11 +331,13 @@ def test_cut_off_of_screened_charges():
     open_box, small = sand.Box.open(), sand.Box.periodic("1 um")
     force = sand.ScreenedCharges("20 nm")
     for box in (open_box, small):
-        assert force.choose(grains, box) == (pytest.approx(2e-7), "smooth, 10 screening lengths")
+        assert force.choose(grains, box) == (pytest.approx(2e-7, rel=1e-6, abs=0.0), "smooth, 10 screening lengths")
     radius, reason = sand.ScreenedCharges("0.1 um").choose(grains, small)
-    assert radius == pytest.approx(0.5e-6 / 1.35) and "less than 10 screening lengths, 1 um" in reason
+    assert (
+        radius == pytest.approx(0.5e-6 / 1.35, rel=1e-6, abs=0.0) and "less than 10 screening lengths, 1 um" in reason
+    )
     radius, reason = sand.ScreenedCharges("2 nm").choose(grains, open_box)
-    assert radius == pytest.approx(4e-8) and "two grain diameters" in reason
+    assert radius == pytest.approx(4e-8, rel=1e-6, abs=0.0) and "two grain diameters" in reason
     (text,) = force.check(grains, open_box)
     assert "the largest radius, 10 nm, is not small compared with screening_length = 20 nm" in text
     assert sand.ScreenedCharges("1 um").check(grains, open_box) == []

@@ -56,7 +56,9 @@ def test_ase_reads_xyz(opened_run, tmp_path):
         assert theirs.get_positions() == pytest.approx(ours.position * 1e10, rel=1e-9, abs=1e-6)
         assert theirs.arrays["radius"] == pytest.approx(ours.radius * 1e10, rel=1e-9, abs=0)
         assert theirs.arrays["moment"] == pytest.approx(ours.moment, rel=1e-8, abs=0)
-        assert theirs.pbc.all() and theirs.cell.lengths() == pytest.approx(np.array(ours.drawn) * 1e10, rel=1e-9)
+        assert theirs.pbc.all() and theirs.cell.lengths() == pytest.approx(
+            np.array(ours.drawn) * 1e10, rel=1e-9, abs=0.0
+        )
         assert theirs.info["Time"] == ours.time
     assert frames[0].get_chemical_symbols() == ["Fe"] * 4 + ["Si"] * 2
 
@@ -93,7 +95,7 @@ def test_ovito_reads_xyz_dump_and_gsd(run, opened_run, tmp_path):
         places = data.particles.positions[...][order]
         assert places == pytest.approx(last.position * unit, rel=1e-6, abs=1e-17 * unit)
         assert data.particles["Radius"][...][order] == pytest.approx(last.radius * unit, rel=1e-6, abs=0)
-        assert np.diag(data.cell[:3, :3]) == pytest.approx(np.array(last.drawn) * unit, rel=1e-6)
+        assert np.diag(data.cell[:3, :3]) == pytest.approx(np.array(last.drawn) * unit, rel=1e-6, abs=0.0)
         assert all(data.cell.pbc)
     data = ovito_io.import_file(str(run / "trajectory.gsd")).compute(4)
     assert data.particles.count == 6
@@ -101,7 +103,9 @@ def test_ovito_reads_xyz_dump_and_gsd(run, opened_run, tmp_path):
         tuple(sorted(pair)) for pair in last.pair.tolist()
     }
     scale = last.radius.mean()
-    assert 0.5 * data.particles["Radius"][...].mean() * 2 == pytest.approx(last.radius.mean() / scale, rel=1e-6)
+    assert 0.5 * data.particles["Radius"][...].mean() * 2 == pytest.approx(
+        last.radius.mean() / scale, rel=1e-6, abs=0.0
+    )
 
 
 def test_mdanalysis_reads_gsd_and_dump(run, opened_run, tmp_path):
@@ -113,7 +117,7 @@ def test_mdanalysis_reads_gsd_and_dump(run, opened_run, tmp_path):
     universe.trajectory[-1]
     assert len(universe.trajectory) == 5
     assert universe.atoms.positions * scale == pytest.approx(last.position, rel=1e-5, abs=1e-6 * scale)
-    assert universe.dimensions[:3] * scale == pytest.approx(np.array(last.drawn), rel=1e-6)
+    assert universe.dimensions[:3] * scale == pytest.approx(np.array(last.drawn), rel=1e-6, abs=0.0)
     (dump,) = opened_run.export("lammps-dump", tmp_path / "t")
     other = mda.Universe(str(dump), format="LAMMPSDUMP", topology_format="LAMMPSDUMP")
     assert len(other.trajectory) == 5 and len(other.atoms) == 6
@@ -132,10 +136,10 @@ def test_lammps_reads_data(opened_run, tmp_path):
     last = opened_run.frames[-1]
     order = np.argsort(program.numpy.extract_atom("id")[:6])
     assert program.numpy.extract_atom("x")[:6][order] == pytest.approx(last.position, rel=1e-9, abs=1e-18)
-    assert program.numpy.extract_atom("radius")[:6][order] == pytest.approx(last.radius, rel=1e-9)
-    assert program.numpy.extract_atom("rmass")[:6][order] == pytest.approx(last.mass, rel=1e-6)
-    assert program.numpy.extract_atom("mu")[:6][order][:, :3] == pytest.approx(last.moment, rel=1e-8)
-    assert program.numpy.extract_atom("v")[:6][order] == pytest.approx(last.velocity, rel=1e-6)
+    assert program.numpy.extract_atom("radius")[:6][order] == pytest.approx(last.radius, rel=1e-9, abs=0.0)
+    assert program.numpy.extract_atom("rmass")[:6][order] == pytest.approx(last.mass, rel=1e-6, abs=0.0)
+    assert program.numpy.extract_atom("mu")[:6][order][:, :3] == pytest.approx(last.moment, rel=1e-8, abs=0.0)
+    assert program.numpy.extract_atom("v")[:6][order] == pytest.approx(last.velocity, rel=1e-6, abs=0.0)
 
 
 def test_freud_reads_gsd(run, opened_run):
@@ -148,7 +152,7 @@ def test_freud_reads_gsd(run, opened_run):
         box = freud.box.Box.from_box(stored.configuration.box)
         last = opened_run.frames[-1]
         unit = last.radius.mean()
-        assert [box.Lx * unit, box.Ly * unit, box.Lz * unit] == pytest.approx(last.drawn, rel=1e-6)
+        assert [box.Lx * unit, box.Ly * unit, box.Lz * unit] == pytest.approx(last.drawn, rel=1e-6, abs=0.0)
         query = freud.locality.AABBQuery.from_system(stored)
         reach = float(stored.particles.diameter.max()) * (1 + 1e-6)
         found = query.query(stored.particles.position, {"r_max": reach, "exclude_ii": True}).toNeighborList()

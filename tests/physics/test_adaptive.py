@@ -43,7 +43,7 @@ def run_to(sim, end):
     while sim.time < end * (1 - 1e-15):
         clock[FLIGHT] = min(clock[FLIGHT] or 1e-12, end - sim.time)
         sim.run(steps=1)
-    assert sim.time == pytest.approx(end, rel=1e-14)
+    assert sim.time == pytest.approx(end, rel=1e-14, abs=0.0)
     return sim
 
 
@@ -161,7 +161,9 @@ def test_time_of_first_contact(part):
     sim = adaptive_run(approaching(part * reach))
     sim.run(until="140 ns")
     assert sim.state.count[MADE] == 1
-    assert sim.state.contacts.formed[0] == pytest.approx((1.3e-6 - reach * math.sqrt(1 - part**2)) / SPEED, rel=1e-9)
+    assert sim.state.contacts.formed[0] == pytest.approx(
+        (1.3e-6 - reach * math.sqrt(1 - part**2)) / SPEED, rel=1e-9, abs=0.0
+    )
 
 
 @pytest.mark.compiled("adaptive")
@@ -291,7 +293,7 @@ def test_pair_lists_miss_no_pair():
     a, b = ends
     assert a.state.count[10] > b.state.count[10] > 1  # number of list builds
     assert a.state.contacts.pair[:, 0].tolist() == b.state.contacts.pair[:, 0].tolist()
-    assert a.time == pytest.approx(b.time, rel=1e-8)
+    assert a.time == pytest.approx(b.time, rel=1e-8, abs=0.0)
     apart = np.array([sand.Box.periodic(BOX).nearest(x) for x in a.grains.position - b.grains.position])
     assert np.abs(apart).max() < 1e-6 * R
     # no grains overlap but the pair in contact
@@ -410,7 +412,7 @@ def test_wrong_settings_have_a_line_each():
     assert settled.velocity_error > 0
     assert settled.spin_error > 0
     given = adaptive_run(scattering_pair(), sand.Adaptive(position_error="1 pm", spin_error="1e3 rad/s")).stepping
-    assert (given.position_error, given.spin_error) == (pytest.approx(1e-12), 1e3)
+    assert (given.position_error, given.spin_error) == (pytest.approx(1e-12, rel=1e-6, abs=0.0), 1e3)
 
 
 CASE = """

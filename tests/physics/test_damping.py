@@ -147,7 +147,7 @@ def test_critical_damping_ratio(mode):
     if mode == 1:  # k_s √(7/2 · …) is that of touching spheres, without the overlap δ0 of 1 %
         stiffness /= pair.stretch**2
     inverse = pair.inverse_mass[mode, mode] if mode != 1 else 3.5 * pair.inverse_mass[0, 0]
-    assert (damping * inverse) ** 2 == pytest.approx(4 * stiffness * inverse, rel=1e-12)
+    assert (damping * inverse) ** 2 == pytest.approx(4 * stiffness * inverse, rel=1e-12, abs=0.0)
 
 
 def random_contact(rng):
@@ -389,7 +389,7 @@ def test_a_bath_gives_every_mode_its_share(ratio):
     stored, kinetic, expected, heat = equilibrium(ratio, 25, 20)
     step_error = (2 * math.pi / 25) ** 2 / 4
     assert (np.abs(stored / (FREEDOM / 2) - 1) < 4 * np.sqrt(2 / (6000 * FREEDOM)) + step_error).all()
-    assert kinetic == pytest.approx(expected, rel=4 * math.sqrt(2 / (6000 * 6)) + step_error)
+    assert kinetic == pytest.approx(expected, rel=4 * math.sqrt(2 / (6000 * 6)) + step_error, abs=0.0)
     assert (np.abs(heat) < 4 * np.sqrt(2 * FREEDOM / 400)).all()
 
 
@@ -404,7 +404,7 @@ def test_equipartition_to_two_percent(ratio):
     apart = 1e-10 if ratio > 0.1 else 4e-10
     stored, kinetic, expected, heat = equilibrium(ratio, 50, 300, "0.5 ns" if ratio > 0.1 else "2 ns", apart)
     np.testing.assert_allclose(stored, FREEDOM / 2, rtol=0.02)
-    assert kinetic == pytest.approx(expected, rel=0.01)
+    assert kinetic == pytest.approx(expected, rel=0.01, abs=0.0)
     assert (np.abs(heat) < 4 * np.sqrt(2 * FREEDOM / 400)).all()
 
 
@@ -544,7 +544,7 @@ def test_sticking_speed_without_and_with_damping():
     for ratio, limit in ((0.1, 2.056), (0.2, 3.398), (0.5, 11.35)):
         assert rebound(ratio, 0.999 * limit, 100) == rebound_by_quadrature(ratio, 0.999 * limit) == 0.0
         for factor in (1.01 * limit, 2 * limit):
-            assert rebound(ratio, factor, 100) == pytest.approx(rebound_by_quadrature(ratio, factor), rel=0.01)
+            assert rebound(ratio, factor, 100) == pytest.approx(rebound_by_quadrature(ratio, factor), rel=0.01, abs=0.0)
 
 
 @pytest.mark.compiled("contacts")

@@ -23,14 +23,15 @@ def default_threads():
 FORCES = {
     "dipoles": sand.Dipoles(periodic="ewald", reciprocal="direct"),
     "dipoles with a mesh": sand.Dipoles(periodic="ewald", reciprocal="mesh"),
-    "charges": sand.Charges(periodic="ewald"),
+    "charges": sand.Charges(periodic="ewald", reciprocal="direct"),
+    "charges with a mesh": sand.Charges(periodic="ewald", reciprocal="mesh"),
 }
 EACH = pytest.mark.parametrize("name", FORCES)
 
 
 def aggregate(name, **options):
     """A vibrating aggregate of 12 iron grains, with moments or with charges, in a small box, whose images act on it."""
-    given = {"charge": 3e-18 * (-1.0) ** np.arange(12)} if name == "charges" else {"moment": "200 A m^2/kg"}
+    given = {"charge": 3e-18 * (-1.0) ** np.arange(12)} if "charges" in name else {"moment": "200 A m^2/kg"}
     grains = random_aggregate(12, 4, material=sand.IRON, **given)
     return sand.Simulation(grains, [sand.Contact(), FORCES[name]], box=BOX, **options)
 

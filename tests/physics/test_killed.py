@@ -48,6 +48,57 @@ pressure = "1 mbar"
 """
 
 
+CHANGED = """
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import sand
+import sand.simulation.run_writer as writer
+
+writer.CHECKPOINT_EVERY = writer.AT_OUTPUT_EVERY = 0.02
+writer.RunWriter.draw = lambda *_: None
+
+
+class Replace(sand.Updater):
+    every = "1.7 ns"
+
+    def act(self, simulation):
+        with simulation.change() as state:
+            leaving = state.grains.position[:, 0] > 0.165e-6
+            state.remove(leaving)
+            state.velocity[:, 0] += 0.3
+            entry = np.array([-0.15e-6, 1e-9 * (simulation.steps % 150), 0.0])
+            if leaving.any() and np.linalg.norm(state.grains.position - entry, axis=1).min() > 30e-9:
+                state.add(sand.Grains([entry], "8 nm", "silica"))
+
+
+folder, updaters = Path(sys.argv[1]), [Replace()]
+if list(folder.glob("checkpoint-*.npz")):
+    simulation = sand.resume(folder, updaters=updaters)
+else:
+    iron = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg", "charge": 1e-19}
+    grains = sand.setup.gas(40, "0.35 um", temperature="3000 K", seed=5, **iron)
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, bath_temperature="100 K")
+    forces = [contact, sand.Dipoles(), sand.Charges(), sand.Gas(temperature="100 K", pressure="1 mbar")]
+    options = {"seed": 3, "frame_every": "0.2 ns", "out": folder, "overwrite": True, "updaters": updaters}
+    simulation = sand.Simulation(grains, [*forces, sand.Field("10 mT")], box="0.35 um", **options)
+if simulation.time < 10e-9:
+    simulation.run(until="10 ns")
+if simulation.time == 10e-9 and simulation.forces[-1].name == "field":
+    with simulation.change() as state:
+        state.forces = state.forces[:-1]
+        state.scale_box(1.02)
+simulation.run(until="40 ns", stop="time > 25 ns and contacts >= 3")
+"""
+
+
+def changed_run(folder):
+    """A process that runs the script CHANGED, or goes on with it."""
+    return subprocess.Popen([sys.executable, "-c", CHANGED, str(folder)], stderr=subprocess.PIPE)
+
+
 def sand_command(*words):
     """A `sand` process that writes a checkpoint every 0.05 s."""
     script = (
@@ -141,3 +192,35 @@ def test_stopped_four_times(undisturbed_run, tmp_path, seed, kind):
     assert_same_as_undisturbed(
         undisturbed_run, killed_and_resumed(undisturbed_run, tmp_path, random.Random(100 + seed), 4, kind)
     )
+
+
+@pytest.fixture(scope="module")
+def undisturbed_change(tmp_path_factory):
+    """Folder of a run with changes by the script and by an updater, and the number of its rows."""
+    folder = tmp_path_factory.mktemp("changed") / "run"
+    job = changed_run(folder)
+    errors = job.communicate()[1].decode()
+    assert job.returncode == 0, errors
+    frames = read_frames(folder / "trajectory.gsd")
+    assert len({frame.id.tobytes() for frame in frames}) >= 3 and len(frames[-1].pair) >= 3
+    assert frames[-1].time < 40e-9 and len(frames[-1].materials) == 2
+    return None, folder, len(frames)
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("moment", range(1, 11))
+def test_killed_with_changes_an_updater_and_a_condition(undisturbed_change, tmp_path, moment):
+    """Grains removed and added, a scaled box, a force left out; killed after each eleventh of the rows: same bits."""
+    folder, ledger = tmp_path / "run", tmp_path / "run" / "ledger.csv"
+    job = changed_run(folder)
+    while job.poll() is None and not (
+        ledger.exists() and len(ledger.read_text().splitlines()) > undisturbed_change[2] * moment / 11
+    ):
+        time.sleep(0.002)
+    assert job.poll() is None
+    job.send_signal(KILL)
+    job.communicate()
+    job = changed_run(folder)
+    errors = job.communicate()[1].decode()
+    assert job.returncode == 0, errors
+    assert_same_as_undisturbed(undisturbed_change, folder)

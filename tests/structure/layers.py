@@ -17,8 +17,9 @@ MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 LAYERS = (
     ("errors", "constants", "version"),
     ("units",),
+    ("descriptions",),
     ("arguments",),
-    ("material", "schema", "threads"),
+    ("material", "ramps", "schema", "threads"),
     ("compiler",),
     ("numerics",),
     ("box",),

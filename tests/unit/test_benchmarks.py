@@ -21,7 +21,7 @@ def test_a_row_passes_if_all_its_limits_are_met():
     good = table.row("x", pair, "ns", 2.5, scale=1e9, of="peer", ratio_asked=4.0, share=0.7, share_asked=0.65)
     assert tuple(good) == table.KEYS
     assert good["met"] is True
-    assert (good["ours"], good["peer"], good["ratio"]) == pytest.approx((2.0, 10.0, 5.0))
+    assert (good["ours"], good["peer"], good["ratio"]) == pytest.approx((2.0, 10.0, 5.0), rel=1e-6, abs=0.0)
     assert table.row("x", pair, "ns", 1.5, scale=1e9)["met"] is False
     assert table.row("x", pair, "ns", ratio_asked=6.0)["met"] is False
     assert table.row("x", pair, "ns", share=0.5, share_asked=0.65)["met"] is False
@@ -61,15 +61,16 @@ def test_lammps_input_of_a_grain():
     grains = worlds.shaken(np.array([[0.0, 0, 0], [2e-6, 0, 0]]))
     lines = decks.data(grains).splitlines()
     first = lines[lines.index("Atoms # sphere") + 2].split()
-    assert [float(word) for word in first] == pytest.approx([1, 1, 1.2, 2.0, -1.0, 0.0, 0.0])
+    assert [float(word) for word in first] == pytest.approx([1, 1, 1.2, 2.0, -1.0, 0.0, 0.0], rel=1e-6, abs=0.0)
     speed = lines[lines.index("Velocities") + 2].split()[1:4]
-    assert [float(word) for word in speed] == pytest.approx(grains.velocity[0].tolist())
+    assert [float(word) for word in speed] == pytest.approx(grains.velocity[0].tolist(), rel=1e-6, abs=0.0)
 
 
 def test_bytes_of_counts_every_array():
     """Arrays of grains, contacts, pairs and lists, at any nesting."""
     system = worlds.lattice(3).state
     parts = (system.grains.arrays, system.contacts, system.pair_list, system.long_range, system.runge_kutta)
+    parts += (system.walls, system.wall_contacts)
     alone = (system.clock, system.count, system.lost, system.cutoff)
     assert pieces.bytes_of(system) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
 
@@ -129,7 +130,7 @@ def test_bytes_per_step_of_a_contact():
     per_grain = sum(a.nbytes for a in sim.state.grains.arrays) / 27
     constants = 0 if sim.state.uniform_contacts else 8 * sim.state.contacts.constants.shape[0]
     side = sim.state.contacts.side.nbytes / sim.state.contacts.side.size
-    assert steps.touched_bytes(sim) == pytest.approx(54 * (137 + side + constants) + 27 * per_grain)
+    assert steps.touched_bytes(sim) == pytest.approx(54 * (137 + side + constants) + 27 * per_grain, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize("count", [16, 32])
@@ -143,8 +144,8 @@ def test_slowest_bending_of_a_chain_is_that_of_a_beam(count):
     mass, distance = sand.IRON.density * 4 / 3 * np.pi * 1e-24, 2e-8 - numbers.rest_overlap
     bending = numbers.roll_stiffness * numbers.reduced_radius**2
     expected = 4.73004**2 / count**2 / distance * np.sqrt(bending / mass)
-    assert value.imag == pytest.approx(expected, rel=0.02)
-    assert -value.real == pytest.approx(0.2 * abs(value) ** 2 * numbers.roll_period / (2 * np.pi), rel=0.01)
+    assert value.imag == pytest.approx(expected, rel=0.02, abs=0.0)
+    assert -value.real == pytest.approx(0.2 * abs(value) ** 2 * numbers.roll_period / (2 * np.pi), rel=0.01, abs=0.0)
 
 
 def test_the_table_of_decay_times_is_that_of_the_linear_modes():
@@ -155,8 +156,8 @@ def test_the_table_of_decay_times_is_that_of_the_linear_modes():
     for row in rows:
         value, _ = settling.slowest_bending(int(row[0]))
         expected = 2e9 * np.pi / value.imag, -1e9 / value.real, -0.5e9 / value.real
-        assert [float(text) for text in row[1:4]] == pytest.approx(expected, rel=5e-3)
-        assert float(row[4]) == pytest.approx(expected[2], rel=0.02)
+        assert [float(text) for text in row[1:4]] == pytest.approx(expected, rel=5e-3, abs=0.0)
+        assert float(row[4]) == pytest.approx(expected[2], rel=0.02, abs=0.0)
 
 
 @pytest.mark.filterwarnings("ignore:contacts of iron")
@@ -169,4 +170,4 @@ def test_bending_of_a_damped_chain_decays_as_its_linear_mode(count):
     about a straight line, and the fit extends over whole periods.
     """
     value, shape = settling.slowest_bending(count)
-    assert settling.simulated_decay(count, value, shape) == pytest.approx(-0.5 / value.real, rel=0.01)
+    assert settling.simulated_decay(count, value, shape) == pytest.approx(-0.5 / value.real, rel=0.01, abs=0.0)

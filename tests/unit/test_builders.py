@@ -285,7 +285,7 @@ def test_other_programs_read_bodies(tmp_path):
     ase_io = pytest.importorskip("ase.io")
     atoms = ase_io.read(write_body(tmp_path / "a.xyz", body))
     assert atoms.positions == pytest.approx(body.position * 1e10, rel=1e-12, abs=1e-6)
-    assert atoms.arrays["radius"] == pytest.approx(body.radius * 1e10)
+    assert atoms.arrays["radius"] == pytest.approx(body.radius * 1e10, rel=1e-6, abs=0.0)
     again = tmp_path / "b.xyz"
     ase_io.write(again, atoms, format="extxyz")
     assert body_from_file(again, M).position == pytest.approx(body.position, abs=1e-17)
@@ -301,7 +301,9 @@ def test_gsd_files_of_other_programs(tmp_path):
     with gsd.hoomd.open(str(tmp_path / "two.gsd"), "w") as file:
         file.append(frame)
     body = read_body(tmp_path / "two.gsd", M, length="2 um")
-    assert body.radius == pytest.approx([1e-6, 1e-6]) and np.ptp(body.position[:, 0]) == pytest.approx(1.998e-6)
+    assert body.radius == pytest.approx([1e-6, 1e-6], rel=1e-6, abs=0.0) and np.ptp(
+        body.position[:, 0]
+    ) == pytest.approx(1.998e-6, rel=1e-6, abs=0.0)
 
 
 HEAD = "length_unit=um Properties=species:S:1:pos:R:3:radius:R:1"
@@ -386,7 +388,7 @@ def test_the_command(tmp_path, capsys, monkeypatch, kind):
     output = json.loads(capsys.readouterr().out)
     assert output["grains"] == 64 and output["file"] == "a.xyz"
     body = body_from_file("a.xyz")
-    assert output["radius_of_gyration"] == pytest.approx(size_of(body))
+    assert output["radius_of_gyration"] == pytest.approx(size_of(body), rel=1e-6, abs=0.0)
     assert output["contacts"] == len(pairs_in_contact(body)[0])
     if kind == "chain":
         assert output["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)

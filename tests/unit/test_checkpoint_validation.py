@@ -11,12 +11,27 @@ import sand
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
-from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
+from sand.state.arrays import SAVED_WALLS
+from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS, WALL_CONTACTS
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))
 META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
-WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32)}
+ONE_WALL = {
+    **{f"walls/{name}": np.zeros((3, 1)) for name in SAVED_WALLS},
+    "walls/work": np.zeros(1),
+    "wall_contacts/pair": np.zeros((2, 1), np.uint32),
+    **{f"wall_contacts/{name}": np.zeros((3, 1)) for name in ("pointer1", "pointer2", "force", "torque1")},
+    **{f"wall_contacts/{name}": np.zeros(1) for name in ("twist", "formed")},
+    "wall_contacts/constants": np.ones((5, 1)),
+    "wall_contacts/lost": np.zeros((4, 1)),
+    "wall_contacts/damping": np.zeros((12, 1)),
+    "wall_contacts/flag": np.zeros(1, np.uint8),
+}
+"""A wall with one contact."""
+WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL}
+WITH_ORDER["count"] = ARRAYS["count"].copy()
+WITH_ORDER["count"][WALL_CONTACTS] = 1
 FAR = 2**31 - 1
 """An index out of range."""
 
@@ -69,6 +84,8 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
             "grains/radius",
             "contacts/pair",
             "pair_list/pair",
+            "walls/work",
+            "wall_contacts/pair",
         )  # then other arrays are inconsistent
         assert sizing or f"'{name}'" in message, (what, message)
     if STORED[name].required:
@@ -98,7 +115,7 @@ def test_inconsistent_lists(tmp_path):
         ("pair_list/pair", (1, 0), ARRAYS["pair_list/pair"][0, 0], "the same grain twice"),
         ("contacts/start", 1, 5, "'contacts/start'"),
         ("order", 0, 1, "once"),
-        ("grains/id", 0, 1, "once"),
+        ("grains/id", 0, 1, "each once"),
     ):
         assert words in error_of(tmp_path, changed_entry(name, index, value))
     turned = ARRAYS["contacts/side"][::-1].copy()

@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from sand.cli import report
 from sand.cli.main import main
 from sand.cli.progress import Progress
 from sand.config.build import simulation_of
@@ -98,7 +99,7 @@ def test_run_prints_settings_that_differ_from_defaults(workdir, capsys):
     (workdir / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nslip = "reset"'))
     (workdir / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
     assert main(["info", "small.toml"]) == 0
-    assert "contact (slip = reset), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
+    assert "contact (slip = reset), dipoles, field (flux_density = (0, 0, 1 mT))" in capsys.readouterr().out
 
 
 @pytest.mark.compiled("dipoles")
@@ -517,3 +518,38 @@ def test_progress_of_a_resumed_run_has_numbers_from_the_start(done, monkeypatch)
     bar.finish()
     assert " clusters, S = " in terminal.getvalue()
     assert " 20%" in terminal.getvalue()
+
+
+def lines_of_progress(monkeypatch, capsys, updates, total=1.0, rate=1.0):
+    """What is printed, without a terminal, when the position grows by these steps, one in `rate` seconds."""
+    clock = [0.0]
+    monkeypatch.setattr("sand.cli.report.time.monotonic", lambda: clock[0])
+    with report.progress_bar(total, False) as bar:
+        bar.set_description_str("drawing maps")
+        for step in updates:
+            clock[0] += rate
+            bar.update(step)
+    return capsys.readouterr().err.splitlines()
+
+
+def test_progress_in_a_log(monkeypatch, capsys):
+    """Without a terminal: a line each 30 s or 5 % of the work, whichever comes first; none within a second."""
+    slow = lines_of_progress(monkeypatch, capsys, [1e-4] * 100)
+    assert slow[0] == "sand: 0%, drawing maps, 30 s, 2 h 46 min left" and len(slow) == 3
+    quick = lines_of_progress(monkeypatch, capsys, [1 / 64] * 64, rate=3.0)
+    assert quick[0] == "sand: 6%, drawing maps, 12 s, 3 min 00 s left" and len(quick) == 16
+    assert lines_of_progress(monkeypatch, capsys, [0.1] * 9, rate=0.1) == []
+    unknown = lines_of_progress(monkeypatch, capsys, [1000.0] * 90, total=None)
+    assert unknown == ["sand: drawing maps, 30 s", "sand: drawing maps, 1 min 00 s", "sand: drawing maps, 1 min 30 s"]
+
+
+@pytest.mark.compiled("dipoles")
+def test_a_run_in_a_log_says_what_it_does(workdir, monkeypatch, capsys):
+    """Lines with simulated time, speed, clusters, S and drift, and a line before the figure is drawn."""
+    monkeypatch.setattr("sand.cli.report.LINE_AT_LEAST", 0.0)
+    assert main(["run", "small.toml"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert "sand: drawing the figure …" in lines
+    assert any("%, " in line and " ns, " in line and " clusters, S = " in line and "s/s" in line for line in lines)
+    assert main(["run", "small.toml", "--quiet", "--overwrite"]) == 0
+    assert not any("clusters" in line or "drawing" in line for line in capsys.readouterr().err.splitlines())

@@ -36,9 +36,9 @@ def test_equal_single_grains():
     grains = gas()
     kelvin, mass, moment = kinetic_temperature(grains), grains.mass[0], np.linalg.norm(grains.moment[0])
     expected = math.sqrt(3.0) * (2.0 * MAGNETIC * moment**2 / (0.5 * mass * (BOLTZMANN * kelvin / mass))) ** (1.0 / 3.0)
-    assert kelvin == pytest.approx(100.0, rel=1e-9)
-    assert capturing_pair(grains, None, kelvin) == (pytest.approx(expected, rel=1e-12), 1, 1)
-    assert sand.Dipoles().choose(grains, BOX).radius == pytest.approx(1.5 * expected, rel=1e-12)
+    assert kelvin == pytest.approx(100.0, rel=1e-9, abs=0.0)
+    assert capturing_pair(grains, None, kelvin) == (pytest.approx(expected, rel=1e-12, abs=0.0), 1, 1)
+    assert sand.Dipoles().choose(grains, BOX).radius == pytest.approx(1.5 * expected, rel=1e-12, abs=0.0)
 
 
 def test_clusters_count_with_their_net_moments():
@@ -47,7 +47,7 @@ def test_clusters_count_with_their_net_moments():
     grains = sand.Grains(1e-7 * np.arange(18.0).reshape(6, 3), "10 nm", "iron", moment=moment)
     found = capturing_pair(grains, np.array([0, 0, 0, 1, 1, 2]), 50.0)
     expected = math.sqrt(3.0) * (4.0 * MAGNETIC * 3.0 * 36e-36 / (BOLTZMANN * 50.0)) ** (1.0 / 3.0)
-    assert found == (pytest.approx(expected, rel=1e-12), 2, 1)
+    assert found == (pytest.approx(expected, rel=1e-12, abs=0.0), 2, 1)
     assert str(found) == "a cluster of 2 grains and a single grain"
     assert capturing_pair(grains, np.zeros(6, int), 50.0).capture == 0.0  # one cluster
     assert capturing_pair(grains, None, 0.0).capture == math.inf
@@ -59,8 +59,8 @@ def test_the_temperature_is_that_of_the_clusters():
     velocity = grains.velocity.reshape(3, 2, 3).mean(axis=1)  # equal masses
     velocity = velocity - velocity.mean(axis=0)
     energy = 0.5 * 2.0 * grains.mass[0] * (velocity**2).sum()
-    assert kinetic_temperature(grains, labels) == pytest.approx(2.0 * energy / (6.0 * BOLTZMANN), rel=1e-12)
-    assert kinetic_temperature(grains, np.arange(6)) == pytest.approx(kinetic_temperature(grains), rel=1e-12)
+    assert kinetic_temperature(grains, labels) == pytest.approx(2.0 * energy / (6.0 * BOLTZMANN), rel=1e-12, abs=0.0)
+    assert kinetic_temperature(grains, np.arange(6)) == pytest.approx(kinetic_temperature(grains), rel=1e-12, abs=0.0)
 
 
 def test_a_new_choice_needs_growth_by_a_tenth_and_never_shortens():
@@ -71,9 +71,9 @@ def test_a_new_choice_needs_growth_by_a_tenth_and_never_shortens():
     state, start = state_of(grains, [], follower.values.copy()), follower.values[CUT_RADIUS]
     assert follower.update(state) is None and follower.present(state) == ""
     state = state_of(grains, [(0, 1)], state.cutoff, 1e-9)
-    assert follower.update(state) == pytest.approx(start * 2.0 ** (1.0 / 3.0), rel=1e-12)
+    assert follower.update(state) == pytest.approx(start * 2.0 ** (1.0 / 3.0), rel=1e-12, abs=0.0)
     state = state_of(grains, [(0, 1), (2, 4)], state.cutoff, 2e-9)
-    assert follower.update(state) == pytest.approx(start * 4.0 ** (1.0 / 3.0), rel=1e-12)
+    assert follower.update(state) == pytest.approx(start * 4.0 ** (1.0 / 3.0), rel=1e-12, abs=0.0)
     assert follower.update(state) is None
     assert "since 2 ns" in follower.present(state) and "clusters of 2 and 2 grains" in follower.present(state)
     kept = state.cutoff.copy()
@@ -92,7 +92,7 @@ def test_half_the_box_limits_the_choice_and_the_note_is_kept():
     follower = follow_clusters([sand.Dipoles()], grains, box, NO_PAIRS, None, None)
     state = state_of(grains, [(0, 1)], follower.values.copy(), 1e-9)
     assert follower.note(state) == ""
-    assert follower.update(state) == pytest.approx(1.1 * start, rel=1e-12)
+    assert follower.update(state) == pytest.approx(1.1 * start, rel=1e-12, abs=0.0)
     assert "from 1 ns on half the box / 1.35" in follower.note(state) == follower.message(state, start)
     state = state_of(grains, [(0, 1), (1, 2), (2, 3)], state.cutoff, 2e-9)
     assert follower.update(state) is None

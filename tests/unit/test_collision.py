@@ -118,6 +118,14 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert "not empty" in capsys.readouterr().err
     assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one"]) == 0
     assert "seed 2" in capsys.readouterr().out
+    monkeypatch.setattr("sand.cli.report.LINE_AT_LEAST", 0.0)
+    assert main(["collide", "hit.toml", "--overwrite"]) == 0
+    assert {"1 of 2 collisions", "2 of 2 collisions"} <= {
+        part for line in capsys.readouterr().err.splitlines() for part in line.split(", ")
+    }
+    monkeypatch.setattr("sand.cli.report.LINE_EVERY", 0.0)
+    assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one", "--overwrite"]) == 0
+    assert " ns, " in (err := capsys.readouterr().err) and "clusters, S = " in err
     assert (tmp_path / "one" / "trajectory.gsd").exists()
     assert json.loads((tmp_path / "one" / "collision.json").read_text())["collisions"][0] == message["collisions"][1]
 

@@ -97,9 +97,9 @@ def test_the_real_part_of_charges():
     for own, closed, smooth, bare in zip(ours, screened(4.5, r, 0), smeared(4.5, r, 0), (1, 1, 3), strict=True):
         power = 1 if own is ours[0] else 3 if bare == 1 else 5
         far = r > 0.4
-        assert (bare / r**power - closed)[far] == pytest.approx(smooth[far], rel=1e-10)
+        assert (bare / r**power - closed)[far] == pytest.approx(smooth[far], rel=1e-10, abs=0.0)
         assert own == pytest.approx(smooth, abs=1e-8 * smooth.max())
-    assert (p(1.0), -4 * p.deriv()(1.0), 16 * p.deriv(2)(1.0)) == pytest.approx((1, 1, 3), rel=1e-11)
+    assert (p(1.0), -4 * p.deriv()(1.0), 16 * p.deriv(2)(1.0)) == pytest.approx((1, 1, 3), rel=1e-11, abs=0.0)
 
 
 CORNERS = np.array(list(itertools.product((0.0, 0.5), repeat=3)))
@@ -123,7 +123,7 @@ def test_lattice_energies(sites, signs, expected):
     1951).  The accuracy of 1e-8 of a gas is 2e-8 of these energies.  Forces are 0 by symmetry.
     """
     force, energy = loads((np.array(sites) - 0.4) * CUBE, Q * np.array(signs), CUBE, accuracy=1e-8)
-    assert energy / (COULOMB * Q**2 / CUBE[0]) == pytest.approx(expected, rel=4e-8)
+    assert energy / (COULOMB * Q**2 / CUBE[0]) == pytest.approx(expected, rel=4e-8, abs=0.0)
     assert np.abs(force).max() < 1e-12 * COULOMB * Q**2 / CUBE[0] ** 2
 
 
@@ -223,7 +223,7 @@ def test_forces_of_grains_in_contact():
     expected = COULOMB * -2 * Q**2 * apart / np.linalg.norm(apart) ** 3
     for listed in (False, True):
         found, *torques = force.sums(box, listed).pair(grains.arrays, box.span, force.numbers(grains, box), 0, 1)
-        assert found == pytest.approx(expected, rel=1e-9) and not np.any(torques)
+        assert found == pytest.approx(expected, rel=1e-9, abs=0.0) and not np.any(torques)
 
 
 def test_the_cheapest_parameters_of_charges_are_chosen():
@@ -253,6 +253,7 @@ def test_the_choice_and_a_net_charge_are_stated():
     neutral = sand.Grains(position, 1e-9, sand.SILICA, charge=charge - charge.mean())
     assert force.check(neutral, box) == []
     kept = {"cutoff": "auto", "cut": "smooth", "periodic": "ewald", "accuracy": 1e-4, "boundary": "tin-foil"}
+    kept |= {"reciprocal": "auto"}
     assert force.parameters() == force.resolved(grains, box) == dataclasses.asdict(force) == kept
 
 

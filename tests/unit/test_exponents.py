@@ -36,11 +36,11 @@ def test_the_error_of_scattered_outputs_is_that_of_least_squares():
     rate = 3.0 * size**0.4 * np.exp(0.05 * np.tile([1, -1, -1, 1], 2))
     (slope, _), covariance = np.polyfit(np.log(size), np.log(rate), 1, cov=True)
     fit = fitted(rate, size=size)
-    assert fit.degree == pytest.approx(slope, rel=1e-10)
-    assert fit.degree_error == pytest.approx(math.sqrt(covariance[0, 0]), rel=1e-10)
-    assert fit.half_width == pytest.approx(2.4469 * fit.degree_error, rel=1e-4)
+    assert fit.degree == pytest.approx(slope, rel=1e-10, abs=0.0)
+    assert fit.degree_error == pytest.approx(math.sqrt(covariance[0, 0]), rel=1e-10, abs=0.0)
+    assert fit.half_width == pytest.approx(2.4469 * fit.degree_error, rel=1e-4, abs=0.0)
     for z, degree in [(fit.exponent, slope), (fit.low, slope - fit.half_width), (fit.high, slope + fit.half_width)]:
-        assert z == pytest.approx(1.0 / (1.0 - degree), rel=1e-9)
+        assert z == pytest.approx(1.0 / (1.0 - degree), rel=1e-9, abs=0.0)
 
 
 def test_coverage_of_the_95_percent_interval():
@@ -56,15 +56,15 @@ def test_the_error_includes_the_curvature():
     """λ = 0.3 in the first half of the outputs and 0.5 in the last: λ = 0.4 ± 0.2."""
     u = np.log(SIZE) - np.log(SIZE).mean()
     fit = fitted(np.exp(0.4 * u + 0.1 * np.abs(u)))
-    assert fit.degree == pytest.approx(0.4, rel=1e-10)
-    assert fit.degree_error == pytest.approx(0.2, rel=1e-10)
+    assert fit.degree == pytest.approx(0.4, rel=1e-10, abs=0.0)
+    assert fit.degree_error == pytest.approx(0.2, rel=1e-10, abs=0.0)
 
 
 def test_the_error_includes_the_numerical_error():
     """Exact lines: the error of λ = 0.4 is at least the change to 0.41 (tighter solver) or 0.37 (other counting)."""
     fit = fitted(SIZE**0.4, SIZE**0.41)
-    assert fit.degree_error == pytest.approx(0.01, rel=1e-9)
-    assert fitted(SIZE**0.4, SIZE**0.41, SIZE**0.37).degree_error == pytest.approx(0.03, rel=1e-9)
+    assert fit.degree_error == pytest.approx(0.01, rel=1e-9, abs=0.0)
+    assert fitted(SIZE**0.4, SIZE**0.41, SIZE**0.37).degree_error == pytest.approx(0.03, rel=1e-9, abs=0.0)
 
 
 def test_exponential_growth_with_rounding_errors():
@@ -138,7 +138,7 @@ def test_sums_of_sizes_at_the_top_of_the_grid_stay():
     for top in (2.0, 2.0 * (1.0 - 2.0**-52), 2.0 * (1.0 + 2.0**-52)):
         grown = coagulate(kinetics.constant(RATE), [1.0, top], DENSITY, times[:1], mass=MASS, may_lose=0.9)
         exact = coagulate(kinetics.constant(RATE), [1.0, 2.0], DENSITY, times[:1], mass=MASS, may_lose=0.9)
-        assert grown.lost == pytest.approx(exact.lost, rel=1e-6)
+        assert grown.lost == pytest.approx(exact.lost, rel=1e-6, abs=0.0)
         assert (grown.mass + grown.lost) / (MASS * DENSITY) == pytest.approx(1.0, rel=1e-13, abs=0.0)
 
 
@@ -147,7 +147,7 @@ def test_exponents_that_add_up_to_one():
     assert 0.7 + 0.2 + 0.1 < 1.0
     with pytest.raises(sand.BadInput, match="not a power of time"):
         theory.dynamic_exponent(0.7 + 0.2, 0.1)
-    assert theory.dynamic_exponent(0.799, 0.2) == pytest.approx(1000.0, rel=1e-9)
+    assert theory.dynamic_exponent(0.799, 0.2) == pytest.approx(1000.0, rel=1e-9, abs=0.0)
 
 
 def test_laws_near_an_exponential_are_fitted_to_all_digits():
@@ -174,12 +174,12 @@ def test_dimensions_do_not_depend_on_rounding():
     half = RNG.normal(size=(40, 3))
     shell = np.concatenate([half, -half]) / np.linalg.norm(np.concatenate([half, half]), axis=1)[:, None]
     turned = [correlation_dimension(shell @ np.linalg.qr(RNG.normal(size=(3, 3)))[0]).value for _ in range(8)]
-    assert turned == pytest.approx([correlation_dimension(shell).value] * 8, rel=1e-9)
+    assert turned == pytest.approx([correlation_dimension(shell).value] * 8, rel=1e-9, abs=0.0)
     rods = [
         correlation_dimension(np.column_stack([unit * np.arange(300.0), np.zeros((300, 2))]), (least, 40 * unit))
         for unit, least in ((1.0, 3.0), (0.1, 0.3), (0.7, 2.1), (1e-8, 3e-8))
     ]
-    assert [rod.value for rod in rods] == pytest.approx([rods[0].value] * 4, rel=1e-9)
+    assert [rod.value for rod in rods] == pytest.approx([rods[0].value] * 4, rel=1e-9, abs=0.0)
 
 
 def test_a_measured_kernel_is_symmetric_bit_for_bit():

@@ -19,8 +19,10 @@ def test_interval_of_a_mean():
     """exp(m + s²/2 ± t √(s²/n + s⁴/2(n − 1))): of e⁰ and e², m = 1, s² = 2, n = 2, t = 12.7."""
     low, high = mean_interval(np.array([1.0, math.e**2]))
     half = t.ppf(0.975, 1) * math.sqrt(2.0 / 2.0 + 4.0 / 2.0)
-    assert math.log(low) == pytest.approx(2.0 - half) and math.log(high) == pytest.approx(2.0 + half)
-    assert mean_interval(np.full(3, 2.0)) == pytest.approx((2.0, 2.0))
+    assert math.log(low) == pytest.approx(2.0 - half, rel=1e-6, abs=0.0) and math.log(high) == pytest.approx(
+        2.0 + half, rel=1e-6, abs=0.0
+    )
+    assert mean_interval(np.full(3, 2.0)) == pytest.approx((2.0, 2.0), rel=1e-6, abs=0.0)
     assert np.isnan(mean_interval(np.ones(1))).all()
     with pytest.raises(BadInput, match="finite and above 0"):
         mean_interval(np.array([1.0, 0.0]))

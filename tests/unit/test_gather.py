@@ -106,8 +106,8 @@ def test_combined_gather_and_kick():
     for name in ("force", "torque", "velocity", "spin"):
         assert np.allclose(getattr(other, name), getattr(grains, name), rtol=1e-14, atol=0.0), name
     assert np.allclose(np.array(found).view(float), (fastest, quickest), rtol=1e-14)
-    assert fastest == pytest.approx((grains.velocity**2).sum(axis=0).max(), rel=1e-14)
-    assert quickest == pytest.approx((grains.spin**2).sum(axis=0).max(), rel=1e-14)
+    assert fastest == pytest.approx((grains.velocity**2).sum(axis=0).max(), rel=1e-14, abs=0.0)
+    assert quickest == pytest.approx((grains.spin**2).sum(axis=0).max(), rel=1e-14, abs=0.0)
 
 
 @pytest.mark.compiled("small")
@@ -122,7 +122,7 @@ def test_drift_with_and_without_moments():
         for magnetic, one in ((True, with_moments), (False, without))
     ]
     speeds = np.sqrt(np.array(squares).view(float))
-    assert speeds == pytest.approx(np.sqrt((without.velocity**2).sum(axis=0).max()), rel=1e-15)
+    assert speeds == pytest.approx(np.sqrt((without.velocity**2).sum(axis=0).max()), rel=1e-15, abs=0.0)
     for name in ("position", "velocity", "orientation", "spin"):
         assert np.allclose(getattr(with_moments, name), getattr(without, name), rtol=1e-15, atol=0.0), name
     assert (without.moment == grains.moment).all() and (with_moments.moment != grains.moment).all()
@@ -145,8 +145,11 @@ def test_largest_speeds_over_all_blocks(moved):
     sim.run(steps=3)
     monitor, v, w = sim.state.pair_list.skin, sim.grains.velocity, sim.grains.spin
     assert GRAINS > GRAINS_PER_BLOCK and (v**2).sum(axis=1).argmax() == moved
-    assert monitor[SQUARED_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
-    assert monitor[SQUARED_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and monitor[SQUARED_SPIN] > 0.0
+    assert monitor[SQUARED_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14, abs=0.0)
+    assert (
+        monitor[SQUARED_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14, abs=0.0)
+        and monitor[SQUARED_SPIN] > 0.0
+    )
 
 
 @pytest.mark.validate

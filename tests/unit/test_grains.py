@@ -97,3 +97,37 @@ def test_materials_are_checked():
     assert sand.IRON.but(surface_energy="1 J/m^2").surface_energy == 1.0
     assert sand.IRON.rolling_limit == 1e-9
     assert sand.MAGNETITE.surface_energy is None
+
+
+def test_parts_of_grains():
+    """An index, slice, mask or list gives new grains with the same quantities, and only the materials that they use."""
+    rng = np.random.default_rng(3)
+    kinds = [sand.IRON, sand.SILICA, sand.SILICA, sand.IRON]
+    vectors = {name: rng.normal(size=(4, 3)) for name in ("position", "velocity", "spin", "moment")}
+    grains = sand.Grains(**vectors, radius=[1e-8, 2e-8, 3e-8, 4e-8], material=kinds, charge=[1, 2, 3, 4])
+    grains.arrays.orientation[:] = rng.normal(size=(4, 4))
+    for index in (2, -1, slice(1, 3), [3, 0], np.array([False, True, True, False]), slice(None, None, -1)):
+        part, numbers = grains[index], np.atleast_1d(np.arange(4)[index])
+        for name in GrainArrays._fields:
+            if name not in ("material", "id"):
+                assert (getattr(part, name) == getattr(grains, name)[numbers]).all()
+        assert [part.materials[k] for k in part.material] == [kinds[k] for k in numbers]
+        assert part.id.tolist() == list(range(len(numbers))) and set(part.material) == set(range(len(part.materials)))
+        again = sand.Grains(part.position, part.radius, [kinds[k] for k in numbers])
+        assert (again.material == part.material).all()  # as a resumed run numbers them
+    grains[0].arrays.position[0, 0] = 5.0
+    assert grains.position[0, 0] != 5.0
+    assert [one.radius[0] for one in grains] == grains.radius.tolist()
+    assert repr(grains[1:]) == "<3 grains of silica, iron, radius 20 nm to 40 nm>"
+    assert repr(grains[0]) == "<1 grain of iron, radius 10 nm>"
+
+
+@pytest.mark.parametrize(
+    "index", [4, -5, slice(4, 9), np.zeros(4, bool), [True, False], 1.5, "a", np.zeros((2, 2), int)]
+)
+def test_no_such_grains(index):
+    """One line with the number of grains; an IndexError, so that loops end."""
+    grains = sand.Grains(np.zeros((4, 3)), 1e-8, "iron")
+    with pytest.raises(IndexError, match=r"grains\[.*\] names no grain: there are 4; give an index") as error:
+        grains[index]
+    assert isinstance(error.value, sand.BadInput) and "\n" not in str(error.value)

@@ -102,7 +102,7 @@ def test_an_error_in_an_inner_function_reaches_python():
         return total
 
     roots = kernel(roots, cached=False)
-    assert roots(np.array([4.0, 9.0])) == pytest.approx(5.0, rel=1e-15)
+    assert roots(np.array([4.0, 9.0])) == pytest.approx(5.0, rel=1e-15, abs=0.0)
     with pytest.raises(ValueError, match="below 0"):
         roots(np.array([4.0, -9.0]))
 

@@ -347,8 +347,8 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
         constants = column_loops(JKR).of_pair(a, law.pairings, i, j)
         period = 2 * np.pi / np.sqrt(constants.max_squared_frequency)
-        assert near.step[p] == pytest.approx(period / law.per_period, rel=1e-14)
-        assert near.break_overlap[p] == pytest.approx(constants.break_overlap, rel=1e-14)
+        assert near.step[p] == pytest.approx(period / law.per_period, rel=1e-14, abs=0.0)
+        assert near.break_overlap[p] == pytest.approx(constants.break_overlap, rel=1e-14, abs=0.0)
 
 
 @pytest.mark.validate
@@ -464,7 +464,7 @@ def test_states_of_earlier_versions_continue(earlier, far):
     goes_on = sand.Simulation(grains, forces, neighbours=Neighbours("cells", "2 nm"), restart=saved, **options)
     there, here = begun.loads(), goes_on.loads()
     for name, energy in there["energy"].items():
-        assert here["energy"][name] == pytest.approx(energy, rel=1e-12)
+        assert here["energy"][name] == pytest.approx(energy, rel=1e-12, abs=0.0)
     begun.run(steps=40)
     goes_on.run(steps=40)
     for name in ("velocity", "spin", "force"):

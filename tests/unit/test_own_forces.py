@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import sand
+from sand.cli.main import main
 from sand.cli.report import resume_line
 from sand.config.case import ForcesSection
 from sand.errors import BadInput
-from sand.forces.own import OWN
+from sand.forces.own import IMPORTED, OWN
 from sand.forces.registry import FORCES
 
 SCRIPT = """import sand
@@ -112,13 +113,43 @@ def test_nothing_is_imported_without_being_asked(script, tmp_path):
     assert line_of(lambda: sand.resume(tmp_path, imports=["no_such_module"])).startswith("--import no_such_module:")
 
 
+@pytest.mark.parametrize("command", ["run", "info", "grow", "collide"])
+def test_commands_import_modules_on_request(script, tmp_path, monkeypatch, capsys, command):
+    """`--import FILE` of every command that reads forces makes a force of the case known; without it a line says so."""
+    forget()
+    IMPORTED.clear()
+    grains = "[grains]\nnumber = 2\nradius = '10 nm'\n[box]\nperiodic = '1 um'\n[run]\nuntil = '0.1 ns'\n"
+    body = "kind = 'grain'\nradius = '10 nm'\n"
+    bodies = f"[target]\n{body}[projectile]\n{body}[impact]\nspeed = '1 m/s'\n"
+    table = "[forces.lift]\nimport = 'own_script:lift'\nacceleration = 1.0\n"
+    case, out = tmp_path / "a.toml", [] if command == "info" else ["--out", str(tmp_path / "out")]
+    case.write_text((bodies if command == "collide" else grains) + table)
+    assert main([command, str(case), *out]) == 2
+    assert "SAND imports no modules on its own; add --import own_script" in capsys.readouterr().err
+    monkeypatch.setattr("sand.config.case.own_force", stopped)  # which would compile the force
+    with pytest.raises(Stopped):
+        main([command, str(case), *out, "--import", script.__file__, "--debug"])
+    assert "own_script:lift" in OWN
+    assert [script.__file__] == IMPORTED
+
+
+class Stopped(Exception):
+    """Raised when the force of the user is made."""
+
+
+def stopped(*_, **__):
+    raise Stopped
+
+
 def test_the_energies_of_own_forces(script):
     """Forces, ledger columns and energies of grains, by the formulas; the pair's energy is shared in halves."""
     g = grains()
     pull, lift = script.pull(strength=1e-12), script.lift(acceleration=2.0)
-    assert pull.energy_scale(g) == pytest.approx(1e-12 * 2e-8, rel=1e-12)
+    assert pull.energy_scale(g) == pytest.approx(1e-12 * 2e-8, rel=1e-12, abs=0.0)
     f, energy = pull.formula((0.0, 3e-7, 4e-7), None, None, pull.numbers(g, sand.Box.open()).own)
-    assert f == pytest.approx((0.0, -0.6e-12, -0.8e-12)) and energy == pytest.approx(5e-19)
+    assert f == pytest.approx((0.0, -0.6e-12, -0.8e-12), rel=1e-6, abs=0.0) and energy == pytest.approx(
+        5e-19, rel=1e-6, abs=0.0
+    )
     assert lift.flux_density_size() == 0.0 and lift.position_dependent
 
 
@@ -132,8 +163,8 @@ def test_a_run_is_resumed_bit_by_bit(script, tmp_path):
 
     whole, part = begin(None), begin(tmp_path / "run")
     part.run(steps=150, until="1 s")
-    assert part.at_grains()["pull"] == pytest.approx([0.5 * part.ledger["pull"][-1]] * 2, rel=1e-12)
-    assert whole.loads()["energy"]["pull"] == pytest.approx(1e-16 * 3e-7, rel=1e-12)
+    assert part.at_grains()["pull"] == pytest.approx([0.5 * part.ledger["pull"][-1]] * 2, rel=1e-12, abs=0.0)
+    assert whole.loads()["energy"]["pull"] == pytest.approx(1e-16 * 3e-7, rel=1e-12, abs=0.0)
     forget()
     assert "add --import own_script" in line_of(lambda: sand.resume(tmp_path / "run"))
     rest = sand.resume(tmp_path / "run", imports=["own_script"])

@@ -192,6 +192,37 @@ def test_wrong_arguments_are_refused(make, line):
         make()
 
 
+@pytest.mark.parametrize(
+    ("force", "box", "line"),
+    [
+        (sand.Dipoles(open="pairs"), "1 um", "dipoles: open = 'pairs' is for open boxes, and the box is periodic 1 um"),
+        (sand.Dipoles(open="tree"), ("1 um", "1 um", None), "dipoles: open = 'tree' is for open boxes, and the box is"),
+        (
+            sand.Dipoles(cut="sharp"),
+            None,
+            "dipoles: cut = 'sharp' has no effect without a cut-off (open box: all pairs)",
+        ),
+        (
+            sand.Dipoles(None, "sharp"),
+            "1 um",
+            "dipoles: cut = 'sharp' has no effect without a cut-off (no cut-off, given",
+        ),
+        (sand.Charges(cut="sharp"), None, "charges: cut = 'sharp' has no effect without a cut-off"),
+        (sand.Attraction(cut="sharp"), None, "attraction: cut = 'sharp' has no effect without a cut-off"),
+        (sand.Charges(periodic="ewald"), None, "charges: periodic = 'ewald' needs a box that is periodic along x, y"),
+    ],
+)
+def test_settings_without_effect_in_a_box_are_refused(force, box, line):
+    """One line, before anything is computed; what has an effect in another box is accepted there."""
+    grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], 1e-8, sand.SILICA, charge=1e-19, moment="1e-18 A m^2")
+    with pytest.raises(sand.BadInput) as error:
+        sand.Simulation(grains, [force], box=box)
+    assert len(error.value.problems) == 1 and error.value.problems[0].startswith(line)
+    if force.cutoff == "auto":
+        other = sand.Box.periodic("1 um") if box is None else sand.Box.open()
+        assert not any("effect" in warning for warning in force.check(grains, other))
+
+
 def test_a_cutoff_beyond_half_the_box_is_refused():
     """For charges as for dipoles."""
     grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], 1e-8, sand.SILICA, charge=1e-19, moment="1e-18 A m^2")

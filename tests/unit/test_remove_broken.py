@@ -29,7 +29,7 @@ def test_each_column_moves_with_its_contact(broken):
     contacts.flag[broken] = BROKEN_FLAG
     kept = [c for c in range(7) if c not in broken]
     expected = {name: getattr(contacts, name)[..., kept].copy() for name in set(ContactArrays._fields) - BY_GRAIN}
-    compact_contacts(contacts, count)
+    count[CONTACTS] = compact_contacts(contacts, count[CONTACTS])
     assert count[CONTACTS] == len(kept)
     for name, array in expected.items():
         assert (getattr(contacts, name)[..., : len(kept)] == array).all(), name

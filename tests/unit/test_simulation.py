@@ -1,5 +1,6 @@
 """The simulation object: refused input, warnings, choices, outcomes."""
 
+import json
 import math
 import signal
 import threading
@@ -136,7 +137,7 @@ def test_the_automatic_cutoff_in_a_small_box_reaches_beyond_contact(moment, reas
     """L < 10.8 r: two diameters do not fit, and (L/2)/1.35 is used, never a capture radius inside a grain."""
     grains = pair(moment=[0, 0, moment], velocity=[[900.0, 0, 0], [0, 0, 0]])
     choice = sand.Dipoles().choose(grains, sand.Box.periodic("0.1 um"))
-    assert choice.radius == pytest.approx(0.5 * 1e-7 / 1.35, rel=1e-12) and reason in choice.reason
+    assert choice.radius == pytest.approx(0.5 * 1e-7 / 1.35, rel=1e-12, abs=0.0) and reason in choice.reason
     assert choice.radius > 2e-8  # the distance of two grains in contact
 
 
@@ -249,7 +250,7 @@ def test_rounding_is_not_reported_as_drift():
     assert sim.ledger.drift == 0.0
     last["total"] = first["total"] + 10.0 * np.spacing(first["total"])
     kinetic = max(row["translation"] + row["rotation"] for row in sim.ledger.rows)
-    assert sim.ledger.drift == pytest.approx(10.0 * abs(np.spacing(first["total"])) / kinetic, rel=1e-12)
+    assert sim.ledger.drift == pytest.approx(10.0 * abs(np.spacing(first["total"])) / kinetic, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.compiled("contacts")
@@ -347,13 +348,21 @@ def test_a_torn_ledger_does_not_stop_a_resume(tmp_path):
 
 @pytest.mark.compiled("contacts")
 def test_automatic_cutoff_without_moments(tmp_path):
-    """Thermal grains without moments in a periodic box: half the box, and a resume works."""
+    """Thermal grains without moments in a periodic box: half the box, and a resume works.
+
+    The warning is shown once, not again by the resumed run, and stays in both summaries.
+    """
     grains = pair(velocity=[[1, 0, 0], [-1, 0, 0]])
     with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
         sim = sand.Simulation(grains, [sand.Dipoles()], box="1 um", out=tmp_path / "run")
     sim.run(steps=10)
-    with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
+    assert ["no grain has a magnetic moment" in text for text in sim.warnings] == [True]
+    first = json.loads((tmp_path / "run" / "summary.json").read_text())
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
         sand.resume(tmp_path / "run").run(steps=10)
+    assert not shown and first["warnings"] == sim.warnings
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["warnings"] == first["warnings"]
 
 
 @pytest.mark.validate

@@ -53,9 +53,9 @@ def test_vectorised_minima_equal_plain_minima():
     pairs = [pair_step(arrays, w.pair_list, span, control, p) for p in range(w.count[PAIRS])]
     assert len(pairs) > 50
     assert math.isfinite(min(pairs))
-    assert step == pytest.approx(min(control.longest, min(one for one, _ in each)), rel=1e-13)
-    assert cycle == pytest.approx(min(control.longest, min(one for _, one in each)), rel=1e-13)
-    assert closing == pytest.approx(min(pairs), rel=1e-13)
+    assert step == pytest.approx(min(control.longest, min(one for one, _ in each)), rel=1e-13, abs=0.0)
+    assert cycle == pytest.approx(min(control.longest, min(one for _, one in each)), rel=1e-13, abs=0.0)
+    assert closing == pytest.approx(min(pairs), rel=1e-13, abs=0.0)
 
 
 @pytest.mark.compiled("contacts")

@@ -7,12 +7,13 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.config.build import simulation_of
-from sand.config.case import BoxSection, GrainsSection, MaterialSection, RunSection, check_case, read_case
+from sand.config.case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection, check_case, read_case
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
 from sand.neighbours.settings import Neighbours
 from sand.setup import GrainClass
+from sand.simulation.driven import Driven
 
 MODELS = [RunSection, BoxSection, GrainsSection, GrainClass, MaterialSection, Neighbours]
 
@@ -37,7 +38,7 @@ def test_the_file_is_a_valid_case(tmp_path, monkeypatch, capsys):
     text = (tmp_path / "first.toml").read_text("utf-8")
     assert tomllib.loads(text)["grains"] == EXAMPLES["grains"]
     simulation = simulation_of(read_case("first.toml"), None)
-    assert len(simulation.grains) == 100 and simulation.temperature == pytest.approx(300.0, rel=1e-12)
+    assert len(simulation.grains) == 100 and simulation.temperature == pytest.approx(300.0, rel=1e-12, abs=0.0)
     for name in ("first", "first.toml"):
         assert main(["new", name]) == 2
         assert "first.toml exists" in capsys.readouterr().err
@@ -50,10 +51,10 @@ def test_every_key_is_there_with_its_meaning():
     """All keys of all sections, forces and integrators; each has a description above it."""
     text = template("a.toml")
     tables = tables_of(text)
-    expected = [{key.name for key in keys_of(kind)} for kind in (*MODELS[:5], *FORCES.values())]
+    expected = [{key.name for key in keys_of(kind)} for kind in (*MODELS[:5], WallSection, *FORCES.values())]
     expected[2] -= {"classes"}
     expected += [{"method"} | {key.name for key in keys_of(kind)} for kind in INTEGRATORS.values()]
-    expected.append({key.name for key in keys_of(Neighbours)})
+    expected += [{key.name for key in keys_of(kind)} for kind in (Neighbours, Driven)]
     assert [{line.lstrip("#").split(" =")[0] for line in lines} for _, lines in tables] == expected
     assert [f"[forces.{name}]" for name in FORCES] == [name for name, _ in tables if name.startswith("[forces.")]
     before = ""

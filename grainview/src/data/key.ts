@@ -31,11 +31,11 @@ function bar(scale: Scale, label: string, unit: string): KeyPart {
   return { title: name ? `${label} (${name})` : label, bar: scale.palette.map(css), numbers };
 }
 
-function clusters(painted: Painted, { manifest }: Dataset): KeyPart {
+function clusters(painted: Painted, position: Float32Array, { manifest }: Dataset): KeyPart {
   const sizes = new Map<number, [count: number, grain: number]>();
   let single = 0;
   painted.values.forEach((name, grain) => {
-    if (Number.isNaN(name)) single++;
+    if (Number.isNaN(name)) single += Number(!Number.isNaN(position[3 * grain])); // not the absent ones
     else sizes.set(name, [(sizes.get(name)?.[0] ?? 0) + 1, sizes.get(name)?.[1] ?? grain]);
   });
   const largest = [...sizes].sort((a, b) => b[1][0] - a[1][0] || a[0] - b[0]);
@@ -57,12 +57,13 @@ function materials({ manifest }: Dataset): KeyPart {
 export function keyOf(
   quantity: Quantity,
   painted: Painted,
+  position: Float32Array, // of the frame; NaN for grains that are absent
   dataset: Dataset,
   bonds: { kind: string; scale: Scale },
 ): KeyPart[] {
   const parts: KeyPart[] = [];
   if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit));
-  else parts.push(quantity.id === "material" ? materials(dataset) : clusters(painted, dataset));
+  else parts.push(quantity.id === "material" ? materials(dataset) : clusters(painted, position, dataset));
   if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + repulsive", "N"));
   if (bonds.kind === "mode") {
     const { modes, within } = dataset.manifest.colours;

@@ -11,6 +11,9 @@ const PATHS = {
   next: "M5 3l7 5-7 5z",
   previousEvent: "M7.5 3v10L1.5 8zM14 3v10L8 8z",
   nextEvent: "M8.5 3l6 5-6 5zM2 3l6 5-6 5z",
+  cluster: ["M5 6", "M10.2 6", "M7.6 10.5"]
+    .map((centre) => `${centre}m-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0-5.2 0`).join(""),
+  box: "M2.5 5l5.5-3 5.5 3v6L8 14l-5.5-3zM2.5 5L8 8l5.5-3M8 8v6",
   centre: "M8 1v4M8 11v4M1 8h4M11 8h4M8 8m-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0-7 0",
   camera: "M2 5h3l1-2h4l1 2h3v8H2zM8 9m-2.4 0a2.4 2.4 0 1 0 4.8 0a2.4 2.4 0 1 0-4.8 0",
   link: "M7 9a3 3 0 0 0 4.3 0l2-2A3 3 0 0 0 9 2.7l-1 1M9 7a3 3 0 0 0-4.3 0l-2 2A3 3 0 0 0 7 13.3l1-1",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..errors import NoSuchKey, did_you_mean, shown
+from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..state.state import DAMPING, LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
@@ -50,6 +51,13 @@ class LedgerColumns:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def __repr__(self) -> str:
+        return f"<ledger of {len(self)} row{'' if len(self) == 1 else 's'}: {', '.join(self.columns)}>"
+
+    def to_pandas(self) -> Any:
+        """Convert to a pandas DataFrame; needs pandas."""
+        return import_optional("pandas", "to_pandas").DataFrame({name: self[name] for name in self.columns})
 
     def select(self, numbers: Iterable[int]) -> LedgerColumns:
         """Copy with the rows of these indices."""

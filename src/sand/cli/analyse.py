@@ -39,7 +39,10 @@ def command(
     if len({Path(folder).absolute() for folder in folders}) < len(folders):
         raise BadInput("the same folder is given twice")
     target = None if out is None else _output_folder(Path(out), NAMES, overwrite)
-    ensembles = [read_ensemble(folder, window) for folder in folders]
+    ensembles = []
+    for folder in folders:
+        report.reading(folder)
+        ensembles.append(read_ensemble(folder, window))
     content = {"ensembles": [ensemble_summary(one) for one in ensembles], "comparison": compare_growth(ensembles)}
     if target is not None:
         write_analysis(target, ensembles, content)

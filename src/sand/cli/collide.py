@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ SHOWN = 12
 @click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
 @options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
+@options.imports
 @options.threads
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.output
@@ -55,10 +57,24 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: 
         As the job; or if a worker process has died.
     """
     from .job import running_job
+    from .progress import Progress
 
-    processes = workers if len(job.case.impact.seeds) > 1 else 1
-    with running_job(job.folder, processes, threads=threads, quiet=as_json or quiet) as (executor, interrupts):
-        content = job.run(executor, [interrupts])
+    several, hidden = len(job.case.impact.seeds) > 1, as_json or quiet
+    observers: list[Any] = [] if several or hidden else [Progress(math.inf, math.inf)]
+    with (
+        report.progress_bar(1.0, hidden or not several, bar_format="{percentage:3.0f}% {desc}") as bar,
+        running_job(job.folder, workers if several else 1, threads=threads, quiet=hidden) as (executor, interrupts),
+    ):
+
+        def progress(done: int, total: int) -> None:
+            bar.set_description_str(f"{done} of {total} collisions", refresh=False)
+            bar.update(done / total - bar.n)
+
+        try:
+            content = job.run(executor, [interrupts, *observers], progress)
+        finally:
+            for each in observers:
+                each.finish()
     rows = [*collision_rows(content["collisions"]), ("files", f"{job.folder}/")]
     report.answer(content, heading, rows, as_json=as_json, quiet=quiet)
 

@@ -34,6 +34,7 @@ def command(folder: str, form: str, out: str | None, frames: str, overwrite: boo
     existing = sorted(stem.parent.glob(stem.name + SUFFIXES[form]))
     if existing and not overwrite:
         raise BadInput(f"{existing[0]} exists; give another --out, or --overwrite")
+    report.reading(folder)
     written = run.export(form, stem, chosen(frames))
     more = f" and {len(written) - 1} more" if len(written) > 1 else ""
     content = {"files": [str(path) for path in written]}

@@ -23,6 +23,7 @@ DEFAULT_SEEDS = list(range(1, 9))
 )
 @options.workers
 @options.scheduler
+@options.imports
 @options.threads
 @options.quiet_output
 def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:

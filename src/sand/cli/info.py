@@ -18,6 +18,8 @@ from . import options, report
 from .collide import collision_rows
 from .scatter import result_rows
 
+COMPILATION = 5.0
+"""Wall time [s] expected of the compilation of a stage that was never compiled on this machine."""
 Description = tuple[str, report.Rows, dict[str, Any]]
 """Heading and rows for people, and the same content for machines."""
 JOBS = {
@@ -30,6 +32,7 @@ JOBS = {
 
 @click.command("info", short_help="Describe a run or one of its files.")
 @click.argument("path", metavar="DIR|FILE", type=options.PATH)
+@options.imports
 @options.output
 def command(path: str, as_json: bool) -> None:
     """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
@@ -159,9 +162,34 @@ def describe_case(path: Path) -> Description:
     steps = math.inf if case.run.steps is None else case.run.steps
     limits = _limits(simulation)
     ends = (end, steps, case.run.stop)
+    cost, costs = _cost(simulation, end, steps)
     content = {"kind": "case", "case": case_of(simulation, *ends), "choices": simulation.choices, "limits": limits}
     rows = report.opening(simulation, *ends, Path(case.run.out or path.stem))
-    return "a valid case", [*rows, *limits.items()], content
+    return "a valid case", [*rows, *costs, *limits.items()], content | {"cost": cost}
+
+
+def _cost(simulation: Any, end: float, last_step: float) -> tuple[dict[str, Any], report.Rows]:
+    """Expected steps, wall time, memory and compilation of a run."""
+    from ..compiler.jit import COMPILE_TIMES
+    from ..compiler.progress import compile_times
+    from ..simulation.cost import expected_cost
+    from ..units import format_quantity
+
+    cost, missing = expected_cost(simulation, end, last_step), simulation._engine.uncompiled()
+    known = compile_times(COMPILE_TIMES)
+    compilation = sum(known.get(name, COMPILATION) for name in missing)
+    source = f"as in {cost.measured}" if cost.measured else "rough estimate: no such run was measured on this machine"
+    steps = "" if cost.steps is None else f", {cost.steps:.2g} steps"
+    wall = "depends on the condition" if cost.seconds is None else f"about {report.format_wall_time(cost.seconds)}"
+    names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
+    rows = [
+        ("steps", f"about {format_quantity(cost.step, 's')} each{steps}"),
+        ("wall time", f"{wall} ({source})"),
+        ("memory", f"about {cost.memory / 1e6:.0f} MB" if cost.memory < 1e9 else f"about {cost.memory / 1e9:.2g} GB"),
+        ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
+    ]
+    content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": missing}
+    return content | {"compilation_seconds": compilation}, rows
 
 
 def _limits(simulation: Any) -> dict[str, str]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..config.case import with_absolute_files
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
 from ..io.lock import LOCK, refuse_locked
@@ -60,9 +60,8 @@ def launch(
         goal = (end, last_step)
         if not (quiet or as_json):
             report.show(heading, report.opening(simulation, *goal, condition, folder))
-            if sys.stderr.isatty():
-                bar = Progress(*goal)
-                simulation.observers.append(bar)
+            bar = Progress(*goal)
+            simulation.observers.append(bar)
         try:
             result = simulation.run(until, steps=steps, stop=stop)
         except Interrupted as stop:
@@ -178,7 +177,7 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         raise BadInput(
             f"--overwrite would replace the case file {case} itself; copy it to another folder, or give another --out"
         )
-    content = read_toml(case)
+    content = with_absolute_files(read_toml(case), case)
     for body in sorted(BODIES & content.keys()):
         source = Path(content[body].get("file", case))
         if source.exists() and any(path.samefile(source) for path in replaced):

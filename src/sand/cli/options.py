@@ -64,6 +64,23 @@ threads = click.option(
 )
 
 
+def _import(_context: click.Context, _option: click.Parameter, names: tuple[str, ...]) -> None:
+    if names:
+        from ..forces.own import import_modules
+
+        import_modules(names)
+
+
+imports = click.option(
+    "--import",
+    metavar="MODULE",
+    multiple=True,
+    callback=_import,
+    expose_value=False,
+    help="Module or file that defines a force of your own, which the case uses; may be repeated.",
+)
+
+
 def end_of_run(text: str) -> Any:
     """The option --until with the help text `text`; its value is in seconds."""
     return click.option("--until", metavar="TIME", callback=_seconds, help=text)

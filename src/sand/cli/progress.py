@@ -1,8 +1,9 @@
-"""Progress bar of a run."""
+"""Progress of a run: a bar on a terminal, lines in a log."""
 
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 from ..simulation.observers import Observer
@@ -11,6 +12,10 @@ from .report import progress_bar
 
 FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
 """Layout of the bar, at most 80 columns."""
+NUMBERS_EVERY = 1.0
+"""Wall time [s] between two readings of clusters, S and drift."""
+WITHOUT_END = "{desc} [{elapsed}{postfix}]"
+"""Layout where the end is not known."""
 
 
 class Progress(Observer):
@@ -21,7 +26,7 @@ class Progress(Observer):
     end : float
         End of the run [s]; if infinite, the bar counts steps.
     last_step : float
-        Last step of the run.
+        Last step of the run; infinite if the end is not known.
     """
 
     tick_reads_grains = False
@@ -30,11 +35,13 @@ class Progress(Observer):
         self._end, self._last_step = end, last_step
         self._by_time = math.isfinite(end)
         self._bar: Any = None
-        self._numbers = ""
+        self._numbers, self._next = "", 0.0
 
     def see(self, simulation: Any, row: dict[str, float]) -> None:
-        """Show the numbers of a new frame."""
-        self._read_row(simulation, row)
+        """Show the numbers of a new row, at most once a second: the drift takes longer, the more rows there are."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + NUMBERS_EVERY
+            self._read_row(simulation, row)
         self.tick(simulation)
 
     def _read_row(self, simulation: Any, row: dict[str, float]) -> None:
@@ -42,12 +49,14 @@ class Progress(Observer):
         self._numbers = f"{clusters} clusters, S = {size:.3g}, drift {simulation.ledger.drift:.1g}"
 
     def tick(self, simulation: Any) -> None:
-        """Advance the bar; tqdm limits how often it is drawn."""
+        """Advance the bar, which limits how often it is drawn."""
         position = simulation.time if self._by_time else simulation.steps
         total = self._end if self._by_time else self._last_step
         if self._bar is None:
             self._read_row(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
-            self._bar = progress_bar(total, False, initial=position, bar_format=FORMAT)
+            known = math.isfinite(total)
+            layout = FORMAT if known else WITHOUT_END
+            self._bar = progress_bar(total if known else None, False, initial=position, bar_format=layout)
         bar = self._bar
         bar.set_description_str(format_quantity(simulation.time, "s"), refresh=False)
         rate = bar.format_dict["rate"] or 0.0

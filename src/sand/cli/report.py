@@ -6,6 +6,8 @@ import json
 import math
 import re
 import shlex
+import sys
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -16,10 +18,12 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput, FilesFailed
-from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, is_job, plain, read_toml
+from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml
 
 Rows = list[tuple[str, str]]
 """Labels and texts of a table of two columns."""
+LARGE = 1e8
+"""Size of trajectories [bytes] from which a note says that they are read."""
 LONGEST_NOTE = 600
 """Largest number of characters of a note."""
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
@@ -40,6 +44,15 @@ def note(text: str) -> None:
     """Print one line on stderr; the middle of a very long one is left out."""
     shown = text if len(text) <= LONGEST_NOTE else f"{text[: LONGEST_NOTE // 2]} … {text[-LONGEST_NOTE // 3 :]}"
     write_line(f"sand: {shown}", err=True)
+
+
+def reading(path: str | Path) -> None:
+    """Print a note before the trajectories of a run, or of the runs in a folder, are read, if that takes a while."""
+    place = Path(path)
+    found = [place] if place.is_file() else [*place.glob(TRAJECTORY), *place.glob(f"*/{TRAJECTORY}")]
+    size = sum(each.stat().st_size for each in found)
+    if size > LARGE:
+        note(f"reading {path}, {size / 1e6:.0f} MB …")
 
 
 def compiling(quiet: bool = False) -> AbstractContextManager[None]:
@@ -148,8 +161,78 @@ def listed(folder: Path) -> str:
     return f"{folder}/  " + "  ".join(files_of(folder))
 
 
-def progress_bar(total: float, hidden: bool, **layout: Any) -> Any:
-    """Progress bar of tqdm, shown on a terminal only."""
+LINE_EVERY, LINE_PART, LINE_AT_LEAST = 30.0, 0.05, 1.0
+"""Where there is no terminal: a line after this wall time [s], or this part of the work but not before the last [s]."""
+
+
+class ProgressLines:
+    """Progress as lines of text, in place of a progress bar of tqdm, where there is no terminal.
+
+    Parameters
+    ----------
+    total : float or None
+        Position at the end; None or infinite if it is not known.
+    initial : float, optional
+        Position at the beginning.
+    desc : str, optional
+        Description of the work.
+    """
+
+    def __init__(self, total: float | None, initial: float = 0.0, desc: str = ""):
+        self.n, self._total, self._first, self._texts = (
+            initial,
+            total or math.inf,
+            initial,
+            {"desc": desc, "postfix": ""},
+        )
+        self._began = self._last = time.monotonic()
+        self._last_part = self._part()
+
+    def __enter__(self) -> ProgressLines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _part(self) -> float:
+        return self.n / self._total
+
+    @property
+    def format_dict(self) -> dict[str, float]:
+        """The mean rate, as `tqdm.format_dict`."""
+        return {"rate": (self.n - self._first) / max(time.monotonic() - self._began, 1e-9)}
+
+    def set_description_str(self, text: str, refresh: bool = True) -> None:
+        """Set the description."""
+        self._texts["desc"] = text
+
+    def set_postfix_str(self, text: str, refresh: bool = True) -> None:
+        """Set the numbers after the times."""
+        self._texts["postfix"] = text
+
+    def update(self, by: float = 1.0) -> None:
+        """Advance; prints a line if one is due."""
+        self.n += by
+        now = time.monotonic()
+        waited, done = now - self._last, self._part() - self._last_part
+        if waited < LINE_EVERY and (done < LINE_PART or waited < LINE_AT_LEAST):
+            return
+        self._last, self._last_part = now, self._part()
+        known, rate = math.isfinite(self._total), self.format_dict["rate"]
+        times = format_wall_time(now - self._began)
+        if known and rate > 0.0:
+            times += f", {format_wall_time((self._total - self.n) / rate)} left"
+        part = f"{self._part():.0%}" if known else ""
+        note(", ".join(text for text in (part, self._texts["desc"], times, self._texts["postfix"]) if text))
+
+    def close(self) -> None:
+        """Nothing is left to be removed."""
+
+
+def progress_bar(total: float | None, hidden: bool, **layout: Any) -> Any:
+    """Progress bar of tqdm on a terminal, otherwise `ProgressLines`."""
+    if not (hidden or sys.stderr.isatty()):
+        return ProgressLines(total, layout.get("initial", 0.0), layout.get("desc", ""))
     from tqdm import tqdm
 
     tqdm.monitor_interval = 0  # no monitor thread: updates are frequent enough
@@ -216,13 +299,10 @@ def _grains(grains: Any, temperature: float) -> str:
 
 def _force(force: Any) -> str:
     """Name and non-default settings of a force; case.toml lists all settings."""
-    try:
-        defaults = type(force)().parameters()
-    except (BadInput, TypeError):  # a force with required settings
-        defaults = {}
-    changed = {key: value for key, value in force.parameters().items() if value != defaults.get(key)}
-    texts = (f"{key} = {f'{v:.4g}' if isinstance(v, float) else v}" for key, v in changed.items())
-    return f"{force.name} ({', '.join(texts)})" if changed else force.name
+    from ..descriptions import as_text, changed_arguments
+
+    texts = [f"{key} = {as_text(value)}" for key, value in changed_arguments(force).items()]
+    return f"{force.name} ({', '.join(texts)})" if texts else force.name
 
 
 def results(summary: dict[str, Any]) -> Rows:

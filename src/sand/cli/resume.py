@@ -24,13 +24,7 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 @click.command("resume", short_help="Continue an interrupted run or job of any command.")
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @options.end_of_run('For a run: a new end instead of the planned one, such as "10 us".')
-@click.option(
-    "--import",
-    "imports",
-    metavar="MODULE",
-    multiple=True,
-    help="Module or file that defines a force of your own, which the run uses; may be repeated.",
-)
+@options.imports
 @options.workers
 @options.scheduler
 @options.threads
@@ -38,7 +32,6 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 def command(
     folder: str,
     until: float | None,
-    imports: tuple[str, ...],
     workers: int,
     scheduler: str | None,
     threads: int | None,
@@ -52,10 +45,6 @@ def command(
     results are those of an uninterrupted job.
     """
     set_threads(threads)
-    if imports:
-        from ..forces.own import import_modules
-
-        import_modules(imports)
     place = Path(folder)
     kind = _kind(place)
     if kind != "run":

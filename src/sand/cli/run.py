@@ -28,6 +28,7 @@ from . import options, report
 @options.end_of_run('End of the run in place of that in the case, such as "5 us".')
 @click.option("--seed", type=options.SEED, metavar="N", help="Seed in place of that in the case.")
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
+@options.imports
 @options.threads
 @options.quiet_output
 def command(

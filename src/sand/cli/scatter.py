@@ -66,6 +66,7 @@ def scatter(
     BadInput
         If the folder belongs to another case, or a worker process has died.
     """
+    from ..config.case import with_absolute_files
     from ..experiments.scattering.job import Job
     from ..io.lock import writing
     from ..io.run_folder import make_folder, read_toml
@@ -84,7 +85,7 @@ def scatter(
         if not resume:
             make_folder(folder, overwrite=overwrite)
         with writing(folder):
-            content = Job(*read, read_toml(case), folder, resume).run(executor, progress)
+            content = Job(*read, with_absolute_files(read_toml(case), case), folder, resume).run(executor, progress)
     rows = [*result_rows(content), ("files", report.listed(folder))]
     report.answer({**content, "folder": str(folder)}, f"scatter {case}", rows, as_json=as_json, quiet=quiet)
 

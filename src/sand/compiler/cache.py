@@ -7,15 +7,17 @@ as the user who reads it.  A folder is therefore used only if it belongs to the 
 from __future__ import annotations
 
 import atexit
+import json
 import os
 import shutil
 import stat
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from ..errors import warn
 
-__all__ = ["private_folder", "unsafe"]
+__all__ = ["private_folder", "read_record", "unsafe", "write_record"]
 
 _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -59,6 +61,24 @@ def private_folder(name: str) -> Path:
     atexit.register(_delete, base, os.getpid())
     warn(f"compiled code is not cached, so that every start compiles it again: {'; '.join(reasons)}")
     return _create(base / name)
+
+
+def read_record(path: Path) -> Any:
+    """Content of a record in the cache, a JSON file; {} if it cannot be read."""
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def write_record(path: Path, content: Any) -> None:
+    """Replace a record in the cache; one that cannot be written is no error."""
+    try:
+        draft = path.with_suffix(f".{os.getpid()}")
+        draft.write_text(json.dumps(content, indent=1), "utf-8")
+        draft.replace(path)
+    except OSError:
+        pass
 
 
 def unsafe(folder: Path) -> str | None:

@@ -26,7 +26,8 @@ from numba.extending import register_jitable
 from .cache import private_folder
 from .progress import CompilationListener, acquire_lock
 
-__all__ = ["COMPILED", "cache_folder", "caller", "compile_error", "formula", "kernel", "loop", "rare", "separate"]
+__all__ = ["COMPILED", "COMPILE_TIMES", "cache_folder", "caller", "compile_error", "formula", "in_cache", "kernel"]
+__all__ += ["loop", "rare", "separate"]
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -146,6 +147,8 @@ def cache_folder() -> Path:
 
 
 _FOLDER = cache_folder()
+COMPILE_TIMES = _FOLDER.parent / "compile-times.json"
+"""Record of the last duration of each compilation."""
 
 
 def _share_cache(compiled: Any) -> None:
@@ -188,10 +191,19 @@ def _share_cache(compiled: Any) -> None:
     cache.load_overload, compiled.compile = load_overload, compile_with_lock
 
 
+def in_cache(compiled: Any, signature: Any) -> bool:
+    """Whether the code of a kernel for this signature is on the disk; nothing is compiled. True if unknown."""
+    try:
+        cache = compiled._cache
+        return cache._index_key(signature, compiled.targetctx.codegen()) in cache._cache_file._load_index()
+    except AttributeError:
+        return True
+
+
 _PURPOSES: dict[int, str] = {}
 """What each kernel computes, by the id of its dispatcher; kernels are never deleted."""
 if COMPILED:
-    event.register("numba:compile", CompilationListener(_PURPOSES, cache_folder().parent / "compile-times.json"))
+    event.register("numba:compile", CompilationListener(_PURPOSES, COMPILE_TIMES))
 
 
 def kernel(

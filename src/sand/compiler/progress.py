@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -14,7 +12,10 @@ from typing import Any
 from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import event
 
-__all__ = ["CompilationListener", "acquire_lock", "compilation_notes", "describe", "suppress_notes"]
+from .cache import read_record, write_record
+
+__all__ = ["CompilationListener", "acquire_lock", "announce", "compilation_notes", "compilation_seconds"]
+__all__ += ["compile_times", "describe", "suppress_notes"]
 
 LONGEST_WAIT = 300.0
 """Wall time [s] to wait for a process that compiles the same code."""
@@ -54,6 +55,11 @@ def compilation_notes(notify: Notify | None) -> Iterator[None]:
         _notify.pop()
 
 
+def announce(what: str) -> None:
+    """Show a note on what a wait is for, such as "drawing the figure", where notes on compilation are shown."""
+    _notify[-1](f"{what} …")
+
+
 def suppress_notes() -> None:
     """Show no notes in this process, for workers whose parent reports progress."""
     _notify.append(_nowhere)
@@ -78,6 +84,23 @@ def acquire_lock(path: Path, what: str) -> BaseFileLock | None:
     return lock
 
 
+_spent = [0.0]
+"""Wall time [s] of all compilations in this process."""
+
+
+def compilation_seconds() -> float:
+    """Wall time [s] that this process has spent on compilation."""
+    return _spent[0]
+
+
+def compile_times(record: Path) -> dict[str, float]:
+    """Last duration [s] of the compilation of each kernel, from a record; an unreadable one counts as empty."""
+    try:
+        return {str(name): float(seconds) for name, seconds in read_record(record).items()}
+    except (ValueError, AttributeError, TypeError):
+        return {}
+
+
 class CompilationListener(event.Listener):
     """Listener for numba's compilation events: notes for the kernels of SAND, and a record of their durations.
 
@@ -94,11 +117,7 @@ class CompilationListener(event.Listener):
         self._current, self._depth, self._began = "", 0, 0.0
 
     def _durations(self) -> dict[str, float]:
-        try:
-            found = json.loads(self._record.read_text("utf-8"))
-            return {str(name): float(seconds) for name, seconds in found.items()}
-        except (OSError, ValueError, AttributeError, TypeError):
-            return {}
+        return compile_times(self._record)
 
     def on_start(self, event: Any) -> None:
         """Note the start of a kernel; the functions that it calls are compiled within."""
@@ -115,13 +134,10 @@ class CompilationListener(event.Listener):
         """Record the duration of a kernel, unless its compilation failed."""
         self._depth -= 1
         if self._current and self._depth == 0:
-            durations = self._durations() | {self._current: round(time.perf_counter() - self._began, 3)}
+            seconds = time.perf_counter() - self._began
+            _spent[0] += seconds
+            durations = self._durations() | {self._current: round(seconds, 3)}
             self._current = ""
             if sys.exc_info()[0] is not None:  # numba's `event.is_failed` is true for every compilation
                 return
-            try:
-                draft = self._record.with_suffix(f".{os.getpid()}")
-                draft.write_text(json.dumps(durations, indent=1), "utf-8")
-                draft.replace(self._record)
-            except OSError:
-                pass  # notes without a time are no error
+            write_record(self._record, durations)

@@ -24,7 +24,7 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
-from .jit import COMPILED, caller, kernel, loop, rare, separate
+from .jit import COMPILED, caller, in_cache, kernel, loop, rare, separate
 from .native_calls import call_from_python
 from .processor import FAST_512_BIT, SLOW_GATHER, target
 from .table import (
@@ -107,10 +107,12 @@ class Stage:
         takes the `table`.
     needs : tuple of str
         Names of its arguments.
+    purpose : str
+        What it computes.
     """
 
     def __init__(self, function: Callable, purpose: str, long_vectors: bool, cached: bool):
-        self.function, self._purpose, self._long_vectors, self._cached = function, purpose, long_vectors, cached
+        self.function, self.purpose, self._long_vectors, self._cached = function, purpose, long_vectors, cached
         self.needs = tuple(inspect.signature(function).parameters)
         self._compiled, self._compiler = dict[Any, Any](), None
 
@@ -120,17 +122,30 @@ class Stage:
 
     def address(self, table: Table, parameters: Any) -> int:
         """Address of the compiled function for the types of these parts; compiles it, or loads it from the disk."""
-        own = structure_of(parameters)
-        key = own, *(table.key(name) for name in self.needs if name not in SPECIAL)
+        key = self._key(table, parameters)
         if key not in self._compiled:
-            signature = types.int64(
-                Address(tuple(self._part(name, table, own) for name in self.needs)), ANY_TABLE, types.int64
-            )
-            dispatcher = self._compiler = self._compiler or self._dispatcher()
+            dispatcher, signature = self._to_compile(table, parameters)
             dispatcher.compile(signature)
             found = dispatcher.overloads[signature.args]
             self._compiled[key] = found, _machine_code(found).get_pointer_to_function(found.fndesc.llvm_func_name)
         return int(self._compiled[key][1])
+
+    def _key(self, table: Table, parameters: Any) -> Any:
+        """What identifies the types of these parts."""
+        return structure_of(parameters), *(table.key(name) for name in self.needs if name not in SPECIAL)
+
+    def _to_compile(self, table: Table, parameters: Any) -> tuple[Any, Any]:
+        """Numba's dispatcher, and the signature for the types of these parts."""
+        own = structure_of(parameters)
+        parts = tuple(self._part(name, table, own) for name in self.needs)
+        self._compiler = self._compiler or self._dispatcher()
+        return self._compiler, types.int64(Address(parts), ANY_TABLE, types.int64)
+
+    def is_compiled(self, table: Table, parameters: Any = ()) -> bool:
+        """Whether the machine code for these parts exists, in this process or on the disk; nothing is compiled."""
+        if not COMPILED or self._key(table, parameters) in self._compiled:
+            return True
+        return in_cache(*self._to_compile(table, parameters))
 
     def in_python(self, table: Table, parameters: Any, block: int) -> Any:
         """Call the function without the compiler."""
@@ -196,7 +211,7 @@ class Stage:
         words = self.function.__qualname__, "wide" if wide else "", digest or ""
         entry = _renamed(entry, "_".join(word for word in words if word))
         return kernel(
-            entry, cached=self._cached and digest is not None, nogil=True, wrapper=False, purpose=self._purpose
+            entry, cached=self._cached and digest is not None, nogil=True, wrapper=False, purpose=self.purpose
         )
 
 

@@ -31,12 +31,14 @@ def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Sim
         grains,
         case.forces.build(),
         box=box,
+        walls=[wall.build(case.materials_by_name()) for wall in case.walls],
         stepping=case.stepping,
         neighbours=case.neighbours,
         seed=case.run.seed,
         frame_every=case.run.frame_every,
         row_every=case.run.row_every,
         checkpoint_every=case.run.checkpoint_every,
+        driven=case.driven,
         **options,
     )
 
@@ -141,17 +143,28 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     path = folder / CASE
     begun: dict[str, Any] = meta["case"]
     there = read_toml(path) if path.exists() else begun
-    was, case = (check_case(content, str(path)) for content in (begun, there))
+    # a run that was changed may have been stopped before the changed case was written
+    candidates = [begun, *([meta["case_written"]] if meta.get("case_written") else [])]
+    changed = [_changed_section(each, there, str(path)) for each in candidates]
+    if all(changed):
+        raise BadInput(
+            f"{path}: [{changed[0]}] is not what the run began with, and a run cannot change on its way; restore it, "
+            f"or start a new run from the last frame: sand run CASE.toml --from {shlex.quote(str(folder))}"
+        )
+    case, ends = check_case(begun, str(path)), check_case(there, str(path)).run
+    case.run.until, case.run.steps, case.run.stop = ends.until, ends.steps, ends.stop
+    meta["until"], meta["last_step"], meta["stop"] = ends.until, ends.steps, ends.stop
+    meta["case_in_file"] = there
+    return case
+
+
+def _changed_section(begun: dict[str, Any], there: dict[str, Any], path: str) -> str:
+    """First section of a case that differs in more than the end of the run; "" if none does."""
+    was, case = (check_case(content, path) for content in (begun, there))
     for name in ("until", "steps", "stop"):  # the end may be changed
         setattr(was.run, name, getattr(case.run, name))
-    for name in {**begun, **there}:
-        if begun.get(name) != there.get(name) and getattr(was, name) != getattr(case, name):
-            raise BadInput(
-                f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; restore it, "
-                f"or start a new run from the last frame: sand run CASE.toml --from {shlex.quote(str(folder))}"
-            )
-    meta["until"], meta["last_step"], meta["stop"] = case.run.until, case.run.steps, case.run.stop
-    return case
+    differ = (name for name in {**begun, **there} if begun.get(name) != there.get(name))
+    return next((name for name in differ if getattr(was, name) != getattr(case, name)), "")
 
 
 @checked
@@ -165,7 +178,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     imports : Iterable[str], optional
         Modules that define forces of your own, by name or file, to be imported first; SAND imports no others.
     options
-        Further arguments of `Simulation` (observers).
+        Further arguments of `Simulation` (observers, updaters).
 
     Returns
     -------

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import copy
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -19,8 +20,10 @@ from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
 from ..setup.grain_classes import GrainClass, class_numbers
 from ..simulation.condition import GIVEN, read_condition
+from ..simulation.driven import Driven
 from ..simulation.ledger import Ledger
-from .commands import refuse_other_command
+from ..simulation.walls import Wall, read_walls, wall_columns
+from .commands import BODIES, refuse_other_command
 from .errors import validate
 from .sections import (
     Cadence,
@@ -238,6 +241,30 @@ else:
     )
 
 
+class WallSection(Section):
+    """[[walls]]: a plane to which grains stick; see `sand.Wall`."""
+
+    point: list[Any]
+    """A point of the plane at the start, three components [m]."""
+    normal: list[Any]
+    """Direction from the wall to the grains, three components, of any length above 0."""
+    material: str
+    """Preset or name in [materials]."""
+    velocity: list[Any] | None = None
+    """Velocity, three components [m/s]; at rest by default; for a wall with a mass the velocity at the start."""
+    mass: Any = None
+    """Mass [kg] of a wall that moves along its normal by Newton's law; none: `velocity` gives its motion."""
+    force: Any = None
+    """Force [N] on a wall with a mass along its normal; above 0 it presses the wall against the grains."""
+    name: str | None = None
+    """Name in the ledger's columns; wall1, wall2, … by default."""
+
+    def build(self, materials: dict[str, Material]) -> Wall:
+        """Build the wall.  Raises BadInput."""
+        given = self.model_dump(exclude_none=True, exclude={"material"})
+        return Wall(material=materials.get(self.material, self.material), **given)
+
+
 class Case(Section):
     """The content of a case file of `sand run`."""
 
@@ -246,8 +273,10 @@ class Case(Section):
     grains: GrainsSection
     materials: dict[str, MaterialSection] = Field(default_factory=dict)
     forces: ForcesSection = ForcesSection()
+    walls: list[WallSection] = Field(default_factory=list)
     stepping: Stepping = Verlet()
     neighbours: Neighbours = Neighbours()
+    driven: list[Driven] = Field(default_factory=list)
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the materials of the case, by name."""
@@ -255,7 +284,7 @@ class Case(Section):
 
 
 def material_errors(content: dict[str, Any], tables: Iterable[str], default: str | None = None) -> list[str]:
-    """Error messages for numbers in [materials], and for materials that do not exist.
+    """Error messages for numbers in [materials] and [[walls]], and for materials that do not exist.
 
     Parameters
     ----------
@@ -289,6 +318,23 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
             for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
                 if isinstance(name, str) and name not in known:
                     problems.append(f"{place}.material: unknown material '{name}'; {did_you_mean(name, known)}")
+    return problems + _wall_errors(content.get("walls"), known)
+
+
+def _wall_errors(walls: Any, known: Collection[str]) -> list[str]:
+    """Error messages for the numbers in [[walls]], and for materials that do not exist."""
+    problems: list[str] = []
+    for k, section in enumerate(walls if isinstance(walls, list) else []):
+        try:
+            wall = WallSection.model_validate(section)
+            if wall.material not in known:
+                hint = did_you_mean(wall.material, list(known))
+                problems.append(f"walls.{k}.material: unknown material '{wall.material}'; {hint}")
+            wall.model_copy(update={"material": "iron"}).build({})
+        except ValidationError:
+            continue  # reported by the validation of the whole file
+        except BadInput as error:
+            problems += error.at(f"walls.{k}").problems
     return problems
 
 
@@ -303,10 +349,19 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     except BadInput:  # reported by the validation of the whole file
         return []
     try:
-        condition.check([*Ledger().columns, *columns])
+        condition.check([*Ledger().columns, *columns, *_wall_names(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []
+
+
+def _wall_names(walls: Any) -> list[str]:
+    """Columns of the ledger with the [[walls]] of a case file; none if these have errors."""
+    try:
+        sections = [WallSection.model_validate(one) for one in walls or ()]
+        return wall_columns(read_walls([one.model_copy(update={"material": "iron"}).build({}) for one in sections]))
+    except (ValidationError, BadInput, TypeError):
+        return []
 
 
 def read_case(path: str | Path) -> Case:
@@ -323,19 +378,19 @@ def read_case(path: str | Path) -> Case:
 
 
 def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, Any]:
-    """The content of a case file with absolute paths, from names relative to the case file, in [grains]."""
-    grains = content.get("grains")
-    if not isinstance(grains, dict):
-        return content
-    classes = grains.get("classes")
-    whole = {**content, "grains": dict(grains)}
-    if isinstance(classes, list):
-        whole["grains"]["classes"] = [dict(one) if isinstance(one, dict) else one for one in classes]
-    for table in (whole["grains"], *(whole["grains"].get("classes") or ())):
-        file = table.get("file") if isinstance(table, dict) else None
+    """The content of a case file with absolute paths, from names relative to the case file, of grains and bodies."""
+    whole = {name: copy.deepcopy(table) if name in ("grains", *BODIES) else table for name, table in content.items()}
+    tables = [whole[name] for name in ("grains", *BODIES) if isinstance(whole.get(name), dict)]
+    for table in [*tables, *(one for each in tables for one in _tables_in(each.get("classes")))]:
+        file = table.get("file")
         if isinstance(file, str) and file.strip() and "\0" not in file:  # others are reported by the validation
             table["file"] = str((Path(path).parent / Path(file).expanduser()).absolute())
     return whole
+
+
+def _tables_in(value: Any) -> list[dict[str, Any]]:
+    """The tables of a list; none of anything else."""
+    return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
 
 
 def check_case(content: dict[str, Any], name: str) -> Case:

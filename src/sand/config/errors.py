@@ -13,6 +13,8 @@ from ..errors import BadInput, did_you_mean
 from .sections import INTEGRATORS
 
 Model = TypeVar("Model", bound=BaseModel)
+RENAMED = {"path": "file"}
+"""Keys of earlier versions, with their present names."""
 
 
 def validate(model: type[Model], content: Any, name: str, problems: Iterable[str] = (), table: str = "") -> Model:
@@ -50,7 +52,10 @@ def _messages(slip: Any, model: type, table: str) -> list[str]:
     parts = [str(part) for part in ((table,) if table else ()) + tuple(path)]
     place = ".".join(part for part in parts if not part.startswith("function-"))
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        return [f"{place}: there is no such key; {did_you_mean(str(path[-1]), _keys_at(model, path[:-1]))}"]
+        allowed = _keys_at(model, path[:-1])
+        renamed = RENAMED.get(str(path[-1]))
+        advice = f"it is now called '{renamed}'" if renamed in allowed else did_you_mean(str(path[-1]), allowed)
+        return [f"{place}: there is no such key; {advice}"]
     if kind == "missing":
         return [f"{place} is missing; add it"]
     if kind == "value_error":  # messages of settings classes may begin with the key already

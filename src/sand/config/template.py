@@ -6,7 +6,6 @@ import ast
 import dataclasses
 import inspect
 import itertools
-import re
 import textwrap
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -14,12 +13,14 @@ from typing import Any, NamedTuple
 import tomli_w
 from pydantic import BaseModel
 
+from ..descriptions import parameter_docs
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
 from ..material import PRESETS, Material
 from ..neighbours.settings import Neighbours
 from ..setup.grain_classes import GrainClass
-from .case import BoxSection, GrainsSection, MaterialSection, RunSection
+from ..simulation.driven import Driven
+from .case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection
 
 WIDTH = 110
 """Columns of comments."""
@@ -63,12 +64,14 @@ def template(name: str) -> str:
         ("[grains]", "", [key for key in keys_of(GrainsSection) if key.name != "classes"]),
         ("[[grains.classes]]", _summary(GrainClass), keys_of(GrainClass)),
         ("[materials.NAME]", _material_note(), _material_keys()),
+        ("[[walls]]", _summary(WallSection).removeprefix("[[walls]]: ").capitalize(), keys_of(WallSection)),
         *((f"[forces.{force}]", _summary(kind), keys_of(kind)) for force, kind in FORCES.items()),
     ]
     for method, kind in INTEGRATORS.items():
         chosen = Key("method", f"Integrator; allowed: {', '.join(INTEGRATORS)}.", method)
         tables.append(("[stepping]", _summary(kind), [chosen, *keys_of(kind)]))
     tables.append(("[neighbours]", _summary(Neighbours), keys_of(Neighbours)))
+    tables.append(("[[driven]]", _summary(Driven), keys_of(Driven)))
     return HEAD.format(name=name) + "".join("\n" + "\n".join(_table(*one)) + "\n" for one in tables)
 
 
@@ -151,20 +154,4 @@ def _attribute_docstrings(kind: type) -> dict[str, str]:
             named = isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name)
             if named and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
                 found[entry.target.id] = " ".join(str(text.value.value).split())
-    return found
-
-
-def parameter_docs(kind: type) -> dict[str, str]:
-    """Descriptions of the parameters in a numpydoc docstring, by name."""
-    text = inspect.getdoc(kind) or ""
-    _, _, text = text.partition("Parameters\n----------\n")
-    text = re.split(r"\n\n?[A-Z][a-z]+\n-{3,}\n", text)[0]
-    found: dict[str, str] = {}
-    names: list[str] = []
-    for line in text.splitlines():
-        if (match := re.fullmatch(r"(\w+(?:, \w+)*) : .*", line)) is not None:
-            names = match[1].split(", ")
-            found |= dict.fromkeys(names, "")
-        else:
-            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
     return found

@@ -143,10 +143,10 @@ def settle_loop(law: ContactLaw, damping: str) -> Callable:
 
 
 @rare
-def compact_contacts(contacts, count):
-    """Remove broken contacts from the arrays; the order of the others is kept."""
+def compact_contacts(contacts, number):
+    """Remove broken contacts from the first `number` columns, in order; returns how many contacts are left."""
     kept = 0
-    for c in range(count[CONTACTS]):
+    for c in range(number):
         if contacts.flag[c] == BROKEN_FLAG:
             continue
         if kept != c:
@@ -171,7 +171,7 @@ def compact_contacts(contacts, count):
             contacts.flag[kept] = contacts.flag[c]
             contacts.every_step[kept] = contacts.every_step[c]
         kept += 1
-    count[CONTACTS] = kept
+    return kept
 
 
 @loop

@@ -115,18 +115,49 @@ accurate to (c dt/m̄)².  Up to a quarter of critical damping the step is that 
 
 @functools.cache
 def contact_constants(law: ContactLaw) -> Callable:
-    """The formula `(pairing, r1, r2, m1, m2)` → `ContactConstants` of a law.
+    """The formula `(pairing, r1, r2, m1, m2)` → `ContactConstants` of a law, for two grains.
 
-    Radii in m, masses in kg.  `max_squared_frequency` is that of the fastest of the four modes of the free pair, or of
-    their damping.  A damping ratio ζ gives each mode of stiffness k and effective mass m the coefficient 2ζ√(k m):
-    1/m = 1/m1 + 1/m2 for the normal mode, 7/2 of it for sliding, 1/I1 + 1/I2 for rolling (stiffness k_r R²) and for
-    twisting.
+    Radii in m, masses in kg.
+    """
+    constants_of = _reduced_constants(law)
+
+    @formula
+    def constants_of_pair(pairing, r1, r2, m1, m2):
+        inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
+        return constants_of(pairing, r1 * r2 / (r1 + r2), 1.0 / m1 + 1.0 / m2, inverse_inertia)
+
+    return constants_of_pair
+
+
+@functools.cache
+def wall_constants(law: ContactLaw) -> Callable:
+    """The formula `(pairing, radius, mass, wall_mass)` → `ContactConstants` of a grain and a plane wall.
+
+    The limit r2 → ∞ of `contact_constants`: R = r1 and 1/I2 = 0.  `wall_mass` is infinite if the motion of the wall is
+    given.
+    """
+    constants_of = _reduced_constants(law)
+
+    @formula
+    def constants_at_wall(pairing, radius, mass, wall_mass):
+        return constants_of(pairing, radius, 1.0 / mass + 1.0 / wall_mass, 2.5 / (mass * radius * radius))
+
+    return constants_at_wall
+
+
+@functools.cache
+def _reduced_constants(law: ContactLaw) -> Callable:
+    """The formula `(pairing, reduced, inverse_mass, inverse_inertia)` → `ContactConstants` of a law.
+
+    The arguments are R [m], 1/m1 + 1/m2 [1/kg] and 1/I1 + 1/I2 [1/(kg m²)].  `max_squared_frequency` is that of the
+    fastest of the four modes of the free pair, or of their damping.  A damping ratio ζ gives each mode of stiffness k
+    and effective mass m the coefficient 2ζ√(k m): 1/m = 1/m1 + 1/m2 for the normal mode, 7/2 of it for sliding,
+    1/I1 + 1/I2 for rolling (stiffness k_r R²) and for twisting.
     """
     normal_mode = law.normal_mode
 
     @formula
-    def constants_of_pair(pairing, r1, r2, m1, m2):
-        reduced = r1 * r2 / (r1 + r2)
+    def constants_of(pairing, reduced, inverse_mass, inverse_inertia):
         adhesive = pairing.surface_energy > 0.0
         normal = normal_mode(pairing.surface_energy, pairing.modulus, reduced)
         a0 = normal.rest_radius
@@ -137,8 +168,6 @@ def contact_constants(law: ContactLaw) -> Callable:
         k_n = normal.stiffness
         # squared frequencies of the four modes of the free pair; I = (2/5) m r². Sliding: r²/I = 5/(2m) adds 5/2 to
         # each 1/m, hence 7/2; rolling (stiffness k_r R²) and twisting: 1/I1 + 1/I2
-        inverse_mass = 1.0 / m1 + 1.0 / m2
-        inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
         squared_frequency = max(k_n * inverse_mass, 3.5 * k_s * inverse_mass)
         squared_frequency = max(squared_frequency, max(k_r * reduced * reduced, k_t) * inverse_inertia)
         share = 2.0 * pairing.damping_ratio
@@ -168,7 +197,7 @@ def contact_constants(law: ContactLaw) -> Callable:
             normal.constants,
         )
 
-    return constants_of_pair
+    return constants_of
 
 
 def ringing_energy(law: ContactLaw, pairing: Pairing, r1: float, r2: float) -> float:

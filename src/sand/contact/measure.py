@@ -10,6 +10,7 @@ from .damping import loads_on_grains, measured_load
 from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
 from .update import pose_at
+from .wall_loops import wall_loops
 
 ENERGIES = ("normal", "sliding", "rolling", "twisting")
 """Energies [J] of contacts that `measure_energies` computes."""
@@ -39,6 +40,20 @@ def energies_stage(law: ContactLaw) -> Stage:
         return 0
 
     return measure_energies
+
+
+@functools.cache
+def wall_energies_stage(law: ContactLaw) -> Stage:
+    """The stage that measures energies of contacts with walls, for one contact law."""
+    add_energies = wall_loops(law).energies
+
+    @stage("the energies of contacts with walls")
+    def measure_wall_energies(grains, walls, wall_contacts, count, span, settings, parameters):
+        """Add the energies [J] listed in ENERGIES to the array parameters[0]."""
+        add_energies(grains, walls, wall_contacts, count, span, settings, parameters[0])
+        return 0
+
+    return measure_wall_energies
 
 
 CONTACT_ROWS = (

@@ -137,13 +137,17 @@ def energies(pose, normal, r1, r2, constants):
 
     The rolling energy includes the normal part of n1 + n2: the torque −R² k_r n1×n2 is its exact gradient.
     """
-    zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    xi = tangential.rolling(pose.n1, pose.n2, constants.reduced_radius)
+    return stored_energies(displacements_of(pose, 0.0, r1, r2, constants), normal, constants)
+
+
+@formula
+def stored_energies(displacements, normal, constants):
+    """As `energies`, from the displacements of a contact."""
     return (
         normal,
-        0.5 * constants.slide_stiffness * dot(zeta, zeta),
-        0.5 * constants.roll_stiffness * dot(xi, xi),
-        0.5 * constants.twist_stiffness * pose.twist * pose.twist,
+        0.5 * constants.slide_stiffness * dot(displacements.slide, displacements.slide),
+        0.5 * constants.roll_stiffness * dot(displacements.roll, displacements.roll),
+        0.5 * constants.twist_stiffness * displacements.twist * displacements.twist,
     )
 
 

@@ -23,6 +23,7 @@ def pairing_between(
     mixing: str = "geometric",
     rolling_limit: float | None = None,
     factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    surface_energy_factor: float = 1.0,
     damping: float = 0.0,
     viscous_time: float = 0.0,
     damping_ratio: float = 0.0,
@@ -41,6 +42,8 @@ def pairing_between(
         Critical rolling displacement ξ_c [m], replacing those of the materials.
     factors : tuple[float, float, float], optional
         Multipliers of k_s, k_r and k_t.
+    surface_energy_factor : float, optional
+        Multiplier of γ_eff.
     damping : float, optional
         Constant damping coefficient c [kg/s] of the normal mode.
     viscous_time : float, optional
@@ -57,7 +60,7 @@ def pairing_between(
     viscous = 2.0 * viscous_time * modulus / (a.poisson_ratio * b.poisson_ratio) if viscous_time > 0.0 else 0.0
     slide, roll, twist = factors
     return Pairing(
-        surface_energy=MIXING[mixing](a.surface_energy, b.surface_energy),
+        surface_energy=surface_energy_factor * MIXING[mixing](a.surface_energy, b.surface_energy),
         modulus=modulus,
         shear=1.0 / sum((2.0 - m.poisson_ratio) / m.shear_modulus for m in (a, b)),
         twist_shear=1.0 / sum(1.0 / m.shear_modulus for m in (a, b)),

@@ -15,6 +15,7 @@ from ..box import Box
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..grains import Grains
 from ..material import Material
+from ..ramps import rampable
 from ..units import format_quantity, si
 from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
 from .law import LAWS, ContactLaw, Pairing
@@ -27,9 +28,17 @@ DAMPING_KEYS = {"damping_ratio": "critical", "damping_constant": "constant", "vi
 """Parameters of the kinds of damping, and the kind that each belongs to."""
 DEFAULT_DAMPING_RATIO = 0.2
 MAX_DAMPING_RATIO = 5.0
+FACTORS = ("slide_factor", "roll_factor", "twist_factor", "surface_energy_factor")
+"""Settings that multiply a constant of all contacts."""
+RAMPABLE = (
+    *FACTORS,
+    *("rolling_limit", "damping_ratio", "damping_constant", "viscous_time", "bath_temperature", "settling_time"),
+)
+"""Settings that may change during a run."""
 
 
 @checked
+@rampable(*RAMPABLE)
 @dataclass(frozen=True)
 class Contact:
     """Adhesive contacts: normal force of a contact law, and springs against sliding, rolling and twisting.
@@ -45,6 +54,9 @@ class Contact:
         and the energy created or destroyed is logged as `lost_stiffness`.
     slide_factor, roll_factor, twist_factor : float or str, optional
         Multipliers ≥ 0 of k_s, k_r, k_t (Seizinger et al. 2012 use 2.5, 8 and 1).
+    surface_energy_factor : float, str or Ramp, optional
+        Multiplier ≥ 0 of γ_eff of all contacts, 1 by default. A `Ramp` lets grains lose or gain adhesion during a run;
+        all numbers here may be ramps.
     rolling_limit : float or str, optional
         Critical rolling displacement ξ_c [m] > 0 of all contacts.  Default: the smaller of the values of the two
         materials.
@@ -85,6 +97,7 @@ class Contact:
     slide_factor: Any = 1.0
     roll_factor: Any = 1.0
     twist_factor: Any = 1.0
+    surface_energy_factor: Any = 1.0
     rolling_limit: Any = None
     damping: str = "none"
     damping_ratio: Any = None
@@ -110,10 +123,9 @@ class Contact:
             if getattr(self, key) not in allowed:
                 given = getattr(self, key)
                 problems.append(f"contact: {key} = {given!r}; {did_you_mean(str(given), allowed)}")
-        units = {"slide_factor": "1", "roll_factor": "1", "twist_factor": "1"}
-        for key, unit in units.items():
+        for key in FACTORS:
             try:
-                object.__setattr__(self, key, si(getattr(self, key), unit, f"contact: {key}", least=0.0))
+                object.__setattr__(self, key, si(getattr(self, key), "1", f"contact: {key}", least=0.0))
             except BadInput as error:
                 problems += error.problems
         if self.damping == "critical" and self.damping_ratio is None:
@@ -172,6 +184,7 @@ class Contact:
             mixing=self.mixing,
             rolling_limit=self.rolling_limit,
             factors=(self.slide_factor, self.roll_factor, self.twist_factor),
+            surface_energy_factor=self.surface_energy_factor,
             damping=self.damping_constant or 0.0,
             viscous_time=self.viscous_time or 0.0,
             damping_ratio=self.damping_ratio or 0.0,

@@ -13,8 +13,8 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ..arguments import MOST_GRAINS
-from ..config.case import ForcesSection, MaterialSection, material_errors
-from ..config.commands import BODIES, refuse_other_command
+from ..config.case import ForcesSection, MaterialSection, material_errors, with_absolute_files
+from ..config.commands import refuse_other_command
 from ..config.errors import validate
 from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, quantity, with_integrator, word
 from ..grains import Grains
@@ -41,7 +41,7 @@ class BodySection(Section):
     kind: BodyKind
     """Builder (as for `sand build`), or `file`."""
     file: PathName | None = None
-    """File of the body; required with `kind = "file"`."""
+    """File of the body, relative to the case file; required with `kind = "file"`."""
     length: str | None = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
     grains: Count | None = None
@@ -162,16 +162,6 @@ class CollisionCase(Section):
         return run_to_end(start, simulation), simulation
 
 
-def with_absolute_paths(content: dict[str, Any]) -> dict[str, Any]:
-    """The case with absolute paths to the files of bodies."""
-    whole = dict(content)
-    for body in BODIES & content.keys():
-        given = content[body]
-        if isinstance(given, dict) and isinstance(given.get("file"), str):
-            whole[body] = {**given, "file": str(Path(given["file"]).absolute())}
-    return whole
-
-
 def read_collision(path: str | Path) -> CollisionCase:
     """Read and check a case file of `sand collide`.
 
@@ -180,7 +170,7 @@ def read_collision(path: str | Path) -> CollisionCase:
     BadInput
         All errors of the file, one line each, with their keys.
     """
-    content = read_toml(path)
+    content = with_absolute_files(read_toml(path), path)
     refuse_other_command(content, path, "collide")
     problems = material_errors(content, ("target", "projectile"), "silica")
     return validate(with_integrator(CollisionCase, content), content, str(path), problems)

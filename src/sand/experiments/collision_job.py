@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from ..compiler.progress import announce
+from ..config.case import with_absolute_files
 from ..errors import BadInput
 from ..io.lock import writing
 from ..io.run_folder import (
@@ -23,7 +25,7 @@ from ..io.run_folder import (
 )
 from ..io.table import GrowingOutcomes
 from .collision import prepare, resume_collision, run_to_end
-from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
+from .collision_case import CollisionCase, read_collision, run_seeds
 
 
 class CollisionJob:
@@ -60,12 +62,17 @@ class CollisionJob:
         self.path, self.resume, self.overwrite = path, resume, overwrite
         self.case: CollisionCase = read_collision(path)
         self.folder = folder or Path(self.case.impact.out or Path(path).stem)
-        self.content = with_absolute_paths(read_toml(path))
+        self.content = with_absolute_files(read_toml(path), path)
         if seeds is not None:
             self.case.impact.seeds = seeds
         self.content["impact"]["seeds"] = self.case.impact.seeds
 
-    def run(self, executor: Executor | None = None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+    def run(
+        self,
+        executor: Executor | None = None,
+        observers: Sequence[Any] = (),
+        progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, Any]:
         """Simulate all collisions that are not finished; returns the content of collision.json.
 
         Parameters
@@ -74,6 +81,8 @@ class CollisionJob:
             Executor for several seeds; None computes in this process.
         observers : sequence, optional
             Observers of the simulations in this process.
+        progress : callable, optional
+            Called with the numbers of finished and of all collisions, if there are several.
 
         Raises
         ------
@@ -83,7 +92,10 @@ class CollisionJob:
             By Ctrl-C; a job with `resume` resumes.
         """
         seeds = self.case.impact.seeds
-        results = [self._one(seeds[0], observers)] if len(seeds) == 1 else self._many(seeds, executor, observers)
+        if len(seeds) == 1:
+            results = [self._one(seeds[0], observers)]
+        else:
+            results = self._many(seeds, executor, observers, progress or (lambda done, total: None))
         counts = Counter(result["outcome"] for result in results)
         content = {"case": str(self.path), "folder": str(self.folder), "collisions": results, "counts": dict(counts)}
         write_json(self.folder / COLLISION, content)
@@ -103,7 +115,13 @@ class CollisionJob:
             self._describe(ONE_COLLISION)
         return run_to_end(start, simulation).to_dict()
 
-    def _many(self, seeds: list[int], executor: Executor | None, observers: Sequence[Any]) -> list[dict[str, Any]]:
+    def _many(
+        self,
+        seeds: list[int],
+        executor: Executor | None,
+        observers: Sequence[Any],
+        progress: Callable[[int, int], None],
+    ) -> list[dict[str, Any]]:
         """Compute the outcomes of several seeds, and a figure of all."""
         from ..plotting.collisions import collision_figure
         from ..plotting.run_figure import save
@@ -114,7 +132,17 @@ class CollisionJob:
             self._describe(CASE)
         with writing(self.folder):
             kept = GrowingOutcomes(self.folder / OUTCOMES, self.content, resume=self.resume)
-            results = run_seeds(self.content, seeds, executor, kept.found, kept.add, observers)
+            done = len(kept.found.keys() & set(seeds))
+
+            def keep(seed: int, outcome: dict[str, Any]) -> None:
+                nonlocal done
+                kept.add(seed, outcome)
+                done += 1
+                progress(done, len(set(seeds)))
+
+            progress(done, len(set(seeds)))
+            results = run_seeds(self.content, seeds, executor, kept.found, keep, observers)
+            announce("drawing the figure")
             save(collision_figure(results), self.folder / FIGURE)
         return results
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 
 from ..errors import BadInput, import_optional
+from ..forces.own import IMPORTED, import_modules
 from ..threads import set_threads
 
 ANSWER = 10.0
@@ -55,7 +56,7 @@ def executor_for(
         raise BadInput(f"workers = {workers}; on Windows Python starts at most {MOST_ON_WINDOWS} processes")
     else:
         context = multiprocessing.get_context("spawn")
-        begin = partial(_leave_signals_to_parent, threads or 1)
+        begin = partial(_begin_worker, threads or 1, list(IMPORTED))
         with ProcessPoolExecutor(workers, mp_context=context, initializer=begin) as pool:
             _start(pool, workers)
             processes = list((getattr(pool, "_processes", None) or {}).values())
@@ -68,13 +69,14 @@ def executor_for(
                 raise
 
 
-def _leave_signals_to_parent(threads: int) -> None:
+def _begin_worker(threads: int, imports: list[str]) -> None:
     """Ignore Ctrl-C, which a terminal sends to all processes; only the parent handles it and shows notes."""
     from ..compiler.progress import suppress_notes
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     set_threads(threads)
     suppress_notes()
+    import_modules(imports)
 
 
 def _nothing() -> None:

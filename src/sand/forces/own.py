@@ -17,6 +17,7 @@ from typing import Any
 
 from ..box import Box
 from ..compiler.jit import compile_error, formula
+from ..descriptions import described
 from ..errors import BadInput, did_you_mean
 from ..grains import Grains
 from ..units import si
@@ -246,10 +247,12 @@ class _Own:
         self.references = f"user-defined: {kind.path}"
         self.formula, self.torques = kind.formula(self.constants())
 
-    def __repr__(self) -> str:
-        return (
-            f"{self.name}({', '.join(f'{key}={value!r}' for key, value in self.parameters().items() if key != IMPORT)})"
-        )
+    __repr__ = described
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the parameters."""
+        return {**self.kind.units, "cutoff": "m"}
 
     def constants(self) -> Any:
         """The parameters of the formula."""
@@ -343,6 +346,10 @@ def own_force(table: dict[str, Any]) -> OwnExternal | OwnPair:
     return OWN[path](**{key: value for key, value in table.items() if key != IMPORT})
 
 
+IMPORTED: list[str] = []
+"""Modules that `import_modules` imported, as it takes them, for other processes."""
+
+
 def import_modules(names: Iterable[str]) -> None:
     """Import modules that define forces, by name or file; the present folder is searched first.
 
@@ -360,6 +367,7 @@ def import_modules(names: Iterable[str]) -> None:
             raise BadInput(f"--import {name}: {_in_words(error)}") from None
         finally:
             sys.path.pop(0)
+        IMPORTED.append(str(Path(name).absolute()) if name.endswith(".py") else name)
 
 
 def module_of(function: Callable) -> str:

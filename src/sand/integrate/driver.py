@@ -26,6 +26,7 @@ from ..state.state import (
     CONTACTS,
     CORRECTED,
     CYCLE,
+    GRAIN1,
     INNER_SKIN,
     LEFT,
     LONG_RANGE_SKIN,
@@ -40,6 +41,7 @@ from ..state.state import (
     STEPS,
     TIME,
 )
+from .driven import HOLD, HOLD_IN_EVENTS, RELEASE, RELEASE_FROM_EVENTS, RESET
 from .force_calls import (
     add_external_loads,
     add_pairs_in_contact,
@@ -63,6 +65,7 @@ from .stages import (
     CONTACT_PASS,
     CONTACT_STEP,
     DRIFT,
+    DRIVE,
     EXPLAIN,
     EXTRAPOLATE,
     FIRST_FORCE,
@@ -81,6 +84,9 @@ from .stages import (
     STIFFNESS_WORK,
     STORE_POSITIONS,
     VERLET_LIST,
+    WALL_CONTACTS,
+    WALL_LOADS,
+    WALL_STEP,
 )
 from .step_control import cycle_steps, is_close, is_past
 from .step_parts import possible_step
@@ -145,7 +151,12 @@ def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, q
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
     scratch[DT] = dt
     blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+    driven = has_stage(program, DRIVE)
+    if driven:
+        call_stage(program, DRIVE, table, HOLD)
     for_each_block(program, DRIFT, table, queue.words, blocks)
+    if driven:
+        call_stage(program, DRIVE, table, RELEASE)
     if external_work.time_dependent:
         gained += sum_external(scratch, forces, program, table, end, ENERGY)
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
@@ -175,6 +186,8 @@ def sum_loads(
     Long-range loads are summed if `due`; within a cycle their constant part or extrapolation replaces them.
     """
     for_each_block(program, GATHER, table, queue.words, blocks_of(grains.mass.size, GRAINS_PER_BLOCK))
+    if has_stage(program, WALL_LOADS):
+        call_stage(program, WALL_LOADS, table, 0)
     add_external_loads(scratch, forces, program, table, clock[TIME] + clock[STEP])
     if forces.pair == 0:
         count[LONG_RANGE_SUMS] += 1
@@ -190,14 +203,26 @@ def sum_loads(
 @caller
 def loads_and_kick(grains, long_range, clock, count, scratch, respa, forces, queue, program, table, due, elapsed):
     """Sum the loads and apply the second half kick; returns the squares of the largest speed and spin."""
-    if forces.pair + forces.external == 0:
+    driven = has_stage(program, DRIVE)
+    if has_stage(program, GATHER_AND_KICK):
         count[LONG_RANGE_SUMS] += 1
         scratch[DT] = 0.5 * clock[STEP]
         blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+        if driven:
+            call_stage(program, DRIVE, table, HOLD)
         for_each_block(program, GATHER_AND_KICK, table, queue.words, blocks)
+        if driven:
+            scratch[DT] = clock[STEP]
+            call_stage(program, DRIVE, table, RELEASE)
         return largest_speeds(queue, blocks)
     sum_loads(grains, long_range, clock, count, scratch, respa, forces, queue, program, table, due, elapsed)
-    return kick(grains, 0.5 * clock[STEP])
+    if not driven:
+        return kick(grains, 0.5 * clock[STEP])
+    call_stage(program, DRIVE, table, HOLD)
+    fastest, fastest_spin = kick(grains, 0.5 * clock[STEP])
+    scratch[DT] = clock[STEP]
+    call_stage(program, DRIVE, table, RELEASE)
+    return fastest, fastest_spin
 
 
 @rare
@@ -222,7 +247,11 @@ def first_half(
 
     A cycle that would pass `until` [s] is not begun, or, with `shorten`, ends at this time.
     """
+    at_wall = call_stage(program, WALL_STEP, table, 0) if has_stage(program, WALL_STEP) else Stop.NONE.value
+    grain = count[GRAIN1]
     dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, span, criteria)
+    if stop == Stop.NONE.value and at_wall != Stop.NONE.value:
+        stop, count[GRAIN1] = at_wall, grain
     if stop != Stop.NONE.value:
         scratch[DT] = dt
         if stop != Stop.OVERCOMPRESSED.value:
@@ -301,10 +330,21 @@ def second_half(
     formed = count_new_contacts(grains, pair_list, count, span)
     if count[CONTACTS] + formed > contacts.pair.shape[1]:
         return Stop.CONTACTS_FULL.value
+    driven = has_stage(program, DRIVE)
+    if driven:
+        call_stage(program, DRIVE, table, HOLD_IN_EVENTS)
+    if has_stage(program, WALL_CONTACTS):
+        stop = call_stage(program, WALL_CONTACTS, table, 0)
+        if stop != Stop.NONE.value:
+            if driven:
+                call_stage(program, DRIVE, table, RELEASE_FROM_EVENTS)
+            return stop
     broken = update_contacts(count, lost, settings, queue, program, table)
     if formed > 0:
         call_stage(program, FORM, table, 0)
         call_stage(program, SORT, table, 0)
+    if driven:
+        call_stage(program, DRIVE, table, RELEASE_FROM_EVENTS)
     if formed > 0 or list_rebuilt:
         call_stage(program, CONTACT_STEP, table, 0)
     dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
@@ -334,6 +374,8 @@ def second_half(
             call_stage(program, GAS_KICK, table, 0)
         if settling:
             call_stage(program, SETTLE_CLUSTERS, table, 0)
+        if gas and driven:
+            call_stage(program, DRIVE, table, RESET)
         if gas or settling or respa.impulse:  # speeds changed between steps
             invalidate_speeds(pair_list)
     return Stop.NONE.value

@@ -2,8 +2,10 @@
 
 import functools
 from collections.abc import Callable
+from typing import Any
 
 from ..compiler.stage import PythonStage, Stage, stage
+from ..compiler.table import Table
 from ..forces.external.loops import external_energy, external_loads, external_power, wrapping_work
 from ..forces.pair.loops import LongRangeSums, Round, all_blocks
 from .parts import EXTERNAL, LOAD_TIME
@@ -97,6 +99,14 @@ def _round_stage(given: Round) -> Stage | PythonStage:
         return all_blocks(grains)
 
     return in_blocks
+
+
+def run_rounds(sums: LongRangeSums, long_vectors: bool, table: Table, parameters: Any) -> None:
+    """Run the rounds of a force from Python."""
+    stages = pair_force_stages(sums, long_vectors)
+    for number in range(ROUND, ROUND + len(sums.rounds)):
+        for block in (BEGIN, *range(stages[number].run(table, parameters, BEGIN))):
+            stages[number].run(table, parameters, block)
 
 
 @functools.cache

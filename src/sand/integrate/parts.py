@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 PARTS = (
     # arrays of the state
-    *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clusters", "clock", "count", "lost"),
+    *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts"),
+    *("clock", "count", "lost"),
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
     # data of one call of the driver
@@ -41,6 +42,7 @@ class Stop(IntEnum):
     SPINS_TOO_FAST = 8
     LIST_FULL = 9
     CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
+    WALL_CONTACTS_FULL = 11
 
 
 class ContactParameters(NamedTuple):

@@ -14,6 +14,7 @@ from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..forces.pair.loops import LongRangeSums
 from . import stages
+from .driven import DrivenArrays, drive
 from .force_stages import (
     EXTERNAL_STAGES,
     IN_CONTACT,
@@ -40,6 +41,8 @@ class Components(NamedTuple):
     gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
+    driven: DrivenArrays | None = None  # grains with prescribed motion
+    walls: Any = None  # contact.wall_loops.WallNumbers; None without walls
 
 
 def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
@@ -49,7 +52,7 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
         stages.DRIFT: stages.drift_stage(given.magnetic, given.wide),
         stages.EXPLAIN: stages.explain_stop,
     }
-    if given.pair_forces or given.external_forces:
+    if given.pair_forces or given.external_forces or given.walls is not None:
         found[stages.GATHER] = stages.gather_stage(given.wide)
     else:
         found[stages.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
@@ -66,6 +69,11 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     if given.flight is not None:
         found[stages.FLIGHT] = given.flight
     program: dict[int, tuple[Stage | PythonStage, Any]] = {number: (each, ()) for number, each in found.items()}
+    if given.driven is not None:
+        program[stages.DRIVE] = drive, given.driven
+    if given.walls is not None:
+        of_walls = stages.wall_stages(given.law, variant_of(parameters.settings))
+        program |= {number: (each, given.walls) for number, each in of_walls.items()}
     number = stages.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:

@@ -16,6 +16,8 @@ from ..contact.law import ContactLaw
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import contact_pass_loop, contact_step, store_contact_sums
+from ..contact.wall_loops import FULL as WALLS_FULL
+from ..contact.wall_loops import add_wall_loads, wall_loops, wall_step_loop
 from ..forces.gas.loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
@@ -25,7 +27,7 @@ from ..state.state import CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLIN
 from .motion import UNBOUNDED, drift_for, gather_and_kick
 from .parts import CYCLE_LENGTH, DT, SINCE, Stop
 from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions
-from .step_control import find_limiting_grains, first_not_finite
+from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_finite, set_wall_step
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
 
@@ -50,7 +52,11 @@ GAS_KICK = 16
 FLIGHT = 17
 EXPLAIN = 18
 SETTLE_CLUSTERS = 19
-FIRST_FORCE = 20  # from here on the stages of forces, see force_stages
+DRIVE = 20
+WALL_CONTACTS = 21
+WALL_LOADS = 22
+WALL_STEP = 23
+FIRST_FORCE = 24  # from here on the stages of forces, see force_stages
 
 INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
@@ -150,6 +156,38 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     return {STIFFNESS_WORK: stiffness_work, SETTLE: settle_contacts, FORM: form}
 
 
+@functools.cache
+def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
+    """Stages of walls by number, whose parameters are `contact.wall_loops.WallNumbers`: contacts, loads, step."""
+    update, find_step = wall_loops(law, damping).update, wall_step_loop(law)
+
+    @stage("the contacts with walls")
+    def update_walls(grains, walls, wall_contacts, clock, count, lost, span, settings, parameters):
+        """Move the walls, and form, slip and break their contacts; returns a `Stop`."""
+        found = update(grains, walls, wall_contacts, clock, count, lost, span, settings, parameters)
+        return Stop.WALL_CONTACTS_FULL.value if found == WALLS_FULL else Stop.NONE.value
+
+    @stage("the forces of walls")
+    def wall_loads(grains, wall_contacts, count):
+        add_wall_loads(grains, wall_contacts, count)
+        return 0
+
+    @stage("the time step of walls")
+    def wall_step(grains, walls, wall_contacts, clock, count, settings, criteria, parameters):
+        """Set the longest step that walls allow; returns a `Stop`."""
+        contact, approach, behind = find_step(
+            grains, walls, wall_contacts, count, settings.per_period, parameters, criteria.longest, criteria.impact,
+            CLOSING_FRACTION,
+        )  # fmt: skip
+        set_wall_step(clock, count, contact, approach, criteria.longest)
+        if behind >= 0:
+            count[GRAIN1] = behind
+            return Stop.OVERCOMPRESSED.value
+        return Stop.NONE.value
+
+    return {WALL_CONTACTS: update_walls, WALL_LOADS: wall_loads, WALL_STEP: wall_step}
+
+
 @stage("the time step of contacts")
 def set_contact_step(grains, contacts, pair_list, clock, count, settings):
     """Set the longest step that contacts allow."""
@@ -160,7 +198,7 @@ def set_contact_step(grains, contacts, pair_list, clock, count, settings):
 @stage("the removal of broken contacts")
 def remove_broken(contacts, count):
     """Remove broken contacts from the arrays, where they were kept without loads until the end of the step."""
-    compact_contacts(contacts, count)
+    count[CONTACTS] = compact_contacts(contacts, count[CONTACTS])
     return 0
 
 

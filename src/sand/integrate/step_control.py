@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from ..box import nearest_image
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
@@ -27,6 +29,7 @@ from ..state.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
+    WALL_STEP,
 )
 
 CHECK_INTERVAL = 16
@@ -234,7 +237,24 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
         clock[LEVEL] = quantise_step(clock[LEVEL], wanted, may_grow)
     if criteria.fixed > 0.0:
         return criteria.fixed
-    return min(clock[LEVEL], clock[CONTACT_STEP])
+    chosen_step = min(clock[LEVEL], clock[CONTACT_STEP])
+    return min(chosen_step, clock[WALL_STEP]) if clock[WALL_STEP] > 0.0 else chosen_step
+
+
+@loop
+def set_wall_step(clock, count, contact, approach, longest):
+    """Set the longest step that walls allow [s], from those of their contacts and of grains approaching them.
+
+    The step of approach is rounded down to a power of two of a second.  The result falls at once and rises at every
+    HOLD_STEPS-th step only, so that it does not follow the phase of oscillations.
+    """
+    step = longest
+    if contact < longest:
+        step = np.float64(np.float32(contact))  # as in contact.update.contact_step
+    if approach < step:
+        step = quantise_step(1.0, approach, True)
+    if clock[WALL_STEP] == 0.0 or step < clock[WALL_STEP] or count[STEPS] % HOLD_STEPS == 0:
+        clock[WALL_STEP] = step
 
 
 @formula

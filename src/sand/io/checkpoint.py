@@ -4,7 +4,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 
 | array | meaning |
 |---|---|
-| meta.json | JSON as bytes: `format`, `version`, `sha256` of all arrays, step, time, planned end, case, choices |
+| meta.json | JSON as bytes: `format`, `version`, `sha256` of all arrays, step, time, planned end, case, choices, … |
 | clock | time and step [s], remaining length of the r-RESPA cycle [s], …; meta.json names all entries |
 | count | numbers of steps, contacts, candidate pairs, contacts formed and broken, slip events; builds of the lists |
 | lost | energy lost per channel [J] |
@@ -14,6 +14,8 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
 | pair_list/… | the list of candidate pairs, and the positions at its last rebuild |
 | order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
+| walls/… | position, velocity, force, impulse and work of each wall; only with walls, as the next |
+| wall_contacts/… | contacts with walls: grain and wall, pointer and anchor, twist, constants, losses, loads |
 | long_range/… | loads of the last long-range summation, state of the cycle, positions at the last rebuild of the list |
 
 `io.state_arrays` checks each array.
@@ -39,8 +41,8 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 8
-"""Version of the file format; other versions are refused. Versions before 8 were never released."""
+VERSION = 9
+"""Version of the file format; other versions are refused. Versions before 9 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
 _META = "meta.json"

@@ -16,11 +16,13 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
 | log/particles/position, radius | to full precision [m]; only in files of bodies |
 | bonds/group | grains in contact |
+| log/particles/id | identity of each grain; absent if it is the index, as long as no grain was removed |
 | log/particles/NAME | own quantities of the user (`sand.schema.OWN`), if any grain has a value |
 | log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
 | log/bonds/share | stretch, slide, roll and twist as shares of their limits |
+| late/particles/id, NAME | the same, in files whose first frame has no log/particles/id, NAME |
 | log/crc32 | checksum of step, material names and all numbers of a frame |
 
 Vectors are in the laboratory frame.
@@ -37,12 +39,15 @@ from typing import Any, overload
 import numpy as np
 
 from ..box import Box
-from ..errors import BadInput, shown
+from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..grains import Grains
 from ..schema import OWN, own_values
+from ..units import format_quantity
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
+IDENTITY, LATE = "id", "late/"
+"""Name of the identities of grains, and beginning of the names of chunks that the first frame lacks."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 
@@ -86,13 +91,49 @@ def stored_frame(
         "bonds/twist": contacts["twist"].astype(np.float32),
         "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
     }
-    # absent where no grain has a value
-    frame.log |= {f"particles/{name}": values.copy() for name, values in own_values(grains).items()}
+    # absent where no grain has a value, unless grains were removed: a reader would then use those of the first frame
+    own = own_values(grains)
+    if not np.array_equal(grains.id, np.arange(len(grains))):
+        frame.log[f"particles/{IDENTITY}"] = np.array(grains.id)
+        own = {name: getattr(grains, name) for name in OWN}
+    frame.log |= {f"particles/{name}": values.copy() for name, values in own.items()}
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
     frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
     return frame
+
+
+def append_frame(file: Any, frame: Any) -> None:
+    """Append a frame to an open GSD file.
+
+    GSD reads no logged array that the first frame lacks: identities and own quantities that appear later are chunks of
+    names that begin with `LATE`.
+    """
+    if len(file):
+        for name in [f"particles/{name}" for name in (IDENTITY, *OWN)]:
+            if name in frame.log and not file.file.chunk_exists(0, f"log/{name}"):
+                file.file.write_chunk(LATE + name, frame.log.pop(name))
+    file.append(frame)
+
+
+def read_stored(file: Any, number: int) -> Any:
+    """A frame as it was given to `append_frame`."""
+    stored = file[number]
+    for name in [f"particles/{name}" for name in (IDENTITY, *OWN)]:
+        if file.file.chunk_exists(number, LATE + name):
+            stored.log[name] = file.file.read_chunk(number, LATE + name)
+        elif name in stored.log and len(stored.log[name]) != stored.particles.N:
+            del stored.log[name]  # of the first frame, with another number of grains
+    return stored
+
+
+def read_identities(file: Any, number: int, count: int) -> np.ndarray:
+    """Identities (N,) of the grains of a frame with N = `count` grains."""
+    for name in (f"{LATE}particles/{IDENTITY}", f"log/particles/{IDENTITY}"):
+        if file.file.chunk_exists(number, name):
+            return np.asarray(file.file.read_chunk(number, name))
+    return np.arange(count, dtype=np.uint32)
 
 
 def code_of(stored: Any) -> int:
@@ -120,8 +161,9 @@ def _crc32(stored: Any) -> int:
 class Frame:
     """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
-    `material` (N,) holds indices into the names `materials`. Arrays of contacts: `pair` (C, 2), `overlap` [m],
-    `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
+    `material` (N,) holds indices into the names `materials`; `id` (N,) is the identity of each grain, which stays when
+    others are removed. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,), `force` [N],
+    `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
     """
 
     def __init__(self, stored: Any):
@@ -136,6 +178,7 @@ class Frame:
         self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
+        self.id = np.asarray(stored.log.get(f"particles/{IDENTITY}", np.arange(p.N)), np.uint32)
         for name in OWN:
             setattr(self, name, np.array(stored.log.get(f"particles/{name}", np.zeros(p.N))))
         names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
@@ -156,6 +199,74 @@ class Frame:
     def __len__(self) -> int:
         """Number of grains."""
         return len(self.radius)
+
+    def __repr__(self) -> str:
+        when = f"t = {format_quantity(self.time, 's')}, step {self.step}"
+        return f"<frame at {when}: {len(self)} grains, {len(self.pair)} contacts>"
+
+
+OF_GRAINS = ("position", "velocity", "spin", "moment", "orientation", "radius", "mass", "charge", "material", *OWN)
+OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
+
+
+class FrameArrays(Sequence[np.ndarray]):
+    """One array of each frame of a sequence of frames; a frame is read when its array is asked for.
+
+    `arrays[3]` is the array of one frame, `arrays[-10:]` again such a sequence, and `arrays[-10:, 5]` an array of the
+    entries 5 of ten frames. `np.asarray(arrays)` reads all frames.
+
+    Parameters
+    ----------
+    frames : FrameSequence
+        The frames.
+    name : str
+        Name of an array of `Frame`.
+    chosen : range or None, optional
+        Indices of the frames, by default all.
+    """
+
+    def __init__(self, frames: FrameSequence, name: str, chosen: range | None = None):
+        if name not in (*OF_GRAINS, *OF_CONTACTS):
+            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(str(name), (*OF_GRAINS, *OF_CONTACTS))}")
+        self.frames, self.name = frames, name
+        self.chosen = range(len(frames)) if chosen is None else chosen
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    @overload
+    def __getitem__(self, index: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, index: slice) -> FrameArrays: ...
+    @overload
+    def __getitem__(self, index: tuple[Any, ...]) -> np.ndarray: ...
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, tuple):
+            first, *rest = index
+            if isinstance(first, slice):
+                return self._stacked([self._of(number)[tuple(rest)] for number in self.chosen[first]])
+            return self[first][tuple(rest)]
+        if isinstance(index, slice):
+            return FrameArrays(self.frames, self.name, self.chosen[index])
+        if not isinstance(index, (int, np.integer)) or not -len(self) <= index < len(self):
+            raise NoSuchFrame(f"{self.name}[{shown(index)}]: there are {len(self)} frames, from 0 to {len(self) - 1}")
+        return self._of(self.chosen[int(index)])
+
+    def _of(self, number: int) -> np.ndarray:
+        return np.asarray(getattr(self.frames[number], self.name))
+
+    def _stacked(self, arrays: list[np.ndarray]) -> np.ndarray:
+        if len({array.shape for array in arrays}) > 1:
+            raise BadInput(f"{self.name}: frames differ in the number of entries; take them one by one")
+        return np.array(arrays)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        """All arrays as one, (frames, …)."""
+        return self._stacked(list(self)).astype(dtype, copy=False)
+
+    def __repr__(self) -> str:
+        return f"<{self.name} of {len(self)} frames, read on access>"
 
 
 class NoSuchFrame(BadInput, IndexError):
@@ -184,3 +295,13 @@ class FrameSequence(Sequence[Frame]):
         if not -len(self) <= index < len(self):
             raise NoSuchFrame(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
         return self._frame(index % len(self))
+
+    def arrays(self, name: str) -> FrameArrays:
+        """One array of each frame, such as "position", read on access; also as `frames.position`.  Raises BadInput."""
+        return FrameArrays(self, name)
+
+    def __getattr__(self, name: str) -> FrameArrays:
+        if name not in (*OF_GRAINS, *OF_CONTACTS):
+            known = [*OF_GRAINS, *OF_CONTACTS, *(known for known in dir(self) if known[0] != "_")]
+            raise NoSuchAttribute(f"frames have no '{name}'; {did_you_mean(name, known)}")
+        return FrameArrays(self, name)

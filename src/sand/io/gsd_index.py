@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import BadInput
 from .damage import DAMAGED, set_aside
-from .frame import Frame, code_of
+from .frame import Frame, code_of, read_stored
 
 ENTRY = np.dtype(
     [
@@ -155,7 +155,7 @@ def repair(path: Path, time: float) -> dict[float, tuple[int, int]]:
     with gsd.hoomd.open(str(path), "r") as file:
         for number in range(_frames_until(file, time), len(file)):
             try:
-                stored = file[number]
+                stored = read_stored(file, number)
                 complete[Frame(stored).time] = (number, code_of(stored))
             except Exception:  # gsd raises various exceptions for broken files
                 break

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from ..errors import BadInput
+from ..errors import BadInput, warn
 from .damage import set_aside
 from .run_folder import LEDGER, SUMMARY, append_text, read_json, read_text, replace_file
 
@@ -60,8 +60,10 @@ def _text(columns: Sequence[str], rows: Iterable[Row]) -> str:
     return ",".join(columns) + "\n" + "".join(_line(columns, row) for row in rows)
 
 
-def keep_if_damaged(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> None:
-    """Rename a ledger that holds rows other than `rows`, with a warning, before it is rewritten from `rows`.
+def keep_if_damaged(
+    path: Path, columns: Sequence[str], rows: Sequence[Row], report: Callable[[str], None] = warn
+) -> None:
+    """Rename a ledger that holds rows other than `rows` before it is rewritten from `rows`; `report` gets the warning.
 
     A missing file is accepted, and so is one with only some of the rows, or with further ones.
 
@@ -80,9 +82,7 @@ def keep_if_damaged(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> 
     if found.startswith(expected) or expected.startswith(found[: found.rfind("\n") + 1]):
         return
     aside = set_aside(path)
-    warnings.warn(
-        f"{path} did not hold what the run had written; it is now {aside.name}, replaced by a new one", stacklevel=2
-    )
+    report(f"{path} did not hold what the run had written; it is now {aside.name}, replaced by a new one")
 
 
 def read_ledger(path: Path) -> list[Row]:

@@ -126,6 +126,11 @@ class LiveTrajectory(FrameSequence):
         with self.lock:
             return self._frames.pairs(index)
 
+    def identities(self, index: int) -> np.ndarray:
+        """Identities (N,) of the grains of a frame ≥ 0.  Raises BadInput if the frame is incomplete."""
+        with self.lock:
+            return self._frames.identities(index)
+
     def close(self) -> None:
         """Close the file."""
         with self.lock, contextlib.suppress(OSError, RuntimeError):

@@ -13,15 +13,29 @@ import numpy as np
 
 from ..errors import BadInput
 from ..schema import FIELDS
-from ..state.arrays import SAVED_LONG_RANGE
-from ..state.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LOST, PAIRS, STAGE, STEPS, TIME
+from ..state.arrays import SAVED_LONG_RANGE, SAVED_WALLS
+from ..state.state import (
+    CLOCK,
+    CONTACTS,
+    COUNT,
+    CUTOFF,
+    GRAIN1,
+    GRAIN2,
+    LOST,
+    PAIRS,
+    STAGE,
+    STEPS,
+    TIME,
+    WALL_CONTACTS,
+)
 
 
 class ArraySpec(NamedTuple):
     """Data type, shape and allowed values of one array of a checkpoint."""
 
     dtype: str
-    shape: tuple[Any, ...]  # sizes: an integer, N grains, C contacts, P pairs; a tuple: one of these; None: any
+    # sizes: an integer, N grains, C contacts, P pairs, W walls, K contacts with walls; a tuple: one of these; None: any
+    shape: tuple[Any, ...]
     rule: str = "finite"  # allowed values: a name in RULES
     required: bool = True
 
@@ -37,7 +51,7 @@ STORED = {
     **{f"grains/{field.name}": ArraySpec("f8", ("N",) if field.width == 1 else (field.width, "N")) for field in FIELDS},
     **{f"grains/{name}": ArraySpec("f8", ("N",), "above 0") for name in ("radius", "mass", "inertia")},
     "grains/material": ArraySpec("u4", ("N",), "any"),
-    "grains/id": ArraySpec("u4", ("N",), "order"),
+    "grains/id": ArraySpec("u4", ("N",), "ascending"),
     "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
     **{
         f"contacts/{name}": ArraySpec("f8", (3, "C"))
@@ -58,6 +72,18 @@ STORED = {
     "pair_list/anchor": ArraySpec("f8", (3, "N"), "no nan"),
     **{f"long_range/{name}": ArraySpec("f8", (3, (0, "N"))) for name in SAVED_LONG_RANGE},
     "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
+    **{f"walls/{name}": ArraySpec("f8", (3, "W"), required=False) for name in SAVED_WALLS},
+    "walls/work": ArraySpec("f8", ("W",), required=False),
+    "wall_contacts/pair": ArraySpec("u4", (2, "K"), "grain and wall", required=False),
+    **{
+        f"wall_contacts/{name}": ArraySpec("f8", (3, "K"), required=False)
+        for name in ("pointer1", "pointer2", "force", "torque1")
+    },
+    **{f"wall_contacts/{name}": ArraySpec("f8", ("K",), required=False) for name in ("twist", "formed")},
+    "wall_contacts/constants": ArraySpec("f8", (None, "K"), required=False),
+    "wall_contacts/lost": ArraySpec("f8", ((4, 6), "K"), required=False),
+    "wall_contacts/damping": ArraySpec("f8", (12, (0, "K")), required=False),
+    "wall_contacts/flag": ArraySpec("u1", ("K",), "any", required=False),
 }
 """All arrays of a checkpoint."""
 NUMBERS = {"steps": int, "time": float, "output_time": float, "wall_seconds": float, "temperature": float}
@@ -66,6 +92,8 @@ PLANNED_END = {"until": float, "last_step": int}
 """Numbers of `meta.json` that may be null."""
 TABLES = {"choices": dict, "case": dict, "ledger": list}
 """Tables of `meta.json`."""
+CHANGES = {"case_written": dict, "updaters": list}
+"""Entries of `meta.json` that a run without changes may lack: the case in case.toml, and names of updaters."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
@@ -88,7 +116,7 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
     for name, spec in STORED.items():
         if name in arrays:
             _check_array(name, arrays[name], spec, sizes)
-        elif spec.required:
+        elif spec.required or ("walls/work" in arrays and name.startswith(("walls/", "wall_contacts/"))):
             raise BadInput(f"there is no array {name!r}")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
@@ -106,6 +134,9 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
             raise BadInput(
                 f"its meta.json has {name} = {value!r}, which is no {'number of steps' if kind is int else 'number'}"
             )
+    for name, kind in CHANGES.items():
+        if name in meta and not isinstance(meta[name], kind):
+            raise BadInput(f"its meta.json has {name} = {meta[name]!r}, which is not a {kind.__name__}")
     for name, table in TABLES.items():
         if not isinstance(meta.get(name), table):
             raise BadInput(f"its meta.json has {name} = {meta.get(name)!r}, which is not a {table.__name__}")
@@ -120,9 +151,10 @@ def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
         return int(arrays[name].shape[-1])
 
     n, c, p = columns("grains/radius"), columns("contacts/pair"), columns("pair_list/pair")
+    w, k = (columns(name) if name in arrays else 0 for name in ("walls/work", "wall_contacts/pair"))
     if n == 0:
         raise BadInput("it holds no grain")
-    return {"N": n, "N+1": n + 1, "C": c, "2C": 2 * c, "P": p}
+    return {"N": n, "N+1": n + 1, "C": c, "2C": 2 * c, "P": p, "W": w, "K": k}
 
 
 def _check_array(name: str, array: np.ndarray, spec: ArraySpec, sizes: Mapping[str, int]) -> None:
@@ -159,10 +191,21 @@ def _pairs(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     return "names the same grain twice" if (array[0] == array[1]).any() else ""
 
 
+def _at_walls(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+    for row, what, n in zip(array, ("grain", "wall"), (sizes["N"], sizes["W"]), strict=True):
+        if row.size and int(row.max()) >= n:
+            return f"names {what} {int(row.max())}, but the {what}s are 0 to {n - 1}"
+    return ""
+
+
 def _order(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     seen = np.zeros(array.size, bool)
     seen[array[array < array.size]] = True
     return "" if seen.all() else f"does not hold each number from 0 to {array.size - 1} once"
+
+
+def _ascending(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+    return "" if (array[1:] > array[:-1]).all() else "does not hold ascending numbers, each once"
 
 
 def _starts(array: np.ndarray, sizes: Mapping[str, int]) -> str:
@@ -179,7 +222,9 @@ RULES: dict[str, Callable[[np.ndarray, Any], str]] = {
     "above 0": _each(lambda array: np.isfinite(array) & (array > 0.0), "finite and above 0"),
     "boolean": _each(lambda array: array <= 1, "0 or 1"),
     "grains": _pairs,
+    "grain and wall": _at_walls,
     "order": _order,
+    "ascending": _ascending,
     "starts": _starts,
 }
 """Functions that return what is wrong with the values of an array, or an empty string."""
@@ -194,6 +239,7 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
         STAGE: 0,
         CONTACTS: arrays["contacts/pair"].shape[1],
         PAIRS: arrays["pair_list/pair"].shape[1],
+        WALL_CONTACTS: arrays["wall_contacts/pair"].shape[1] if "wall_contacts/pair" in arrays else 0,
     }
     for index, value in wanted.items():
         if count[index] != value:
@@ -201,6 +247,9 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
     for index in (GRAIN1, GRAIN2):
         if not -1 <= count[index] < n:
             raise BadInput(f"'count' says {COUNT[index]} = {count[index]}, but the grains are 0 to {n - 1}")
+    following = meta.get("next_id", n)
+    if type(following) is not int or not arrays["grains/id"][-1] < following < 2**32:
+        raise BadInput(f"'grains/id' ends with {arrays['grains/id'][-1]}, and meta.json says next_id = {following!r}")
     if not 0.999999 * meta["time"] <= meta["output_time"] < np.inf:
         raise BadInput(f"meta.json says output_time = {meta['output_time']!r} s, less than time = {meta['time']!r} s")
     if clock[TIME] != meta["time"]:

@@ -7,20 +7,19 @@ import ctypes
 import math
 import os
 import time as wall
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..box import Box
-from ..errors import BadInput, FilesFailed, shown
+from ..errors import BadInput, FilesFailed, shown, warn
 from ..grains import Grains
 from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
-from .frame import Frame, FrameSequence, code_of, stored_frame
+from .frame import Frame, FrameSequence, append_frame, code_of, read_identities, read_stored, stored_frame
 
 FLUSH_EVERY = 1.0
 """Wall time [s] between flushes; GSD buffers, and unflushed frames are lost if the process is killed."""
@@ -45,6 +44,8 @@ class TrajectoryWriter:
         frames and frames that differ from the resumed run are deleted.
     written : Sequence[float], optional
         Times of the frames [s] that the run has written up to that time.
+    report : callable, optional
+        Called with the text of a warning.
 
     Raises
     ------
@@ -52,7 +53,13 @@ class TrajectoryWriter:
         If the file cannot be written.
     """
 
-    def __init__(self, path: Path, resume_at: float | None = None, written: Sequence[float] = ()):
+    def __init__(
+        self,
+        path: Path,
+        resume_at: float | None = None,
+        written: Sequence[float] = (),
+        report: Callable[[str], None] = warn,
+    ):
         self.path = path
         self._file: Any = None  # closed between runs
         self._later: dict[float, tuple[int, int]] = {}  # frames after resume_at: index and checksum by time
@@ -69,7 +76,7 @@ class TrajectoryWriter:
                 except (BadInput, RuntimeError):
                     lost = f"{path} cannot be repaired; it is now {set_aside(path).name}, and a new one begins"
                 if lost:
-                    warnings.warn(lost, stacklevel=2)
+                    report(lost)
             self._file = _open_file(path, resume_at is not None and path.exists())
             self._entries = len(gsd_index.read_index(path)[1])
         except OSError as error:
@@ -100,7 +107,7 @@ class TrajectoryWriter:
         try:
             if self._file is None:
                 self._file = _open_file(self.path, True)
-            self._file.append(frame)
+            append_frame(self._file, frame)
         except OSError as error:
             raise self._abandon(error) from error
         self._last = time
@@ -218,7 +225,7 @@ class Frames(FrameSequence):
 
     def _frame(self, number: int) -> Frame:
         with self._reading(number):
-            return Frame(self._file[number])
+            return Frame(read_stored(self._file, number))
 
     @property
     def written_by_sand(self) -> bool:
@@ -247,12 +254,22 @@ class Frames(FrameSequence):
                 raise ValueError(f"a contact of grain {pair.max()}, of {grains} grains")
             return pair
 
+    def identities(self, index: int) -> np.ndarray:
+        """Identities (N,) of the grains of a frame ≥ 0, ascending; reads nothing else.  Raises BadInput."""
+        with self._reading(index):
+            count = gsd_index.read_number(self._file.file, index, "particles/N")
+            return read_identities(self._file, index, count)
+
     def head(self, index: int) -> tuple[float, int, int]:
         """Time [s], step and number of contacts of a frame ≥ 0.  Raises BadInput if it is incomplete."""
         with self._reading(index):
             time = gsd_index.time_of(self._file, index)
             contacts = gsd_index.read_number(self._file.file, index, "bonds/N")
             return time, gsd_index.step_of(self._file, index), contacts
+
+    def __repr__(self) -> str:
+        ends = [format_quantity(self.head(k)[0], "s") for k in (0, len(self) - 1)] if len(self) else []
+        return f"<{len(self)} frame{'' if len(self) == 1 else 's'} of {self.path}, t = {' to '.join(ends) or 'none'}>"
 
     @property
     def times(self) -> np.ndarray:

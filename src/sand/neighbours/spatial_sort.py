@@ -13,7 +13,7 @@ from ..arguments import checked
 from ..contact.gather import resort_contacts_by_grain
 from ..grains import Grains
 from ..state.arrays import NOT_SAVED, RATE_ARRAYS, SAVED_LONG_RANGE, UNIFORM_ARRAYS
-from ..state.state import CONTACTS, GRAIN1, GRAIN2, PAIRS, State
+from ..state.state import CONTACTS, GRAIN1, GRAIN2, PAIRS, WALL_CONTACTS, State
 
 BITS = 21
 """Bits per coordinate; three coordinates fill 63 bits."""
@@ -66,7 +66,8 @@ def reorder_grains(state: State, rows: np.ndarray) -> None:
     for array in [*state.grains.arrays, pair_list.anchor, *(getattr(long_range, name) for name in PER_GRAIN_ARRAYS)]:
         if array.shape[-1]:
             array[...] = array[..., rows]
-    for array in [contacts.pair[:, : count[CONTACTS]], pair_list.pair[:, : count[PAIRS]], long_range.order]:
+    at_walls = state.wall_contacts.pair[0, : count[WALL_CONTACTS]]
+    for array in [contacts.pair[:, : count[CONTACTS]], pair_list.pair[:, : count[PAIRS]], long_range.order, at_walls]:
         array[...] = new_index[array]
     for index in (GRAIN1, GRAIN2):
         if count[index] >= 0:

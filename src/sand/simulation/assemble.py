@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -32,6 +34,7 @@ from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
 from ..material import SILICA
 from ..neighbours.settings import ChosenSearch, Neighbours
+from ..ramps import ramps_of
 from ..setup.from_frame import StrainedContacts
 from ..state.arrays import (
     ALWAYS_RECORDED,
@@ -51,8 +54,11 @@ from ..state.arrays import (
 from ..state.state import COMPARED, CUT_RADIUS, RECORDED, State
 from .checks import check_system
 from .cluster_cutoff import follow_clusters
+from .driven import Driven, check_driven, driven_arrays
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
+from .ramped import RampedForces
+from .walls import Wall, check_walls, place_walls, wall_numbers
 
 NEIGHBOURS_PER_GRAIN = 4
 """Initial capacity of the Verlet list per grain; it grows on overflow."""
@@ -86,6 +92,8 @@ def build_engine(
     stepping: Integrator,
     neighbours: Neighbours,
     seed: int = 0,
+    driven: Sequence[Driven] = (),
+    walls: Sequence[Wall] = (),
     *,
     fresh: bool = True,
     contacts: StrainedContacts | None = None,
@@ -97,6 +105,10 @@ def build_engine(
     ----------
     seed : int, optional
         Seed of the random kicks of gas and bath.
+    driven : Sequence[Driven], optional
+        Grains with prescribed motion.
+    walls : Sequence[Wall], optional
+        Walls, each with its own name.
     fresh : bool, optional
         Whether this is a new start, whose overlaps are checked; a resumed run may be in the middle of an impact.
     contacts : StrainedContacts or None, optional
@@ -110,10 +122,18 @@ def build_engine(
         If something does not fit; all problems at once.
     """
     warnings = check_system(grains, forces, box, fresh=fresh)
+    check_driven(driven, grains, forces, stepping, neighbours)
     by_type = _forces_by_type(forces, grains)
+    check_walls(walls, grains, by_type.contact, box, stepping, fresh=fresh)
     pair_gap = float(grains.radius.min())
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
+    if fresh:  # grains of another simulation may have other identities
+        wrapped.arrays.id[...] = np.arange(len(grains))
+    held = driven_arrays(driven, grains)
+    if held is not None:
+        wrapped.arrays.velocity[:, held.grain], wrapped.arrays.spin[:, held.grain] = held.velocity, held.spin
+        neighbours = dataclasses.replace(neighbours, order="as given")
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     follower = follow_clusters(by_type.long_range, grains, box, start.pair, contacts, cutoff)
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
@@ -131,9 +151,9 @@ def build_engine(
     stepping = stepping.resolved(grains, control)
     parameters = StepParameters(
         box.span,
-        _contact_parameters(by_type.contact, grains, verlet, seed),
+        _contact_parameters(by_type.contact, grains, verlet, seed, uniform=held is None),
         found.search,
-        _respa_settings(by_type, verlet, long_range),
+        _respa_settings(by_type, verlet, long_range, every_step=held is not None),
         _external_work(by_type.external, box),
         _gas_settings(by_type.gas, grains, seed),
         control,
@@ -148,10 +168,13 @@ def build_engine(
         bool(by_type.gas),
         bool(grains.body_moment.any()),
         len(grains) >= WIDE_FROM,
+        held,
+        wall_numbers(walls, grains, by_type.contact),
     )
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
     state = _new_state(wrapped, box, parameters, components, capacity, over_all_pairs=over_all_pairs)
+    place_walls(state, walls, components.law, state.contacts.lost.shape[0], damped=parameters.settings.damped)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
@@ -162,10 +185,28 @@ def build_engine(
     engine = Engine(
         state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower
     )
+    if any(map(ramps_of, forces)):
+        changing = functools.partial(
+            _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
+        )
+        engine.ramped = RampedForces(forces, changing)
+        engine.set_ramped_parameters()
     given = add_contacts(engine, by_type.contact, contacts)
     if by_type.contact is not None:
         refuse_overlaps(wrapped, by_type.contact, start, given)
     return engine
+
+
+def _changing_parameters(
+    forces: Sequence[Force], grains: Grains, *, verlet: Verlet, seed: int, pair_gap: float, uniform: bool
+) -> dict[str, Any]:
+    """The fields of `StepParameters` that depend on parameters of forces."""
+    by_type = _forces_by_type(forces, grains)
+    return {
+        "settings": _contact_parameters(by_type.contact, grains, verlet, seed, uniform=uniform),
+        "gas": _gas_settings(by_type.gas, grains, seed),
+        "criteria": _step_control(grains, verlet, by_type, pair_gap),
+    }
 
 
 def _long_range_loops(
@@ -186,13 +227,17 @@ def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
 
 
 def _respa_settings(
-    forces: ForcesByType, verlet: Verlet, loops: Sequence[tuple[LongRangeForce, LongRangeSums, Any]]
+    forces: ForcesByType,
+    verlet: Verlet,
+    loops: Sequence[tuple[LongRangeForce, LongRangeSums, Any]],
+    *,
+    every_step: bool,
 ) -> RespaSettings:
-    """Multiple time stepping; cycles of one step without long-range forces.
+    """Multiple time stepping; cycles of one step without long-range forces, or with `every_step`: driven grains.
 
     Without contacts, or with cycles of one step, there is neither extrapolation nor a constant force.
     """
-    most = verlet.max_cycle_steps if forces.long_range else 1
+    most = verlet.max_cycle_steps if forces.long_range and not every_step else 1
     scheme = verlet.far if forces.contact and most > 1 else "every step"
     taylor = scheme.startswith("taylor")
     if taylor:
@@ -298,7 +343,9 @@ def sound_crossing(grains: Grains, number: int) -> float:
     return radius * math.sqrt(material.density / material.young_modulus)
 
 
-def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verlet, seed: int) -> ContactParameters:
+def _contact_parameters(
+    contact: Contact | None, grains: Grains, stepping: Verlet, seed: int, *, uniform: bool
+) -> ContactParameters:
     law = contact or Contact()
     # without a Contact no grains touch, and materials may lack the constants of contacts
     pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
@@ -312,5 +359,6 @@ def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verle
         seed=seed,
         per_period=stepping.steps_per_period,
         settling_time=math.inf if law.settling_time is None else law.settling_time,
-        uniform_contacts=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
+        uniform_contacts=uniform
+        and all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
     )

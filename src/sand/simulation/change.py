@@ -1,27 +1,65 @@
-"""Changes by the user between two runs: velocities, spins, moments and charges of grains, and parameters of forces."""
+"""Changes by the user: grains, their velocities, spins, moments and charges, the box, and forces."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, ErrorCollector, did_you_mean
-from ..forces.base import Force
+from ..box import Box, as_box
+from ..contact.model import Contact
+from ..errors import BadInput, ErrorCollector, did_you_mean, shown
+from ..forces.base import Force, LongRangeForce
+from ..forces.gas.model import Gas
 from ..grains import Grains
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
 from ..schema import BY_NAME, stored
-from ..state.state import CHECKED, FLIGHT, NEEDED, STEP_INCREASES, STEPS, State
+from ..state.arrays import SAVED_LONG_RANGE
+from ..state.state import (
+    BROKEN,
+    CHECKED,
+    COMPARED,
+    CONTACTS,
+    CUT_CAPTURE,
+    CUT_RADIUS,
+    CUT_TEMPERATURE,
+    FLIGHT,
+    FORMING,
+    KICKED,
+    MADE,
+    NEEDED,
+    STEP_INCREASES,
+    STEPS,
+    TIME,
+    State,
+    grains_from_arrays,
+)
+from ..units import si
+from .assemble import build_engine
+from .changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
+from .checks import outside_box
+from .driven import Driven, kept_driven, refuse_changed_motion
+from .engine import Engine
+from .initial_contacts import overlapping_pairs, refuse_overlaps
 from .settings import read_forces
+from .walls import Wall
 
 QUANTITIES = ("velocity", "spin", "moment", "charge")
 """Quantities of the grains that can be changed."""
+ASSIGNED = (*QUANTITIES, "forces", "box")
+"""Attributes of a change that can be assigned."""
+MOST_ID = 2**32 - 1
+"""Largest identity of a grain."""
 
 
 class Change:
-    """What can be changed between two runs; see `Simulation.change`.
+    """What can be changed between two runs, or by an updater; see `Simulation.change`.
+
+    `remove` and `add` act at once: the arrays then have the rows of the grains that stay, in their order, followed by
+    those of the grains added.
 
     Attributes
     ----------
@@ -30,19 +68,144 @@ class Change:
     charge : ndarray
         (N,) [C].
     forces : tuple[Force, ...]
-        The forces; `replace` exchanges one.
+        The forces; `replace` exchanges one, and one that is left out acts no longer.
+    box : Box
+        The box; an assigned one (a `sand.Box`, or lengths) leaves all positions as they are.
+    grains : Grains
+        The grains, to be read: `position`, `radius`, …
+    id : ndarray
+        (N,) uint32: identity of each grain, its index at the start or the next number that no grain has had.
     """
 
-    def __init__(self, grains: Grains, forces: Sequence[Force]):
-        self.velocity, self.spin = grains.velocity.copy(), grains.spin.copy()
-        self.moment, self.charge = grains.moment.copy(), grains.charge.copy()
-        self.forces = tuple(forces)
+    velocity: np.ndarray
+    spin: np.ndarray
+    moment: np.ndarray
+    charge: np.ndarray
+    forces: tuple[Force, ...]
+    box: Box
+    grains: Grains
+    _before: tuple[Grains, Box]
+    _kept: np.ndarray  # indices before of the grains that stay
+    _pair: np.ndarray  # contacts (C, 2) before
+    _next_id: int
+    _errors: ErrorCollector  # of `remove` and `add`
+    _is_scaled: bool
+
+    def __init__(self, grains: Grains, forces: Sequence[Force], box: Box, pair: np.ndarray, next_id: int):
+        own: dict[str, Any] = {
+            "grains": grains.copy(),
+            "_before": (grains, box),
+            "_kept": np.arange(len(grains)),
+            "_pair": pair,
+        }
+        own |= {"_next_id": next_id, "_errors": ErrorCollector(), "_is_scaled": False}
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
+        for name in QUANTITIES:
+            setattr(self, name, getattr(grains, name).copy())
+        self.forces, self.box = tuple(forces), box
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Assign a quantity.  Raises BadInput for other names."""
-        if name not in (*QUANTITIES, "forces"):
-            raise BadInput(f"a change has no '{name}'; {did_you_mean(name, (*QUANTITIES, 'forces'))}")
-        object.__setattr__(self, name, value)
+        """Assign a quantity, the forces or the box.  Raises BadInput for another name or an invalid box."""
+        if name not in ASSIGNED:
+            raise BadInput(f"a change has no '{name}' to assign; {did_you_mean(name, ASSIGNED)}")
+        object.__setattr__(self, name, as_box(value) if name == "box" else value)
+
+    @property
+    def id(self) -> np.ndarray:
+        """Identity (N,) of each grain."""
+        return self.grains.id
+
+    @property
+    def regroups(self) -> bool:
+        """Whether grains are added or removed, or the box is another one."""
+        same = np.array_equal(self.grains.id, self._before[0].id)
+        return not same or self._is_scaled or self.box != self._before[1]
+
+    def remove(self, which: Any) -> None:
+        """Remove grains, with their contacts.
+
+        Parameters
+        ----------
+        which : array_like of int or bool
+            Indices of grains, or (N,) True for those to be removed, such as `np.isin(state.id, [3, 5])`.
+
+        Raises
+        ------
+        BadInput
+            At the end of the change, if there is no such grain, or no grain would remain.
+        """
+        count, given = len(self.grains), np.atleast_1d(np.asarray(which))
+        if given.size == 0:
+            return
+        if given.dtype == bool and given.shape != (count,):
+            self._errors.problems.append(f"remove: array of shape {given.shape}, but there are {count} grains")
+            return
+        if given.dtype != bool and (given.ndim != 1 or given.dtype.kind not in "iu"):
+            self._errors.problems.append(f"remove: {shown(which)} must be whole numbers, or True and False")
+            return
+        if given.dtype != bool and len(wrong := given[(given < 0) | (given >= count)]):
+            self._errors.problems.append(f"remove: there is no grain {wrong[0]}; there are {count}, 0 to {count - 1}")
+            return
+        stays = np.ones(count, bool)
+        stays[given] = False
+        if not stays.any():
+            self._errors.problems.append(f"remove: all {count} grains would be removed; at least one must stay")
+            return
+        rows = np.flatnonzero(stays)
+        self._set_grains(subset(self.grains, rows), lambda values: values[rows] if len(values) == count else values)
+        object.__setattr__(self, "_kept", self._kept[stays[: len(self._kept)]])
+
+    def add(self, grains: Grains) -> None:
+        """Add grains, such as those of `sand.setup`; they may touch others, and have contacts then, without strain.
+
+        Parameters
+        ----------
+        grains : Grains
+            The grains, also of materials that no grain had before.
+
+        Raises
+        ------
+        BadInput
+            At the end of the change, if a grain lies outside the box, or overlaps another one by more than at a start.
+        """
+        if not isinstance(grains, Grains):
+            self._errors.problems.append(f"add: {shown(grains)} must be sand.Grains")
+            return
+        if self._next_id + len(grains) > MOST_ID:
+            self._errors.problems.append(f"add: a simulation can have at most {MOST_ID} grains in all")
+            return
+        identity = np.arange(self._next_id, self._next_id + len(grains), dtype=np.uint32)
+        object.__setattr__(self, "_next_id", self._next_id + len(grains))
+        values = {name: np.asarray(getattr(grains, name)) for name in QUANTITIES}
+        object.__setattr__(self, "grains", joined(self.grains, grains, identity))
+        for name, more in values.items():
+            present = np.asarray(getattr(self, name))
+            fits = present.ndim == more.ndim and present.shape[1:] == more.shape[1:]
+            setattr(self, name, np.concatenate([present, more]) if fits else present)
+
+    def scale_box(self, factor: Any) -> None:
+        """Scale the periodic axes of the box by a factor > 0, and with them the centres of mass of all clusters.
+
+        Clusters keep their shape: a position x becomes x + (f − 1) R, with R the centre of mass of the cluster.
+        Positions of grains that touch without being in contact are not looked at until the end of the change.
+
+        Raises
+        ------
+        BadInput
+            If the factor is not above 0, or the box is open.
+        """
+        value = si(factor, "1", "factor of scale_box", above=0.0)
+        if self.box.is_open:
+            raise BadInput("scale_box: the box is open")
+        lengths = tuple(None if length is None else value * length for length in self.box.lengths)
+        factors = np.array([1.0 if length is None else value for length in lengths])
+        moved, box = self.grains.copy(), Box(lengths)  # type: ignore[arg-type]
+        position = scaled_positions(self.grains, self._pairs(), self.box, factors)
+        moved.arrays.position[...] = box.wrap(position).T
+        object.__setattr__(self, "grains", moved)
+        object.__setattr__(self, "_is_scaled", True)
+        self.box = box
 
     def replace(self, force: Force) -> None:
         """Exchange the force of the same kind, such as `sand.Field("0 T")` for the present field.
@@ -58,49 +221,183 @@ class Change:
             raise BadInput(f"forces: the simulation has no '{given.name}'; {did_you_mean(given.name, names)}")
         self.forces = tuple(given if own.name == given.name else own for own in self.forces)
 
+    def _set_grains(self, grains: Grains, rows: Any) -> None:
+        """Use other grains, and the quantities that `rows` makes of the present ones."""
+        object.__setattr__(self, "grains", grains)
+        for name in QUANTITIES:
+            setattr(self, name, rows(np.atleast_1d(np.asarray(getattr(self, name)))))
+
+    def _pairs(self) -> np.ndarray:
+        """Contacts (C, 2) of the grains that stay, in the numbers of the change."""
+        number = np.full(len(self._before[0]), -1, np.int64)
+        number[self._kept] = np.arange(len(self._kept))
+        pair = number[self._pair]
+        return pair[(pair >= 0).all(axis=1)]
+
     def checked_forces(self, present: Sequence[Force]) -> tuple[Force, ...]:
         """The forces of the change.
 
         Raises
         ------
         BadInput
-            If their kinds are not those of the simulation, which the columns of its ledger name, or if the contact
-            model differs: existing contacts were formed with the present one.
+            If the contact model differs: existing contacts were formed with the present one.
         """
         forces = read_forces(self.forces)
-        if {force.name for force in forces} != {force.name for force in present}:
-            names = ", ".join(force.name for force in present)
-            raise BadInput(f"forces: a change keeps the kinds of forces, {names}, and alters parameters only")
-        before = {force.name: force for force in present}
-        for force in forces:
-            if force.name == "contact" and force.parameters() != before["contact"].parameters():
-                raise BadInput("forces: the contact model cannot change; start a new simulation from a frame")
+        contact = [[force.parameters() for force in each if isinstance(force, Contact)] for each in (present, forces)]
+        if contact[0] != contact[1]:
+            raise BadInput("forces: the contact model cannot change; start a new simulation from a frame")
         return forces
 
-    def arrays(self, state: State) -> dict[str, np.ndarray]:
-        """The arrays of a checkpoint of this state, with the changed quantities.
+    def checked_grains(self) -> Grains:
+        """The grains with the quantities of the change.
 
         Raises
         ------
         BadInput
-            If a quantity has another shape, or is out of range.
+            If grains could not be removed or added, a quantity has another shape or is out of range, or the box does
+            not fit.
         """
-        grains, errors = state.grains, ErrorCollector()
-        out = {name: array.copy() for name, array in state.to_arrays().items()}
+        self._errors.done()
+        grains, errors = self.grains.copy(), ErrorCollector()
         for name in QUANTITIES:
             column = BY_NAME["body_moment" if name == "moment" else name]
             values = errors.take(stored, column, getattr(self, name), len(grains), called=name)
             if values is None:
                 continue
             changed = np.atleast_2d(values != getattr(grains.arrays, name)).any(axis=0)
-            out[f"grains/{name}"][..., changed] = values[..., changed]
+            getattr(grains.arrays, name)[..., changed] = values[..., changed]
             if name == "moment":
                 for i in np.flatnonzero(changed):
                     turned = turned_back(tuple(grains.arrays.orientation[:, i]), tuple(values[:, i]))
-                    out["grains/body_moment"][:, i] = turned
+                    grains.arrays.body_moment[:, i] = turned
+        if self.regroups:
+            errors.problems += outside_box(grains, self.box)
+            before, box = self._before
+            errors.take(refuse_cut_contacts, subset(before, self._kept), box, grains, self.box, self._pairs())
         errors.done()
-        count, clock = out["count"], out["clock"]
-        # the next step is chosen anew, as after a start
-        count[CHECKED] = count[STEP_INCREASES] = count[NEEDED] = count[STEPS] - INCREASE_INTERVAL
-        clock[FLIGHT] = 0.0
-        return out
+        return grains
+
+    def refuse_overlaps(self, grains: Grains, forces: Sequence[Force]) -> None:
+        """Refuse added grains, and a box, in which grains without a contact overlap by more than at a start."""
+        contact = next((force for force in forces if isinstance(force, Contact)), None)
+        if contact is None or not self.regroups:
+            return
+        added = len(grains) - len(self._kept)
+        numbers = f"{len(self._kept)} to {len(grains) - 1} are those added" if added else "none is added"
+        found, given = overlapping_pairs(grains, self.box), np.sort(self._pairs(), axis=1)
+        refuse_overlaps(grains, contact, found, given, f"after the change, in whose numbers {numbers}")
+
+
+def as_chosen(force: Force, grains: Grains, box: Box) -> Force:
+    """The force with its automatic cut-off as a number, if it was chosen once for these grains at the start.
+
+    A run that is resumed has this number, too, so that a change has the same result in it.
+    """
+    if not isinstance(force, LongRangeForce) or getattr(force, "cutoff", None) != "auto":
+        return force
+    radius = force.resolved(grains, box).get("cutoff")
+    if radius == "auto":
+        return force
+    chosen = copy.copy(force)
+    object.__setattr__(chosen, "cutoff", None if radius == "none" else radius)
+    return chosen
+
+
+def changed_engine(
+    change: Change,
+    present: Sequence[Force],
+    engine: Engine,
+    columns: Sequence[str],
+    seed: int,
+    driven: Sequence[Driven] = (),
+    walls: Sequence[Wall] = (),
+) -> tuple[Engine, tuple[Force, ...], tuple[Driven, ...]]:
+    """The engine after a change, its forces and driven grains; the engine before stays as it is.
+
+    Parameters
+    ----------
+    present : Sequence[Force]
+        The forces before.
+    engine : Engine
+        The engine before.
+    columns : Sequence[str]
+        Columns of the ledger, which are those of the start.
+    driven : Sequence[Driven], optional
+        The driven grains before.
+    walls : Sequence[Wall], optional
+        The walls.
+
+    Raises
+    ------
+    BadInput
+        If something does not fit; all problems at once, as far as each can be found without the others.
+    """
+    errors, state = ErrorCollector(), engine.state
+    driven = kept_driven(driven, change._kept)
+    forces = errors.take(change.checked_forces, present)
+    grains = errors.take(change.checked_grains)
+    if forces is not None and grains is not None:
+        errors.take(change.refuse_overlaps, grains, forces)
+    if grains is not None:
+        errors.take(refuse_changed_motion, driven, grains)
+    errors.done()
+    regroups = change.regroups
+    cutoff = None if change.box != state.box or state.cutoff[CUT_RADIUS] == 0.0 else state.cutoff.copy()
+    arrays = {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
+    same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material])
+    parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed)
+    new = build_engine(*parts, fresh=False, cutoff=cutoff, driven=driven, walls=walls)
+    without = [name for name in new.columns() if name not in columns]
+    if without:
+        raise BadInput(
+            f"forces: the ledger of this run has no column for {', '.join(without)}; give the force at the start, such "
+            "as with a strength of 0, and change it then"
+        )
+    grains.arrays.material[...] = same.arrays.material  # materials are numbered anew
+    rebuilt = regroups or any(len(set(shapes)) > 1 for shapes in _long_range_shapes(state, new.state))
+    if walls and (rebuilt or change.box != state.box):
+        raise BadInput(
+            "walls: with walls a change cannot add or remove grains, set or scale the box, or leave out a force; start "
+            "a new simulation from a frame"
+        )
+    if rebuilt:
+        arrays = regrouped_arrays(state, change._kept, grains, new.state)
+    else:
+        arrays = {name: array.copy() for name, array in state.to_arrays().items()}
+        arrays |= {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
+    count, clock = arrays["count"], arrays["clock"]
+    if cutoff is None and new.cutoff is not None:
+        arrays["cutoff"] = new.cutoff.values.copy()
+        if state.cutoff[CUT_TEMPERATURE] > 0.0:
+            arrays["cutoff"][CUT_TEMPERATURE] = state.cutoff[CUT_TEMPERATURE]
+    count[COMPARED] = engine.regular_state.count[COMPARED]
+    if new.cutoff is not None and (regroups or cutoff is None):
+        # chosen anew before the next step
+        arrays["cutoff"][CUT_CAPTURE], count[COMPARED] = 0.0, count[MADE] + count[BROKEN] + 1
+    # the next step is chosen anew, as after a start
+    count[CHECKED] = count[STEP_INCREASES] = count[NEEDED] = count[STEPS] - INCREASE_INTERVAL
+    clock[FLIGHT] = 0.0
+    if any(isinstance(force, Gas) for force in forces) > any(isinstance(force, Gas) for force in present):
+        clock[KICKED] = clock[TIME]
+    new.load_state(arrays)
+    new.refresh_loads()
+    if regroups:
+        _as_initial(new.regular_state, int(arrays["count"][MADE]), float(arrays["lost"][FORMING]))
+    return new, forces, driven
+
+
+def _long_range_shapes(*states: State) -> list[tuple[tuple[int, ...], ...]]:
+    """Shapes of each saved long-range array in these states; they differ if a force begins or ceases to act."""
+    return [tuple(getattr(state.long_range, name).shape for state in states) for name in SAVED_LONG_RANGE]
+
+
+def _as_initial(state: State, made: int, lost: float) -> None:
+    """Contacts that the change formed are initial ones: they are not counted as formed, and nothing is lost by them."""
+    formed = int(state.count[MADE]) - made
+    if formed == 0:
+        return
+    used = int(state.count[CONTACTS])
+    state.contacts.lost[:, used - formed : used] = 0.0
+    state.lost[FORMING], state.count[MADE] = lost, made
+    if state.count[COMPARED] >= 0:
+        state.count[COMPARED] = made + state.count[BROKEN]

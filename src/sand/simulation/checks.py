@@ -42,7 +42,7 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
     BadInput
         With all problems.
     """
-    problems = [*_outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
+    problems = [*outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
     warnings: list[str] = []
     for force in forces:
         try:
@@ -77,7 +77,8 @@ def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[s
     return warnings
 
 
-def _outside_box(grains: Grains, box: Box) -> list[str]:
+def outside_box(grains: Grains, box: Box) -> list[str]:
+    """Message about grains outside a periodic box; none if there are none."""
     lengths = np.array([np.inf if v is None else v for v in box.lengths])
     wrong = np.flatnonzero((np.abs(grains.position) > (0.5 + POSITION_TOLERANCE) * lengths).any(axis=1))
     if not len(wrong):

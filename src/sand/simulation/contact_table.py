@@ -31,6 +31,26 @@ class Columns(dict[str, np.ndarray]):
         """Raise BadInput, which is also a KeyError."""
         raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self))}")
 
+    def __repr__(self) -> str:
+        rows = len(next(iter(self.values()), ()))
+        return f"<{rows} row{'' if rows == 1 else 's'} of {', '.join(self)}>"
+
+    def _flat(self) -> dict[str, np.ndarray]:
+        """One-dimensional columns: vectors split into components, pairs into grain1 and grain2."""
+        flat: dict[str, np.ndarray] = {}
+        for name, column in self.items():
+            if name == "pair":
+                flat |= {"grain1": column[:, 0], "grain2": column[:, 1]}
+            elif column.ndim == 2:
+                flat |= {f"{name}_{axis}": column[:, k] for k, axis in enumerate("xyz")}
+            else:
+                flat[name] = column
+        return flat
+
+    def to_pandas(self) -> Any:
+        """Convert to a pandas DataFrame; needs pandas."""
+        return import_optional("pandas", "to_pandas").DataFrame(self._flat())
+
 
 class ContactTable(Columns):
     """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
@@ -55,22 +75,6 @@ class ContactTable(Columns):
 
     def __repr__(self) -> str:
         return f"<{len(self['pair'])} contacts: {', '.join(self)}>"
-
-    def _flat(self) -> dict[str, np.ndarray]:
-        """One-dimensional columns: vectors split into components, pairs into grain1 and grain2."""
-        flat: dict[str, np.ndarray] = {}
-        for name, column in self.items():
-            if name == "pair":
-                flat |= {"grain1": column[:, 0], "grain2": column[:, 1]}
-            elif column.ndim == 2:
-                flat |= {f"{name}_{axis}": column[:, k] for k, axis in enumerate("xyz")}
-            else:
-                flat[name] = column
-        return flat
-
-    def to_pandas(self) -> Any:
-        """Convert to a pandas DataFrame; needs pandas."""
-        return import_optional("pandas", "to_pandas").DataFrame(self._flat())
 
     def to_xarray(self) -> Any:
         """Convert to an xarray Dataset with dimension `contact` and units as attributes; needs xarray."""

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from ..compiler.program import Program
+from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
-from ..contact.measure import ENERGIES, energies_stage
-from ..errors import warn
+from ..contact.measure import ENERGIES, energies_stage, wall_energies_stage
+from ..contact.model import Contact
+from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.loops import external_energies_for
-from ..forces.pair.loops import long_range_energies_for
+from ..forces.pair.loops import LongRangeSums, long_range_energies_for
 from ..integrate.base import Integrator
+from ..integrate.driven import HEAVY
 from ..integrate.driver import advance
-from ..integrate.force_stages import SUM, WHOLE, pair_force_stages
+from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.program import Components, build_program
 from ..integrate.respa import clear_long_range_loads
@@ -44,11 +48,13 @@ from ..state.state import (
     CYCLE,
     GRAIN1,
     GRAIN2,
+    GROUPS,
     LEFT,
     LISTED,
     LONG_RANGE_SUMS,
     MADE,
     ORDERED,
+    OUTSIDE,
     PAIRS,
     REBUILT,
     REJECTED,
@@ -58,9 +64,14 @@ from ..state.state import (
     STEP_INCREASES,
     STEPS,
     TIME,
+    WALL_CONTACTS,
     State,
 )
 from .cluster_cutoff import ClusterCutoff
+from .ramped import RampedForces
+
+CONTACT = Contact.name
+"""Name of the contact model among the forces."""
 
 
 @dataclass
@@ -87,6 +98,8 @@ class Engine:
         Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
     cutoff : ClusterCutoff or None
         The cut-off that follows the clusters, if there is one.
+    ramped : RampedForces or None
+        The forces, if any of them has ramps.
     """
 
     _state: State
@@ -99,6 +112,8 @@ class Engine:
     neighbours: Neighbours
     _components: Components
     cutoff: ClusterCutoff | None = None
+    ramped: RampedForces | None = None
+    _intervals: Sequence[tuple[int, int]] = ()  # of the ramps, for which the parameters are set
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
@@ -161,8 +176,9 @@ class Engine:
                 return stop
             before, is_sorted = self._state.copy(), self._is_sorted
             compared, self._state.count[COMPARED] = self._state.count[COMPARED], -1
-            regular = self.advance(math.inf, 1)
-            # the cut-off that follows the clusters is compared with them by the next `advance`, if the step is kept
+            regular = self._advance(math.inf, 1)
+            # the cut-off that follows the clusters, and ramps, are brought up to date by the next `advance`, if the
+            # step is kept
             self._state.count[COMPARED] = compared
             if regular is not Stop.NONE:
                 return regular
@@ -201,6 +217,11 @@ class Engine:
         return self._state.time if self._output_time is None else self._output_time
 
     @property
+    def regular_time(self) -> float:
+        """Time of the regular state [s]."""
+        return self._state.time
+
+    @property
     def steps(self) -> int:
         """Number of steps taken so far."""
         return self._state.steps
@@ -218,7 +239,28 @@ class Engine:
         self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
-        """Take steps not beyond `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed."""
+        """Take steps not beyond `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed.
+
+        Parameters with ramps are brought up to date after the first step or cycle that ends in a new interval.
+        """
+        if self.ramped is None:
+            return self._advance(until, most_steps)
+        last = self.steps + most_steps
+        while True:
+            self._follow_ramps()
+            change = self.ramped.next_change(self._state.time)
+            stop = self._advance(min(until, change), last - self.steps)
+            if stop is Stop.TIME_REACHED and self._state.time < change < until:  # the step or cycle that passes it
+                stop = self._advance(until, min(1, last - self.steps))
+            if stop is Stop.TIME_REACHED and change <= self._state.time < until:
+                stop = Stop.NONE
+            if stop is not Stop.NONE or self.steps >= last:
+                if stop in (Stop.NONE, Stop.TIME_REACHED):
+                    self._follow_ramps()
+                return stop
+
+    def _advance(self, until: float, most_steps: float) -> Stop:
+        """As `advance`, with the present parameters of the forces."""
         self._output_state = self._output_time = None
         last = self.steps + most_steps
         if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
@@ -238,6 +280,8 @@ class Engine:
             stop = self._call_driver(until, last, shorten)
             if stop is Stop.CONTACTS_FULL:
                 state.grow_contacts()
+            elif stop is Stop.WALL_CONTACTS_FULL:
+                state.grow_wall_contacts()
             elif stop is Stop.PAIRS_FULL:
                 found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
                 state.grow_pairs(int(OVER_ALLOCATION * found))
@@ -256,7 +300,7 @@ class Engine:
         radius = self.cutoff.update(state)
         if radius is not None:
             self._change_cutoff(self.cutoff.index, radius)
-            warn(self.cutoff.message(state, before))
+            self.warnings.append(self.cutoff.message(state, before))
 
     def _change_cutoff(self, k: int, radius: float) -> None:
         """Use another cut-off [m] for the dipoles, long-range force k: their loops, the reach of lists, loads, energy.
@@ -282,6 +326,55 @@ class Engine:
             arrays.torque[...] += torque_change
         state.lost[CUTOFF_CHANGED] += energy - self._pair_energy(k)
 
+    def set_ramped_parameters(self) -> None:
+        """Give ramped parameters their values at the time of the regular state; loads and contacts stay as they are."""
+        assert self.ramped is not None
+        time, self._program = self._state.time, None
+        self._intervals = self.ramped.intervals(time)
+        forces = self.ramped.at(time)
+        now: dict[str, Any] = {force.name: force for force in forces if force.name in self.ramped.names}
+        self.parameters = self.parameters._replace(**self.ramped.parameters(forces, self._state.grains))
+        for name in ("settings", "gas", "criteria"):
+            self._table.set(name, getattr(self.parameters, name))
+        self.external = [now.get(force.name, force) for force in self.external]
+        self.long_range = [
+            (force, sums, numbers._replace(own=now[force.name].constants()) if force.name in now else numbers)
+            for force, sums, numbers in self.long_range
+        ]
+        self._components = self._components._replace(
+            pair_forces=[own[1:] for own in self.long_range],
+            external_forces=[(force.formula, force.numbers()) for force in self.external],
+        )
+
+    def _follow_ramps(self) -> None:
+        """Change ramped parameters if the regular state is in new intervals of the ramps, and compute loads anew.
+
+        The change of the energy at fixed positions is work of the user. Contacts keep their displacements; a
+        contact beyond its new limits slips or breaks when the loads are computed.
+        """
+        assert self.ramped is not None
+        state = self._state
+        if self._intervals == self.ramped.intervals(state.time):
+            return
+        before = self._ramped_energy()
+        self.set_ramped_parameters()
+        if CONTACT in self.ramped.names:
+            with self._held():
+                renewal_stage(self.law).run(self._current_table(state))
+        state.lost[OUTSIDE] += before - self._ramped_energy()
+        state.count[CHECKED] = state.steps - INCREASE_INTERVAL  # the next step is chosen for the new parameters
+        if self.neighbours.uses_spatial_sort(len(state.grains)):
+            self._sort_in_space()
+        if CONTACT in self.ramped.names:
+            state.pair_list.anchor[0, 0] = math.inf  # the list has constants of possible contacts: build it anew
+        self._refresh_loads()
+
+    def _ramped_energy(self) -> float:
+        """Energy [J] of the forces with ramps."""
+        assert self.ramped is not None
+        energies = [share.sum() for share in self.energies_at_grains(self.ramped.names).values()]
+        return math.fsum([*energies, *(self.contact_energies() if CONTACT in self.ramped.names else ())])
+
     def _pair_loads(self, k: int) -> np.ndarray:
         """Forces and torques (2, 3, N) of long-range force k; the loads of the state stay as they are."""
         (_, sums, numbers), own = self.long_range[k], self._state.long_range
@@ -297,22 +390,48 @@ class Engine:
         """Energy [J] of long-range force k."""
         _, sums, numbers = self.long_range[k]
         shares = np.zeros(len(self._state.grains))
-        long_range_energies_for(sums).run(self._current_table(self._state), (numbers, shares))
+        self._add_energies(self._current_table(self._state), sums, numbers, shares)
         return math.fsum(shares)
+
+    def _add_energies(self, table: Table, sums: LongRangeSums, numbers: Any, shares: np.ndarray) -> None:
+        """Add the energies [J] of a long-range force to those of the grains."""
+        if sums.energies_need_rounds:
+            run_rounds(sums, self._components.wide, table, numbers)
+        long_range_energies_for(sums).run(table, (numbers, shares))
 
     def _current_table(self, state: State) -> Table:
         """The table with the present arrays of the state."""
         self._table.set("grains", state.grains.arrays)
-        for name in ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "clock", "count", "lost"):
+        for name in (*GROUPS, "clock", "count", "lost"):
             self._table.set(name, getattr(state, name))
         return self._table
 
-    def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
-        """One call of the driver."""
+    def _call_table(self, until: float, last: float, shorten: bool) -> tuple[Table, Any]:
+        """The table for one call of the driver, and its task queue."""
         state, table = self._state, self._current_table(self._state)
         queue = new_task_queue(len(state.grains), state.contacts.flag.size)
         for name, value in (("queue", queue), ("until", float(until)), ("last", int(last)), ("shorten", shorten)):
             table.set(name, value)
+        return table, queue
+
+    def uncompiled(self) -> list[str]:
+        """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
+        (table, _), shares = self._call_table(math.inf, 1, False), np.zeros(len(self._state.grains))
+        program = build_program(self._components, self.parameters, table)
+        table.set("program", program)
+        stages: list[tuple[Any, Any]] = [(advance, ()), *program.stages.values()]
+        stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+        stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in self.long_range]
+        stages += [
+            (external_energies_for(outer.formula), (outer.numbers(), self.time, shares)) for outer in self.external
+        ]
+        missing = [each.purpose for each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)]
+        return list(dict.fromkeys(missing))
+
+    def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
+        """One call of the driver."""
+        state = self._state
+        table, queue = self._call_table(until, last, shorten)
         try:
             if self._program is None:
                 self._program = build_program(self._components, self.parameters, table)
@@ -340,7 +459,21 @@ class Engine:
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
         arrays, settings = (state.grains.arrays, state.contacts, state.count), self.parameters.settings
-        return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
+        with self._held():
+            return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
+
+    @contextlib.contextmanager
+    def _held(self) -> Iterator[None]:
+        """While constants of contacts are computed, driven grains have a mass that counts as infinite."""
+        driven, arrays = self._components.driven, self._state.grains.arrays
+        index: Any = [] if driven is None else driven.grain
+        for quantity in (arrays.mass, arrays.inertia):
+            quantity[index] *= HEAVY
+        try:
+            yield
+        finally:
+            for quantity in (arrays.mass, arrays.inertia):
+                quantity[index] /= HEAVY
 
     def begin(self) -> None:
         """Form contacts between grains that touch at the start, with no energy booked, and compute the first loads."""
@@ -352,11 +485,17 @@ class Engine:
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)
         state.lost[:] = 0.0
-        state.contacts.lost[:] = 0.0
+        state.contacts.lost[:] = state.wall_contacts.lost[:] = 0.0
+        state.walls.impulse[:] = 0.0
 
     def refresh_loads(self) -> None:
         """Sum the loads anew by the second half of a step of 0 s, after the user has changed grains or forces."""
-        state = self.regular_state
+        self.restore_user_order()
+        self._refresh_loads()
+
+    def _refresh_loads(self) -> None:
+        """As `refresh_loads`, in the present order of the arrays."""
+        state = self._state
         steps, sums = state.steps, int(state.count[LONG_RANGE_SUMS])
         state.count[STAGE] = 1
         state.clock[STEP] = state.clock[CYCLE] = state.clock[LEFT] = 0.0
@@ -374,6 +513,8 @@ class Engine:
             self._is_sorted = True
         elif state.contacts.gather_order.size:
             resort_contacts_by_grain(state.grains.arrays, state.contacts, state.count)
+        if self.ramped is not None:
+            self.set_ramped_parameters()
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
         self._rebuild_list()
@@ -392,17 +533,23 @@ class Engine:
         moved = state.box.nearest((state.grains.arrays.position - state.long_range.anchor).T)
         return bool((moved**2).sum(axis=1).max() <= (0.5 * self.parameters.search.margin) ** 2)
 
-    def energies_at_grains(self) -> dict[str, np.ndarray]:
-        """Energy [J] of each grain (N,) by force: half of each pair energy, and the energies of per-grain forces."""
+    def energies_at_grains(self, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
+        """Energy [J] of each grain (N,) by force: half of each pair energy, and the energies of per-grain forces.
+
+        Of all forces, or of those with these names.
+        """
         table, state = self._current_table(self.state), self.state
-        shares = {name: np.zeros(len(state.grains)) for name in self._columns()}
+        shares = {name: np.zeros(len(state.grains)) for name in self.columns()}
         for force, sums, numbers in self.long_range:
-            long_range_energies_for(sums).run(table, (numbers, shares[force.column]))
+            if names is None or force.name in names:
+                self._add_energies(table, sums, numbers, shares[force.column])
         for outer in self.external:
+            if names is not None and outer.name not in names:
+                continue
             external_energies_for(outer.formula).run(table, (outer.numbers(), state.time, shares[outer.name]))
         return shares
 
-    def _columns(self) -> list[str]:
+    def columns(self) -> list[str]:
         """Columns of the forces in the ledger."""
         return [*(force.column for force, _, _ in self.long_range), *(force.name for force in self.external)]
 
@@ -411,6 +558,8 @@ class Engine:
         found, state = np.zeros(len(ENERGIES)), self.state
         if state.count[CONTACTS]:
             energies_stage(self.law).run(self._current_table(state), (found,))
+        if state.count[WALL_CONTACTS]:
+            wall_energies_stage(self.law).run(self._current_table(state), (found,))
         return found.tolist()
 
     def force_energies(self) -> dict[str, float]:

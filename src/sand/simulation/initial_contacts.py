@@ -8,7 +8,7 @@ import numpy as np
 
 from ..box import Box
 from ..contact.model import Contact
-from ..errors import BadInput
+from ..errors import BadInput, first_problems
 from ..grains import Grains
 from ..setup.checks import most_overlap
 from ..setup.from_frame import StrainedContacts
@@ -69,7 +69,9 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedCont
     return given
 
 
-def refuse_overlaps(grains: Grains, contact: Contact, found: OverlappingPairs, given: np.ndarray) -> None:
+def refuse_overlaps(
+    grains: Grains, contact: Contact, found: OverlappingPairs, given: np.ndarray, when: str = "at the start"
+) -> None:
     """Refuse pairs that overlap by too much at the start.
 
     Parameters
@@ -78,6 +80,8 @@ def refuse_overlaps(grains: Grains, contact: Contact, found: OverlappingPairs, g
         The pairs that overlap.
     given : ndarray
         Pairs of contacts from an earlier run, sorted, (C, 2); they may be in the middle of an impact.
+    when : str, optional
+        When they overlap, for the message.
 
     Raises
     ------
@@ -95,11 +99,9 @@ def refuse_overlaps(grains: Grains, contact: Contact, found: OverlappingPairs, g
     is_new = ~np.isin(i * count + j, given[:, 0] * count + given[:, 1])
     wrong = np.flatnonzero((found.overlap > limit) & is_new)
     problems = [
-        f"grains {i[k]} and {j[k]} overlap by {found.overlap[k]:.3g} m at the start; "
+        f"grains {i[k]} and {j[k]} overlap by {found.overlap[k]:.3g} m {when}; "
         f"at most {limit[k]:.3g} m is allowed: move them apart"
         for k in wrong[:NAMED]
     ]
-    if len(wrong) > NAMED:
-        problems.append(f"… and {len(wrong) - NAMED} more overlapping pairs")
     if problems:
-        raise BadInput(problems)
+        raise BadInput(first_problems(problems, len(wrong), "overlapping pairs"))

@@ -16,6 +16,7 @@ from ..contact.measure import ENERGIES
 from ..errors import BadInput
 from ..grains import Grains
 from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
+from .walls import wall_row
 
 KINETIC = "translation", "rotation"
 """Columns of kinetic energies."""
@@ -29,13 +30,17 @@ INTERNAL = "internal"
 CORRECTION = "angular_momentum_corrected"
 """Column of the corrections that keep the angular momentum constant over r-RESPA cycles, their magnitudes summed."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
+LOST_WALLS = "lost_walls"
+"""Column of the energy that moving walls took from grains and contacts; only with walls."""
 COUNTED = {"step", "time", *NUMBERS}
 """Columns that need no energies, see `count_row`."""
-WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
+WHOLE = {"step", *NUMBERS, "wall_contacts"} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
-def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]) -> dict[str, float]:
+def log_row(
+    state: State, of_contacts: Sequence[float], forces: dict[str, float], walls: Sequence[str] = ()
+) -> dict[str, float]:
     """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
 
     Parameters
@@ -44,6 +49,8 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
         Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
     forces : dict[str, float]
         Energy [J] of each long-range and per-grain force by column.
+    walls : Sequence[str], optional
+        Columns of the walls, see `walls.wall_columns`.
     """
     contacts = int(state.count[CONTACTS])
     pairs = state.contacts.pair[:, :contacts].T
@@ -52,13 +59,15 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
     row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
-    row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist()])
+    moved = {LOST_WALLS: -math.fsum(state.walls.work)} if walls else {}
+    row |= moved
+    row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist(), *moved.values()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
         CORRECTION: float(state.clock[CORRECTED]),
         INTERNAL: math.fsum(internal_kinetic_energy(state.grains, pairs, state.box)[0]),
     }
-    return row | {name: counts[name] for name in NUMBERS}
+    return row | {name: counts[name] for name in NUMBERS} | wall_row(state, walls)
 
 
 def count_row(state: State) -> dict[str, float]:
@@ -100,14 +109,20 @@ class Ledger(LedgerColumns):
     ----------
     forces : Sequence[str], optional
         Names of the energy columns of long-range and per-grain forces.
+    walls : Sequence[str], optional
+        Columns of the walls, see `walls.wall_columns`.
     """
 
-    def __init__(self, forces: Sequence[str] = ()):
+    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = ()):
         others = [name for name in forces if name != MAGNETIC]
+        self.walls = tuple(walls)
         own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
-        of_state = (*LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS)
+        if taken := [name for name in walls if name in {*own, *forces, LOST_WALLS, MAGNETIC}]:
+            raise BadInput(f"walls: '{taken[0]}' is a column of the ledger; give this wall another name")
+        lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
+        of_state = (*lost, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, *walls)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
@@ -132,8 +147,11 @@ class Ledger(LedgerColumns):
         return np.array([[row[name] for name in self.columns] for row in self.rows], dtype=np.float64)
 
     def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
-        """Restore the rows from the array of `to_array`; raises BadInput if it has other columns."""
-        if set(columns) != set(self.columns):
+        """Restore the rows from the array of `to_array`; raises BadInput if it lacks a column of this ledger.
+
+        Further columns are those of forces that a change left out.
+        """
+        if not set(columns) >= set(self.columns):
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
@@ -150,7 +168,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS}
+        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, *self.walls}
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN

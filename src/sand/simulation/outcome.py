@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from ..descriptions import described
 from ..integrate.parts import Stop
 
 
@@ -19,7 +20,7 @@ class Outcome(Enum):
     NO_STEP = "no step can be taken: the forces require one too short for the resolution of the time"
     TOO_FAST = "a grain would move by more than half the smallest radius in one step: the step is too long"
     SPINS_TOO_FAST = "a grain would rotate by more than half a radian in one step: the step is too long"
-    OVERCOMPRESSED = "two grains overlap by more than the smaller radius: the impact is too fast, or the step too long"
+    OVERCOMPRESSED = "two grains, or a grain and a wall, overlap by more than a radius: too fast, or the step too long"
 
     @property
     def is_physics(self) -> bool:
@@ -30,7 +31,7 @@ class Outcome(Enum):
 OUTCOME_OF_STOP = {stop: Outcome[stop.name] for stop in Stop if stop.name in Outcome.__members__}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
     """Result of `Simulation.run`.
 
@@ -56,6 +57,8 @@ class Result:
     drift: float
     grains: tuple[int, ...] = ()
     condition: str = ""
+
+    __repr__ = described
 
     def __str__(self) -> str:
         named = f" (grains {', '.join(map(str, self.grains))})" if self.grains else ""

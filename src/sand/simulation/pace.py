@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-
-from ..errors import warn
+from collections.abc import Callable
 
 SAMPLE_SECONDS = 1.0
 """Wall time [s] of steps, compilation excluded, after which the estimate is made."""
 MOST_STEPS, MOST_SECONDS = 1e12, 365.25 * 86400.0
 """Remaining steps, and wall time [s], above which the estimate becomes a warning."""
+
+
+LONG = "this run needs about"
+"""Beginning of the warning."""
 
 
 class RunTimeEstimate:
@@ -19,10 +22,12 @@ class RunTimeEstimate:
     ----------
     end, last : float
         Time [s] and step at which the run ends; infinite where not set.
+    warn : callable
+        Called with the text of the warning and its beginning, by which it is recognised.
     """
 
-    def __init__(self, end: float, last: float):
-        self._end, self._last = end, last
+    def __init__(self, end: float, last: float, warn: Callable[[str, str], None]):
+        self._end, self._last, self._warn = end, last, warn
         self._first: tuple[float, int] | None = None  # time and step after the first call
         self._seconds = 0.0
         self._done = False
@@ -44,7 +49,8 @@ class RunTimeEstimate:
         wall = left * self._seconds / taken
         if left > MOST_STEPS or wall > MOST_SECONDS:
             years = f"about {wall / MOST_SECONDS:.2g} years" if wall > MOST_SECONDS else f"{wall / 86400.0:.2g} days"
-            warn(
-                f"this run needs about {left:.1g} more steps, {years} at the present speed; stop it with Ctrl-C "
-                "and choose an earlier end or fewer steps"
+            self._warn(
+                f"{LONG} {left:.1g} more steps, {years} at the present speed; stop it with Ctrl-C "
+                "and choose an earlier end or fewer steps",
+                LONG,
             )

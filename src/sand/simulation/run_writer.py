@@ -29,6 +29,7 @@ from .ledger import Ledger
 from .outcome import Outcome, Result
 from .serialise import case_of
 from .stop import StopCriteria
+from .updater import described
 
 Simulation = Any
 """`sand.Simulation`, which imports this module."""
@@ -54,9 +55,13 @@ class RunWriter:
         Whether files of an earlier run in it may be replaced.
     resumed : bool, optional
         Whether the folder is that of this run, which continues.
+    written : dict or None, optional
+        The case in its case.toml, where it may differ from the present one.
     """
 
-    def __init__(self, out: str | Path, overwrite: bool = False, resumed: bool = False):
+    def __init__(
+        self, out: str | Path, overwrite: bool = False, resumed: bool = False, written: dict[str, Any] | None = None
+    ):
         self.folder = Path(out) if resumed else make_folder(out, overwrite=overwrite)
         self._resumed = resumed
         self.draws = True  # a figure at the end of each `run`
@@ -66,7 +71,8 @@ class RunWriter:
         self._ends: tuple[float, float, str | None] = (math.inf, math.inf, None)
         self._case: dict[str, Any] = {}
         self._lock: FolderLock | None = None
-        self._changed = False  # by the user since the last checkpoint
+        self._changed = False  # by the user or an updater since case.toml was written
+        self._written = written  # the case in case.toml
         newest = max(self.folder.glob("checkpoint-*.npz"), default=None) if resumed else None
         # the checkpoint from which this simulation continues, or the last one that it wrote
         self._own: tuple[str, int] | None = None if newest is None else _stamp(newest)
@@ -85,28 +91,39 @@ class RunWriter:
         self._refuse_others_files(simulation.steps)
         changed, self._changed = self._changed, False
         ends = (criteria.time, criteria.step, criteria.stop)
-        if changed or ends != self._ends:
-            self._ends = ends
-            self._case = case_of(simulation, *ends)
+        is_new = changed or ends != self._ends
+        if is_new:
+            self._ends, self._case = ends, case_of(simulation, *ends)
+        if self._trajectory is None:
+            self._open_files(simulation)
+        elif changed:
+            self.save(simulation)
+        # after the checkpoint, which names the case in the file before
+        if is_new:
             text = "the complete case in SI units, with all defaults"
             write_toml(self.folder / files.CASE, self._case, text)
-        if self._trajectory is not None:
-            if changed:
-                self.save(simulation)
-            return
+            self._written = plain(self._case)
+
+    def _open_files(self, simulation: Simulation) -> None:
+        """Open ledger and trajectory, or create them, and write a checkpoint."""
         if self._resumed:
             self._clean_up_earlier(simulation)
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         times = simulation._frame_times
         resumed_at = (times[-1] if times else -math.inf) if self._resumed else None
-        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, resumed_at, times)
+        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, resumed_at, times, simulation._warn)
         if not self._resumed:
             self._frame(simulation)
         self.save(simulation)
 
-    def changed(self) -> None:
-        """Note that the user changed the simulation: the next `open` writes case.toml and a checkpoint."""
+    def changed(self, simulation: Simulation) -> None:
+        """Note that the user or an updater changed the simulation: the next `open` writes case.toml and a checkpoint.
+
+        Checkpoints have the changed case at once, so that at any time one of them and case.toml fit together.
+        """
         self._changed = True
+        if self._case:
+            self._case = case_of(simulation, *self._ends)
 
     def release(self) -> None:
         """Release the lock of the folder; `open` takes it again."""
@@ -129,7 +146,8 @@ class RunWriter:
     def _clean_up_earlier(self, simulation: Simulation) -> None:
         """Of a resumed run: keep a copy of a damaged ledger, and delete a summary of steps that are taken again."""
         try:
-            keep_if_damaged(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
+            ledger = simulation.ledger
+            keep_if_damaged(self.folder / files.LEDGER, ledger.columns, ledger.rows, simulation._warn)
             with contextlib.suppress(BadInput):
                 steps = read_json(self.folder / files.SUMMARY).get("steps")
                 if isinstance(steps, int) and steps > simulation.steps:
@@ -182,7 +200,11 @@ class RunWriter:
             "wall_seconds": simulation.wall_seconds,
             "temperature": simulation.temperature,
             "choices": simulation.choices,
+            "warnings": simulation.warnings,
             "case": plain(self._case),
+            **({} if self._written is None else {"case_written": self._written}),
+            "next_id": simulation._next_id,
+            "updaters": described(simulation.updaters),
             "ledger": simulation.ledger.columns,
             "clock": CLOCK,
             "count": COUNT,
@@ -249,6 +271,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "drift_per_kT": ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
         "temperature_at_start": simulation.temperature,
         "notes": simulation.notes(),
+        "warnings": simulation.warnings,
         "seed": simulation.seed,
         "choices": simulation.choices,
         "wall_seconds": simulation.wall_seconds,

@@ -21,10 +21,12 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
     stop : str, optional
         Condition that ends the run.
     """
-    materials = simulation.grains.materials
+    of_grains = simulation.grains.materials  # first, in the order of their indices
+    walls = simulation._walls
+    materials = list({m.name: m for m in (*of_grains, *(wall.material for wall in walls))}.values())
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     if recipe["kind"] != "gas":  # a gas names the materials from which it is drawn
-        names = [m.name for m in materials]
+        names = [m.name for m in of_grains]
         recipe = {**recipe, "material": names[0] if len(names) == 1 else names}
     run = {
         "until": max(until, SHORTEST_DURATION),  # a run to time 0 can also be resumed
@@ -50,6 +52,8 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
             m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
         },
         "forces": forces,
+        **({"walls": [wall.parameters() for wall in walls]} if walls else {}),
         "stepping": simulation.stepping.parameters(),
         "neighbours": simulation.neighbours.parameters(),  # as resolved at the start
+        **({"driven": [each.parameters() for each in simulation.driven]} if simulation.driven else {}),
     }

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
+from ..arguments import objects_with
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
 from .cadence import read_cadence
 from .observers import Observer
+from .updater import read_updaters
 
-ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "contacts", "out")
+ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
 """Arguments of a simulation that are fixed once it is built."""
 RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound", "wall_seconds")
 """Attributes of a simulation that follow from the run."""
@@ -29,19 +31,7 @@ def read_setting(name: str, *, wall: bool = False) -> Callable[[Any], float | st
 
 def read_observers(value: Any) -> list[Observer]:
     """Check a list of observers.  Raises BadInput."""
-    try:
-        observers = list(value)
-    except TypeError:
-        raise BadInput(f"observers = {shown(value)}; give a list of sand.Observer objects") from None
-    problems = []
-    for observer in observers:
-        if isinstance(observer, type):
-            problems.append(f"observers: {shown(observer)} is a class; write {shown(observer)}()")
-        elif not all(callable(getattr(observer, name, None)) for name in ("see", "tick", "close")):
-            problems.append(f"observers: {shown(observer)} is not a sand.Observer: it lacks see, tick or close")
-    if problems:
-        raise BadInput(problems)
-    return observers
+    return objects_with(value, "observers", "sand.Observer", ("see", "tick", "close"))
 
 
 def read_forces(value: Any) -> tuple[Force, ...]:
@@ -68,7 +58,8 @@ def read_forces(value: Any) -> tuple[Force, ...]:
 class ReadOnlySettings:
     """Base of `Simulation`: refuses assignments that would have no effect, and misspelt names.
 
-    `observers` and the cadences of output can be assigned at any time; subclasses of `Simulation` may add attributes.
+    `observers`, `updaters` and the cadences of output can be assigned at any time; subclasses of `Simulation` may add
+    attributes.
     """
 
     _built = False
@@ -78,6 +69,7 @@ class ReadOnlySettings:
         "row_every": read_setting("row_every"),
         "checkpoint_every": read_setting("checkpoint_every", wall=True),
         "observers": read_observers,
+        "updaters": read_updaters,
     }
     INTERNAL = ("recipe", "origin", "planned")
     """Attributes that SAND itself assigns later."""

@@ -20,33 +20,32 @@ from ..forces.base import Force
 from ..forces.pair.dipoles import kinetic_temperature
 from ..grains import Grains
 from ..integrate.base import Integrator
-from ..integrate.parts import Stop
 from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import COMPARED, OUTSIDE, State, grains_from_arrays
+from ..state.state import CONTACTS, OUTSIDE, State
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
-from .cadence import SHORTEST_DURATION, Cadence, Schedule, read_cadence
-from .change import Change
-from .condition import EVERY, GIVEN, Condition, OwnCondition
+from .cadence import SHORTEST_DURATION
+from .change import Change, as_chosen, changed_engine
+from .condition import GIVEN, OwnCondition
 from .contact_table import ContactTable
+from .cost import RunTimer
 from .displays import DISPLAYS
-from .ledger import COUNTED, Ledger, count_row, kinetic_energies, log_row
-from .observers import Observer, call_ticks
-from .outcome import OUTCOME_OF_STOP, Outcome, Result
-from .pace import RunTimeEstimate
+from .driven import read_driven
+from .ledger import Ledger, kinetic_energies, log_row
+from .observers import Observer
+from .outcome import Outcome, Result
+from .run_loop import run_loop
 from .run_writer import RunWriter
 from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
 from .stop import StopCriteria, stop_criteria
+from .updater import Updater, check_updaters
 from .vibration import vibration_notes
+from .walls import Wall, WallState, read_walls, wall_columns, wall_states
 
-RETURN_EVERY = 0.1
-"""Approximate wall time [s] between two returns of the compiled driver to Python, for signals and output."""
-ENERGY_CHECK_EVERY = 10_000
-"""Steps between two checks of the energy error."""
 ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting")
 """Columns of a contact's elastic energy."""
 
@@ -55,7 +54,7 @@ ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting
 class Simulation(ReadOnlySettings):
     """A simulation: grains, forces, boundary conditions and an integrator.
 
-    Only `observers`, `frame_every`, `row_every` and `checkpoint_every` can be assigned later.
+    Only `observers`, `updaters`, `frame_every`, `row_every` and `checkpoint_every` can be assigned later.
 
     Parameters
     ----------
@@ -77,6 +76,8 @@ class Simulation(ReadOnlySettings):
         Whether files of an earlier run in `out` may be replaced.
     observers : Iterable[Observer], optional
         Objects that are called during the run (see `sand.Observer`); they must not change the simulation.
+    updaters : Iterable[Updater], optional
+        Objects that change the simulation or end its run at regular moments (see `sand.Updater`).
     frame_every : float or str, optional
         When frames are written: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default
         1/200 of the first `run`.
@@ -85,8 +86,12 @@ class Simulation(ReadOnlySettings):
     checkpoint_every : float or str or None, optional
         When checkpoints are written, in the same forms or by wall time, "30 s wall"; by default at least every minute
         of wall time. The end of each `run` and an interruption write one in any case.
+    walls : Sequence[Wall] or Wall, optional
+        Walls to which grains stick.
     contacts : StrainedContacts or None, optional
         Initial contacts with their displacements, from `sand.setup.from_frame`.
+    driven : Driven or Sequence[Driven], optional
+        Grains with prescribed velocity and spin, such as `sand.Driven([0])`, which holds one.
     restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
         Arrays and metadata of a checkpoint in `out` from which to continue; used by `sand.resume`.
 
@@ -108,16 +113,21 @@ class Simulation(ReadOnlySettings):
         out: str | Path | None = None,
         overwrite: bool = False,
         observers: Iterable[Observer] = (),
+        updaters: Iterable[Updater] | None = None,
         frame_every: Any = None,
         row_every: Any = None,
         checkpoint_every: Any = None,
+        walls: Sequence[Wall] | Wall = (),
         contacts: StrainedContacts | None = None,
+        driven: Any = (),
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        self.forces = read_forces(forces)
+        self.forces, self._walls = read_forces(forces), read_walls(walls)
+        self.driven = read_driven(driven)
         self.box, self.neighbours = as_box(box), neighbours or Neighbours()
         self.seed = None if seed is None else seed_given(seed, bits=63)
         self.observers, self.frame_every = observers, frame_every
+        self.updaters = () if updaters is None else updaters
         self.row_every, self.checkpoint_every = row_every, checkpoint_every
         self._choices_at_start: dict[str, str] = {}  # of a resumed run, from its checkpoint
         self.recipe: dict[str, Any] | None = None  # the [grains] table of the case file that described the grains
@@ -127,25 +137,35 @@ class Simulation(ReadOnlySettings):
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
         saved = None if restart is None else restart[0].get("cutoff")
-        self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts, cutoff=saved)
+        moved = (self.driven, self._walls)
+        self._engine = build_engine(*parts, *moved, fresh=restart is None, contacts=contacts, cutoff=saved)
         self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
         self.temperature = kinetic_temperature(grains)
         self.ledger = Ledger(
-            [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
+            [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)],
+            wall_columns(self._walls),
         )
-        self.writer = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
+        written = None if restart is None else restart[1].get("case_in_file")
+        self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
         self._wall_seconds: float = 0.0  # of earlier calls of `run`
         self._began_at: float | None = None  # start of the present call of `run` (monotonic clock)
         self._has_begun = restart is not None
         self._frame_times: list[float] = []  # [s], of all frames so far
         self._met: tuple[Any, int] | None = None  # the condition that was met, and the step
         self._notes_shown: set[str] = set()  # kinds of notes that were shown as warnings
+        self._warned: list[str] = []
         self._failure = ""  # why the simulation cannot continue
+        self._updating = False  # whether an updater acts now
+        self._stops = False  # whether the updater that acts ends the run
+        self._stopped_by = ""  # the updater that ended the last run
+        self._next_id = len(grains)  # identity of the next grain that is added
         if restart is not None:
             arrays, meta = restart
             self._engine.load_state(arrays, meta.get("output_time"))
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
-            self._choices_at_start = meta.get("choices", {})
+            self._choices_at_start, self._warned = meta.get("choices", {}), list(meta.get("warnings", []))
+            self._next_id = int(meta.get("next_id", len(grains)))
+            check_updaters(updaters, self.updaters, meta.get("updaters", []))
             if "ledger" in arrays:  # a state without a ledger starts a new one
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
                 self._notes_shown = set(self._notes(self.ledger.rows))
@@ -153,8 +173,9 @@ class Simulation(ReadOnlySettings):
                 self._frame_times = arrays["frame_times"].tolist() if "frame_times" in arrays else every_row
             if meta.get("condition_met"):
                 self._met = (meta["condition_met"], self.steps)
-        for text in self._engine.warnings:
-            warn(text)
+        else:
+            self._warn_of_engine()
+        self._engine.warnings.clear()
         self._built = True
 
     @property
@@ -205,6 +226,12 @@ class Simulation(ReadOnlySettings):
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
         return ContactTable(self.state, self._engine.law, self._engine.parameters.settings.follow)
+
+    @property
+    def walls(self) -> tuple[WallState, ...]:
+        """The walls at `time`: position, velocity, force, impulse, work, number of contacts."""
+        self._begin()
+        return wall_states(self._walls, self.state)
 
     @property
     def choices(self) -> dict[str, str]:
@@ -303,6 +330,8 @@ class Simulation(ReadOnlySettings):
         """
         if self._failure:
             raise BadInput(f"this simulation cannot continue: {self._failure}")
+        if self._began_at is not None:
+            raise BadInput("this simulation runs already; an updater or observer cannot call run")
         criteria = stop_criteria(until, steps, stop, self.time, self.steps, self.planned)
         end, _, condition = criteria
         if condition is not None and not isinstance(condition, OwnCondition):
@@ -316,7 +345,9 @@ class Simulation(ReadOnlySettings):
             self._began_at = wall.monotonic()
             with Signals() as signals:
                 try:
-                    outcome = self._loop(criteria, signals)
+                    timer = RunTimer(self)
+                    outcome = run_loop(self, criteria, signals)
+                    timer.record()
                 finally:
                     self._wall_seconds, self._began_at = self.wall_seconds, None
                     self._engine.restore_user_order()
@@ -330,48 +361,62 @@ class Simulation(ReadOnlySettings):
             if self.writer:
                 self.writer.release()
 
-    @contextlib.contextmanager
-    def change(self) -> Iterator[Change]:
-        """Change velocities, spins, moments or charges of grains, or parameters of forces, at the present time.
-
-        The change is made at the end of the `with` block, or not at all if an exception is raised in it. The change of
-        the energy is the work of the user: it is added to `lost_outside`, with the opposite sign. The run continues
-        from the state at `time`, also where no regular step ends.
-
-        Yields
-        ------
-        Change
-            Arrays `velocity`, `spin`, `moment`, `charge`, and `replace(force)`.
+    def stop(self) -> None:
+        """End the present run; for the `act` of an updater, which may return True instead.
 
         Raises
         ------
         BadInput
-            If a quantity is out of range, a kind of force is added or left out, or the contact model differs.
+            Outside of `act`.
+        """
+        if not self._updating:
+            raise BadInput("stop ends a run from the act of an updater only; to end a run: run(until=…, stop=…)")
+        self._stops = True
+
+    @contextlib.contextmanager
+    def change(self) -> Iterator[Change]:
+        """Change grains, their velocities, spins, moments or charges, the box, or forces, at the present time.
+
+        The change is made at the end of the `with` block, or not at all if an exception is raised in it. The change of
+        the energy is the work of the user: it is added to `lost_outside`, with the opposite sign. The run continues
+        from the state at `time`, also where no regular step ends. During a run, only an `Updater` may change it.
+
+        Grains that stay keep the state of their contacts; contacts of removed grains vanish, and are not counted as
+        broken. Automatic cut-offs stay as they were chosen, except those of an Ewald sum and of dipoles whose cut-off
+        follows the clusters; a force given to `replace` has its cut-off chosen for the changed grains and box.
+
+        Yields
+        ------
+        Change
+            Arrays `velocity`, `spin`, `moment`, `charge`, the `box`, and `remove`, `add`, `scale_box`, `replace`.
+
+        Raises
+        ------
+        BadInput
+            If grains do not exist, overlap or lie outside the box, no grain would remain, a quantity is out of range,
+            a force has no column in the ledger, or the contact model differs; all problems at once.
         """
         if self._failure:
             raise BadInput(f"this simulation cannot be changed: {self._failure}")
+        if self._began_at is not None and not self._updating:
+            raise BadInput("a simulation that runs can be changed by an updater only: Simulation(updaters=[…])")
         self._begin()
-        change = Change(self.grains, self.forces)
+        present = tuple(as_chosen(force, self.start, self.box) for force in self.forces)
+        pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
+        change = Change(self.grains, present, self.box, pair, self._next_id)
         yield change
-        forces = change.checked_forces(self.forces)
-        arrays = change.arrays(self.state)
-        arrays["count"][COMPARED] = self.regular_state.count[COMPARED]
-        grains = grains_from_arrays(arrays, [self.grains.materials[k] for k in self.grains.material])
-        parts = (grains, forces, self.box, self.stepping, self.neighbours, int(self.seed or 0))
-        engine = build_engine(*parts, fresh=False, cutoff=arrays["cutoff"])
-        acting = [[force.name for force, _, _ in one.long_range] for one in (self._engine, engine)]
-        if acting[0] != acting[1]:
-            names = ", ".join(sorted(set(acting[0]) ^ set(acting[1])))
-            raise BadInput(f"forces: {names} would act on no grain, or on the first one; a change cannot do that")
-        engine.load_state(arrays)
-        engine.refresh_loads()
+        seed, fixed = int(self.seed or 0), (self.driven, self._walls)
+        engine, forces, driven = changed_engine(change, present, self._engine, self.ledger.columns, seed, *fixed)
         before = self._log_row()["total"]
-        self._engine = engine
-        object.__setattr__(self, "forces", forces)
-        object.__setattr__(self, "start", self.grains.copy())
+        self._engine, self._next_id = engine, change._next_id
+        start = self.grains.copy()
+        for name, value in {"forces": forces, "box": change.box, "driven": driven, "start": start}.items():
+            object.__setattr__(self, name, value)
+        if change.regroups:  # the description of the grains in a case file no longer holds
+            self.recipe = None
         engine.regular_state.lost[OUTSIDE] += before - self._log_row()["total"]
         if self.writer:
-            self.writer.changed()
+            self.writer.changed(self)
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:
@@ -440,6 +485,21 @@ class Simulation(ReadOnlySettings):
         limited = "" if follower is None else follower.note(self.state)
         return [*self._notes(self.ledger.rows).values(), *([limited] if limited else [])]
 
+    @property
+    def warnings(self) -> list[str]:
+        """Texts of the warnings about this run so far, also before it was resumed; each is shown once."""
+        return list(self._warned)
+
+    def _warn(self, text: str, about: str = "") -> None:
+        """Warn once of each text, and of one text that begins with `about`."""
+        if text not in self._warned and not (about and any(one.startswith(about) for one in self._warned)):
+            self._warned.append(text)
+            warn(text)
+
+    def _warn_of_engine(self) -> None:
+        while self._engine.warnings:
+            self._warn(self._engine.warnings.pop(0))
+
     def _notes(self, rows: Sequence[dict[str, float]]) -> dict[str, str]:
         damped = any(isinstance(force, Contact) and force.damping != "none" for force in self.forces)
         return vibration_notes(rows, self.temperature, len(self.start), damped=damped)
@@ -451,7 +511,9 @@ class Simulation(ReadOnlySettings):
             self._record_output()
 
     def _log_row(self) -> dict[str, float]:
-        return log_row(self.state, self._engine.contact_energies(), self._engine.force_energies())
+        energies = self._engine.contact_energies(), self._engine.force_energies()
+        row = log_row(self.state, *energies, wall_columns(self._walls))
+        return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
 
     def _record_output(self, with_frame: bool = True) -> None:
         """Add a row to the ledger, write it, with a frame or without, and call the observers."""
@@ -462,95 +524,12 @@ class Simulation(ReadOnlySettings):
             self._frame_times.append(row["time"])
         for kind, text in self._notes([self.ledger.rows[0], row]).items():
             if kind not in self._notes_shown:
-                warn(text)
+                self._warn(text)
                 self._notes_shown.add(kind)
         if self.writer:
             self.writer.write(self, row, with_frame)
         for observer in self.observers:
             observer.see(self, row)
-
-    def _loop(self, criteria: StopCriteria, signals: Signals) -> Outcome:
-        end, last, condition = criteria
-        if condition is not None and self._met == (_key(condition), self.steps):
-            return Outcome.CONDITION_MET
-        frames, rows, saves = self._schedules()
-        checks = Schedule(None if condition is None else Cadence("steps", EVERY), self.time, self.steps)
-        if condition is not None and self.steps == 0.0 == self.time and self._is_met(condition):
-            return Outcome.CONDITION_MET
-        steps_per_call, checked_at, estimate = 64, self.steps, RunTimeEstimate(end, last)
-        while True:
-            logged = [row["time"] for row in self.ledger.rows[-1:]]
-            began = wall.monotonic()
-            step = min(last, *(each.step_due for each in (frames, rows, saves, checks)))
-            most_steps = max(min(steps_per_call, step - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
-            shown = rows.next(frames.next(end))
-            goal = saves.next(shown)
-            stop = self._engine.advance(goal, most_steps)
-            while stop is Stop.NONE and self.time < max(logged, default=0.0):  # an event ended the step before it
-                stop = self._engine.advance(goal, 1)
-            unsound = self.steps - checked_at >= ENERGY_CHECK_EVERY and not self.is_sound
-            if self.steps - checked_at >= ENERGY_CHECK_EVERY:
-                checked_at = self.steps
-            reached = self.time
-            if stop is Stop.TIME_REACHED and self.steps < step:  # before the first step that would pass this time
-                stop = self._engine.go_to(goal, step) if goal == shown else Stop.NONE
-                reached = self.time if stop is Stop.NONE and goal == shown else goal
-            seconds = wall.monotonic() - began
-            if most_steps == steps_per_call:
-                growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)
-                steps_per_call = max(64, min(int(steps_per_call * growth), 10**7))
-            if stop in OUTCOME_OF_STOP:
-                return OUTCOME_OF_STOP[stop]
-            if unsound:
-                return Outcome.RUNAWAY
-            estimate.update(self.time, self.steps, seconds)
-            done = self.time >= end or self.steps >= last
-            met = False
-            if condition is not None and checks.is_due(self.time, self.steps):
-                checks.advance(self.time, self.steps)
-                met = self._is_met(condition)
-            with_frame = done or met or frames.is_due(self.time, self.steps)
-            output = with_frame or rows.is_due(self.time, self.steps)
-            if output:
-                self._record_output(with_frame)
-                rows.advance(self.time, self.steps)
-            if with_frame:
-                frames.advance(self.time, self.steps)
-            if done or met:
-                ended = Outcome.CONDITION_MET if met else Outcome.FINISHED
-                return ended if self.is_sound else Outcome.RUNAWAY
-            due = saves.is_due(reached, self.steps)
-            if due:
-                saves.advance(reached, self.steps)
-            if self.writer:
-                self.writer.tick(self, output, due)
-            call_ticks(self.observers, self)
-            if signals.received:
-                return Outcome.INTERRUPTED
-
-    def _schedules(self) -> list[Schedule]:
-        """Schedules of frames, rows of the ledger and checkpoints, which continue those of earlier runs."""
-        last = {"frame_every": self._frame_times, "row_every": [row["time"] for row in self.ledger.rows[-1:]]}
-        return [
-            Schedule(
-                None if setting is None else read_cadence(setting, name, wall=True),
-                self.time,
-                self.steps,
-                max(last.get(name, [])[-1:], default=-math.inf),
-            )
-            for name in ("frame_every", "row_every", "checkpoint_every")
-            for setting in [getattr(self, name)]
-        ]
-
-    def _is_met(self, condition: Condition | OwnCondition) -> bool:
-        """Whether the present regular state meets a condition."""
-        if isinstance(condition, OwnCondition):
-            holds = condition.holds(self)
-        else:
-            holds = condition.holds(count_row(self.state) if COUNTED.issuperset(condition.names) else self._log_row())
-        if holds:
-            self._met = (_key(condition), self.steps)
-        return holds
 
     def _close(self, outcome: Outcome, criteria: StopCriteria) -> Result:
         grains = self._engine.limiting_grains() if outcome.is_physics else ()
@@ -559,7 +538,7 @@ class Simulation(ReadOnlySettings):
         if outcome.is_physics:
             self._record_output()
         ledger = self.ledger.with_row(self._log_row())
-        met = (criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
+        met = (self._stopped_by or criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
         result = Result(outcome, self.steps, self.time, ledger.drift, grains, met)
         if self.writer:
             self.writer.close(self, result, ledger)
@@ -568,8 +547,3 @@ class Simulation(ReadOnlySettings):
         if outcome is Outcome.INTERRUPTED:
             raise Interrupted(result)
         return result
-
-
-def _key(condition: Condition | OwnCondition) -> Any:
-    """What identifies a condition."""
-    return condition.function if isinstance(condition, OwnCondition) else condition.text

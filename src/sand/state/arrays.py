@@ -85,6 +85,22 @@ class LongRangeArrays(NamedTuple):
     block_sums: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
+class WallArrays(NamedTuple):
+    """Walls, one column each."""
+
+    position: np.ndarray  # (3, W) a point of the plane [m]
+    normal: np.ndarray  # (3, W) unit vector towards the grains
+    velocity: np.ndarray  # (3, W) [m/s]
+    force: np.ndarray  # (3, W) force of the grains on the wall at the end of the last step [N]
+    impulse: np.ndarray  # (3, W) its integral over time since the start [N s]
+    work: np.ndarray  # (W,) energy that the wall has given to grains and contacts by its motion [J]
+    # used within a step
+    velocity_before: np.ndarray  # (3, W) velocity and impulse at the start of the step
+    impulse_before: np.ndarray  # (3, W)
+    contacts: np.ndarray  # (W,) number of contacts
+    touching: np.ndarray  # (W, N) uint8: 1 for grains in contact with the wall
+
+
 class RungeKuttaArrays(NamedTuple):
     """Buffers for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Not saved."""
 
@@ -122,6 +138,8 @@ RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
 (`LongRangeSums.arrays`), r-RESPA cycles or Taylor series."""
 UNIFORM_ARRAYS = ("constants", "step", "break_overlap")
 """Arrays of contacts and candidate pairs with identical columns if all grains are equal."""
+SAVED_WALLS = ("position", "normal", "velocity", "force", "impulse", "work")
+"""Arrays of the walls in a checkpoint."""
 NOT_SAVED = ("inner", "skin", "gather_order")
 """Arrays of contacts and candidate pairs that are not in a checkpoint, but recomputed."""
 GATHER_CLASSES = 64
@@ -219,6 +237,14 @@ def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = Fals
 def runge_kutta_arrays(grains: int) -> RungeKuttaArrays:
     """Allocate the buffers of the Runge–Kutta integrator; `grains` is 0 if it is not used."""
     return RungeKuttaArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
+
+
+def wall_arrays(walls: int, grains: int) -> WallArrays:
+    """Allocate the arrays of the walls."""
+    vectors = {name: np.zeros((3, walls)) for name in WallArrays._fields[:8] if name != "work"}
+    return WallArrays(
+        work=np.zeros(walls), contacts=np.zeros(walls), touching=np.zeros((walls, grains), np.uint8), **vectors
+    )
 
 
 def cluster_arrays(grains: int) -> ClusterArrays:

@@ -17,15 +17,19 @@ from .arrays import (
     GROWTH,
     NOT_SAVED,
     SAVED_LONG_RANGE,
+    SAVED_WALLS,
     UNIFORM_ARRAYS,
     ClusterArrays,
     ContactArrays,
     LongRangeArrays,
     PairList,
     RungeKuttaArrays,
+    WallArrays,
     cluster_arrays,
+    empty_contact_arrays,
     grown,
     runge_kutta_arrays,
+    wall_arrays,
 )
 
 # --- indices of State.clock (float64): times, and one sum over cycles -------------------------------
@@ -41,9 +45,10 @@ KICKED = 8  # time of the last kick by the gas [s]
 FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
 SETTLED = 11  # time at which settling was last applied to clusters [s]
+WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
-    *("corrected", "settled"),
+    *("corrected", "settled", "wall_step"),
 )
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
@@ -65,9 +70,10 @@ REJECTED = 14  # rejected steps without contacts, of integrators other than Verl
 NEEDED = 15  # step at which a time step as short as LEVEL, or FLIGHT of ForestRuth, was last needed
 ORDERED = 16  # step of the last spatial sort
 COMPARED = 17  # contacts formed and broken when the cut-off was last compared with the clusters; −1: it is fixed
+WALL_CONTACTS = 18  # contacts with walls in use
 COUNT = (
     *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
-    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared"),
+    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "wall_contacts"),
 )
 
 # --- indices of State.cutoff (float64): the cut-off of dipoles that follows the largest clusters -----------------
@@ -96,6 +102,14 @@ RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
 contact does not exist."""
 
 
+GROUPS = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts")
+"""Groups of arrays of a state, besides its grains."""
+WALL_CONTACT_ARRAYS = (
+    *("pair", "pointer1", "pointer2", "twist", "formed", "constants", "lost", "damping", "force", "torque1", "flag"),
+)
+"""Arrays of the contacts with walls in a checkpoint."""
+
+
 @dataclass
 class State:
     """Time, grains, contacts, box and counters of a simulation: everything that a restart needs."""
@@ -111,6 +125,8 @@ class State:
     cutoff: np.ndarray = field(default_factory=lambda: np.zeros(len(CUTOFF)))
     runge_kutta: RungeKuttaArrays = field(default_factory=lambda: runge_kutta_arrays(0))
     clusters: ClusterArrays = field(default_factory=lambda: cluster_arrays(0))
+    walls: WallArrays = field(default_factory=lambda: wall_arrays(0, 0))
+    wall_contacts: ContactArrays = field(default_factory=lambda: empty_contact_arrays(0, 0, 0))
     # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
     order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
     # equal radii, masses and materials, so that one set of constants serves all contacts
@@ -118,7 +134,7 @@ class State:
 
     def __post_init__(self) -> None:
         self.grains.arrays = all_aligned(self.grains.arrays)
-        for group in ("contacts", "pair_list", "long_range", "runge_kutta", "clusters"):
+        for group in GROUPS:
             setattr(self, group, all_aligned(getattr(self, group)))
 
     @property
@@ -133,8 +149,7 @@ class State:
 
     def copy(self) -> State:
         """Independent copy (snapshot)."""
-        groups = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters")
-        copied = {name: type(group)(*(a.copy() for a in group)) for name in groups for group in [getattr(self, name)]}
+        copied = {name: type(group)(*(a.copy() for a in group)) for name in GROUPS for group in [getattr(self, name)]}
         single = {name: getattr(self, name).copy() for name in ("clock", "count", "lost", "cutoff", "order")}
         return replace(self, grains=self.grains.copy(), **copied, **single)  # __post_init__ aligns the arrays
 
@@ -151,6 +166,10 @@ class State:
     def grow_contacts(self, minimum: int = 0) -> None:
         """Allocate more contacts, at least `minimum`."""
         self.contacts = grown(self.contacts, ("start", "gather_order", *self._uniform_arrays()), minimum)
+
+    def grow_wall_contacts(self) -> None:
+        """Allocate more contacts with walls."""
+        self.wall_contacts = grown(self.wall_contacts, ("start", "gather_order"), 0)
 
     def grow_pairs(self, minimum: int = 0) -> None:
         """Allocate more candidate pairs, at least `minimum`."""
@@ -170,6 +189,10 @@ class State:
                 if name not in NOT_SAVED:
                     out[f"{group}/{name}"] = array[..., : self._columns(group, name)]
         out |= {f"long_range/{name}": getattr(self.long_range, name) for name in SAVED_LONG_RANGE}
+        if self.walls.work.size:
+            out |= {f"walls/{name}": getattr(self.walls, name) for name in SAVED_WALLS}
+            for name in WALL_CONTACT_ARRAYS:
+                out[f"wall_contacts/{name}"] = getattr(self.wall_contacts, name)[..., : self.count[WALL_CONTACTS]]
         return out | ({"order": self.order} if self.order.size else {})
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
@@ -204,6 +227,13 @@ class State:
             if name == "anchor" and saved.get("long_range/anchor", self.long_range.anchor).size == 0:
                 continue  # saved without a Verlet list: Engine.load_state builds one
             _copy_into(getattr(self.long_range, name), saved, f"long_range/{name}")
+        for name in SAVED_WALLS if self.walls.work.size else ():
+            _copy_into(getattr(self.walls, name), saved, f"walls/{name}")
+        used = int(self.count[WALL_CONTACTS])
+        while self.wall_contacts.flag.size < used:
+            self.grow_wall_contacts()
+        for name in WALL_CONTACT_ARRAYS if self.walls.work.size else ():
+            _copy_into(getattr(self.wall_contacts, name)[..., :used], saved, f"wall_contacts/{name}")
 
 
 def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Material]) -> Grains:

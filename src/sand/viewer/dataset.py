@@ -18,6 +18,7 @@ from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
 from ..schema import BY_NAME, own_values
 from ..version import __version__
+from .by_identity import ByIdentity
 from .dimensions import fit_dimension
 from .packets import frame_bytes, frame_packet, grains_packet
 from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, stale_note
@@ -329,8 +330,9 @@ def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunD
         if not source.is_file():
             reason = f"there is no {files.TRAJECTORY} in it" if source.is_dir() else "there is no such folder or file"
             raise BadInput(f"{path} is neither a run folder nor a trajectory: {reason}")
-        frames = LiveTrajectory(source)
-        return RunDataset(frames, source.stem, str(path), ledger=lambda: None, summary=dict, field=field)
-    frames = LiveTrajectory(folder / files.TRAJECTORY)
+        return RunDataset(
+            ByIdentity(LiveTrajectory(source)), source.stem, str(path), ledger=lambda: None, summary=dict, field=field
+        )
+    frames = ByIdentity(LiveTrajectory(folder / files.TRAJECTORY))
     name, ledger = folder.resolve().name, LedgerReader(folder)
     return RunDataset(frames, name, str(path), ledger=ledger, summary=lambda: read_summary(folder), field=field)

@@ -12,6 +12,7 @@ from ..errors import BadInput
 from ..forces.external.magnetic_field import Field
 from ..io.run_folder import CASE, read_toml
 from ..numerics.vec import norm
+from ..ramps import ramps_of
 from ..units import format_quantity
 
 
@@ -54,6 +55,8 @@ def read_field(folder: Path) -> FieldDescription | None:
 
 def _field_text(field: Field) -> str:
     constant = format_quantity(norm(field.flux_density), "T")
+    if ramps_of(field):
+        return f"{constant} at first, {field.shape}, changing with a ramp"
     if field.shape == "constant":
         return f"{constant}, constant"
     if field.shape == "ramp":

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ...config.case import MaterialSection, material_errors
+from ...config.case import MaterialSection, material_errors, with_absolute_files
 from ...config.commands import refuse_other_command
 from ...config.errors import validate
 from ...config.sections import PathName, Section, Seed
@@ -136,7 +136,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     BadInput
         All errors of the file, one line each, with their keys.
     """
-    content = read_toml(path)
+    content = with_absolute_files(read_toml(path), path)
     refuse_other_command(content, path, "scatter")
     problems = material_errors(content, ("target", "projectile"), "silica")
     case = validate(ScatterCase, content, str(path), problems)

@@ -16,7 +16,6 @@ from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_to
 from ...io.table import GrowingTable, write_table
 from ...plotting.run_figure import save
 from ...simulation.run_writer import versions
-from ..collision_case import with_absolute_paths
 from .case import ScatterCase
 from .cross_sections import measure, seed_of
 from .encounters import Flight
@@ -40,7 +39,7 @@ class Job:
     flights : list of Flight
         Set-ups from `read_scattering`.
     content : dict
-        Content of the case file.
+        Content of the case file, with absolute paths.
     folder : Path
         Existing folder.
     resume : bool, optional
@@ -60,9 +59,8 @@ class Job:
 
     def __post_init__(self) -> None:
         place = self.folder / CASE
-        self.content = with_absolute_paths(self.content)
         if self.resume and place.exists():
-            if with_absolute_paths(read_toml(place)) != self.content:
+            if read_toml(place) != self.content:
                 raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
         else:
             write_toml(place, self.content, "settings of sand scatter, read by sand resume")

@@ -9,19 +9,21 @@ from ...arguments import checked
 from ...box import Box
 from ...errors import FORBID_EXTRA
 from ...grains import Grains
+from ...ramps import rampable
 from ..vectors import along_z
 from .formulas import UniformElectric, uniform_electric
 
 
 @checked
+@rampable("strength")
 @dataclass(frozen=True)
 class ElectricField:
-    """A uniform, constant electric field: force q E, energy −q E·x.
+    """A uniform electric field: force q E, energy −q E·x.
 
     Parameters
     ----------
     strength : float, str or sequence
-        E, three components [V/m], or one value along +z: "1 kV/m".
+        E, three components [V/m], or one value along +z: "1 kV/m"; or a `Ramp`.
 
     Raises
     ------

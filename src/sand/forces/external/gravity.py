@@ -9,19 +9,21 @@ from ...arguments import checked
 from ...box import Box
 from ...errors import FORBID_EXTRA, BadInput
 from ...grains import Grains
+from ...ramps import rampable
 from ..vectors import along_z, components
 from .formulas import UniformGravity, uniform_gravity
 
 
 @checked
+@rampable("acceleration")
 @dataclass(frozen=True)
 class Gravity:
-    """A uniform, constant acceleration: force m g, energy −m g·x.
+    """A uniform acceleration: force m g, energy −m g·x.
 
     Parameters
     ----------
     acceleration : float, str or sequence
-        g, three components [m/s^2], or one magnitude ≥ 0 along −z: "9.81 m/s^2".
+        g, three components [m/s^2], or one magnitude ≥ 0 along −z: "9.81 m/s^2"; or a `Ramp`.
 
     Raises
     ------

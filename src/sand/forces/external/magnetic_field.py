@@ -13,6 +13,7 @@ from ...box import Box
 from ...errors import FORBID_EXTRA, BadInput, did_you_mean
 from ...grains import Grains
 from ...numerics.vec import across, add, cross, dot, norm, scale, sub
+from ...ramps import force_at, forces_at_points, rampable, ramps_of
 from ...units import si
 from ..vectors import along_z, three
 from .formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
@@ -77,6 +78,7 @@ READERS: dict[str, Callable[[Any, str], Any]] = {
 
 
 @checked
+@rampable("flux_density", "amplitude")
 @dataclass(frozen=True)
 class Field:
     """A uniform magnetic flux density: torque μ×B(t), energy −μ·B(t) (Eqs. 40, 41).
@@ -91,12 +93,13 @@ class Field:
     Parameters
     ----------
     flux_density : float, str or sequence
-        B0, three components [T], or one value along +z as in the paper: "1 mT". 0 for none.
+        B0, three components [T], or one value along +z as in the paper: "1 mT". 0 for none. Or a `Ramp`, which is
+        changed in steps, whereas `shape="ramp"` is exact at every step.
     shape : str, optional
         "constant", "oscillating", "rotating" (right-handed about `axis`) or "ramp".
     amplitude : float, str or sequence, optional
         B1 of "oscillating" and "rotating", three components [T], or one value along +z. For "rotating" it is the
-        rotating component at phase 0, and must be perpendicular to the axis.
+        rotating component at phase 0, and must be perpendicular to the axis. Or a `Ramp`.
     frequency : float or str, optional
         f of "oscillating" and "rotating", oscillations or rotations per second [Hz] > 0.
     phase : float or str, optional
@@ -219,6 +222,9 @@ class Field:
 
     def flux_density_at(self, time: float) -> tuple[float, float, float]:
         """Flux density B [T] at a time [s]."""
+        if ramps_of(self):
+            x, y, z = force_at(self, time).flux_density_at(time)
+            return x, y, z
         if self.shape == "constant":
             return self.flux_density
         x, y, z = flux_density_at(time, self.numbers())
@@ -226,6 +232,8 @@ class Field:
 
     def flux_density_size(self) -> float:
         """Largest |B(t)| [T] over all times, whether the run reaches them or not."""
+        if ramps_of(self):
+            return max(one.flux_density_size() for one in forces_at_points(self))
         b = self.flux_density
         if self.shape == "ramp":
             return max(norm(b), norm(self.final))

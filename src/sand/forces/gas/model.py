@@ -12,6 +12,7 @@ from ...box import Box
 from ...constants import BOLTZMANN, LIGHT
 from ...errors import FORBID_EXTRA, BadInput
 from ...grains import Grains
+from ...ramps import rampable
 from ...units import MELTED, format_quantity, si
 from ..vectors import three
 from . import drag as law
@@ -25,6 +26,7 @@ underestimates drag by 6 % (specular reflection) or 4 % (diffuse reflection)."""
 
 
 @checked
+@rampable("temperature", "density", "pressure", "accommodation", "wind")
 @dataclass(frozen=True)
 class Gas:
     """A rarefied gas: drag (Epstein) and Brownian motion of every grain.
@@ -37,7 +39,8 @@ class Gas:
     Parameters
     ----------
     temperature : float or str
-        T [K] > 0 of the gas and of the surfaces of the grains.
+        T [K] > 0 of the gas and of the surfaces of the grains. This and density, pressure, accommodation and wind may
+        be a `Ramp`.
     density : float or str, optional
         ρ_g [kg/m^3] > 0; either this or the pressure.
     pressure : float or str, optional

@@ -109,8 +109,19 @@ class CutoffForce:
         raise NotImplementedError
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warnings: no grain is subject to the force, or nearest images are summed without a cut-off."""
+        """Warnings: no grain is subject to the force, or nearest images are summed without a cut-off.
+
+        Raises
+        ------
+        BadInput
+            If a setting is invalid or has no effect in this box.
+        """
         choice = self.choose(grains, box)
+        if choice.radius is None and self.cut != CUTS[0]:
+            raise BadInput(
+                f"{self.name}: cut = {self.cut!r} has no effect without a cut-off ({choice.reason}); "
+                "give cutoff, or leave cut out"
+            )
         warnings = [] if self.acts_on(grains) else [self.no_effect]
         if choice.radius is None and not box.is_open:
             warnings.append(

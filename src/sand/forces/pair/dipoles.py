@@ -11,8 +11,8 @@ import numpy as np
 from ...arguments import checked
 from ...box import Box
 from ...constants import BOLTZMANN, MAGNETIC
-from ...errors import BadInput
 from ...grains import Grains
+from ...ramps import rampable
 from ...units import format_quantity
 from .cutoff import HALF_BOX_RATIO, CutoffChoice, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
@@ -45,6 +45,7 @@ class CapturingPair(NamedTuple):
 
 
 @checked
+@rampable()
 @dataclass(frozen=True)
 class Dipoles(EwaldForce):
     """Forces and torques between magnetic moments.
@@ -84,7 +85,7 @@ class Dipoles(EwaldForce):
     ------
     BadInput
         If a parameter is invalid; later, if the cut-off exceeds half the box, a box of an Ewald sum is open along an
-        axis, or that of a tree is not open, or an Ewald sum would need too many wave vectors and nodes.
+        axis, `open` or `cut` have no effect in the box, or an Ewald sum would need too many wave vectors and nodes.
     """
 
     cutoff: Any = "auto"
@@ -122,11 +123,6 @@ class Dipoles(EwaldForce):
 
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """The cut-off radius, or that of the real part of the Ewald sum, or none with a tree, with the reason."""
-        if self.open == "tree" and not box.is_open:
-            raise BadInput(
-                f"{self.name}: open = 'tree' needs an open box, and the box is {box.describe()}; "
-                "use periodic = 'ewald', or leave open out"
-            )
         if not self.uses_tree(grains, box):
             return super().choose(grains, box)
         tree = self.tree(grains)

@@ -35,12 +35,12 @@ PRODUCTS = tuple(round(0.1 * k, 1) for k in range(16, 64))
 """Values of α r_c that are compared."""
 RADII = 1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02
 """Values of r_c, in units of half the shortest side, that are compared."""
-PAIR_COST, LISTED_COST, WAVE_COST = 1.0, 1.2, 0.16
-"""Relative costs of a pair, of an entry of the Verlet list, and of a wave vector of one grain; 1 is 8 ns (Zen 3)."""
+LISTED_COST = 1.2
+"""Cost of an entry of the Verlet list, relative to that of a pair."""
 NODE_COST, ROW_COST, GRAIN_COST = 4.0, 3.3, 20.0
-"""Relative costs of a node of a mesh, of a row of nodes of the spline of one grain (p² rows), and of one grain."""
+"""Costs of a node of a mesh, of a row of nodes of the spline of one grain (p² rows), and of one grain; 1 is 8 ns."""
 TRANSFORMS_COST = 5000.0
-"""Relative cost of the calls of the Fourier transforms, for each block."""
+"""Cost of the calls of the Fourier transforms, for each block."""
 LIST_FROM, LIST_REACH, LIST_UP_TO = 64, 1.1, 0.38
 """Conditions for a Verlet list, as in `neighbours.settings`: grains, reach in units of r_c, fraction within reach."""
 LARGEST_SPACING = 0.8
@@ -134,11 +134,11 @@ def _waves_needed(alpha: float, spacing: float, volume: float, limits: tuple[flo
 
 
 def _cost_of_pairs(count: int, radius: float, volume: float) -> float:
-    """Cost of the real part, by a Verlet list where there will be one."""
+    """Cost of the real part, by a Verlet list where there will be one, in units of that of a pair."""
     share = 4.0 / 3.0 * math.pi * (LIST_REACH * radius) ** 3 / volume
     if count >= LIST_FROM and share <= LIST_UP_TO:
         return LISTED_COST * count * count * share
-    return PAIR_COST * 0.5 * count * count
+    return 0.5 * count * count
 
 
 class _Problem(NamedTuple):
@@ -150,6 +150,7 @@ class _Problem(NamedTuple):
     accuracy: float
     degree: int
     grains: int  # number of them
+    sources: Sources
 
 
 @functools.lru_cache(64)
@@ -177,7 +178,7 @@ def choose_ewald(
     least : float
         Smallest r_c [m]; half the shortest side if that is smaller.
     sources : Sources
-        `ewald_fit.CHARGES`, with "direct" alone, or `DIPOLES`.
+        `ewald_fit.CHARGES` or `DIPOLES`.
     reciprocal : str, optional
         How the reciprocal part is summed: "direct", over wave vectors; "mesh"; or "auto", the cheaper of both.
 
@@ -188,10 +189,10 @@ def choose_ewald(
     """
     volume, half, degree = math.prod(lengths), 0.5 * min(lengths), degree_for(accuracy)
     spacing = min((3.0 * volume / (4.0 * math.pi * carriers)) ** (1.0 / 3.0), LARGEST_SPACING * half)
-    problem = _Problem(lengths, volume, spacing, accuracy, degree, count)
+    problem = _Problem(lengths, volume, spacing, accuracy, degree, count, sources)
     direct, meshes = [], []
     for radius in sorted({max(min(least, half), fraction * half) for fraction in RADII}):
-        pairs = _cost_of_pairs(count, radius, volume)
+        pairs = sources.pair_cost * _cost_of_pairs(count, radius, volume)
         for product in PRODUCTS:
             force, field = real_errors(product, degree, radius, spacing, sources)
             if max(force, field) >= accuracy:
@@ -199,7 +200,7 @@ def choose_ewald(
             limits = math.sqrt(accuracy**2 - force**2), math.sqrt(accuracy**2 - field**2)
             if reciprocal != "mesh":
                 waves = _waves_needed(product / radius, spacing, volume, limits, sources)
-                direct.append((pairs + WAVE_COST * count * waves, -radius, product, waves))
+                direct.append((pairs + sources.wave_cost * count * waves, -radius, product, waves))
             if reciprocal != "direct":
                 meshes += _meshes(problem, pairs, radius, product, limits)
     if not direct and not meshes:
@@ -236,7 +237,7 @@ def _meshes(
     """Costs of the meshes of all orders, with −r_c, α r_c, nodes, order; `pairs` is the cost of the real part."""
     found = []
     for order in ORDERS:
-        widest = widest_cells(order, product / radius, problem.spacing, limits)
+        widest = widest_cells(order, product / radius, problem.spacing, limits, problem.sources)
         if widest > 0.0:
             nodes = nodes_for(problem.lengths, widest, order)
             found.append((pairs + _cost_of_mesh(problem.grains, nodes, order), -radius, product, nodes, order))
@@ -256,11 +257,12 @@ def _with_mesh(
     The estimates by which nodes are chosen are those of cubic cells in a large box.
     """
     alpha = product / radius
-    real = real_errors(product, problem.degree, radius, problem.spacing)
+    sources = problem.sources
+    real = real_errors(product, problem.degree, radius, problem.spacing, sources)
     spacing = max(side / number for side, number in zip(problem.lengths, nodes, strict=True))
     while True:
-        sums = mesh_sums(problem.lengths, nodes, order, alpha)
-        other = mesh_errors(sums, problem.volume, problem.spacing)
+        sums = mesh_sums(problem.lengths, nodes, order, alpha, sources)
+        other = mesh_errors(sums, problem.volume, problem.spacing, sources)
         force, field = (math.hypot(own, mesh) for own, mesh in zip(real, other, strict=True))
         if max(force, field) <= problem.accuracy:
             return EwaldChoice(alpha, radius, 0.0, 0, problem.degree, product, force, field, nodes, order)
@@ -268,7 +270,7 @@ def _with_mesh(
         nodes = nodes_for(problem.lengths, spacing, order)
         if math.prod(nodes) > 2 * MOST_NODES:
             raise BadInput(
-                f"dipoles: periodic = 'ewald' with accuracy = {problem.accuracy:g} is not reached by a mesh of "
+                f"{sources.name}: periodic = 'ewald' with accuracy = {problem.accuracy:g} is not reached by a mesh of "
                 f"{MOST_NODES} nodes; give a larger accuracy, or reciprocal = 'direct'"
             )
 
@@ -345,9 +347,12 @@ def ewald_parameters(
     of_pairs = sources.k, radius**2, 2.0 / radius**2, coefficients
     mean = mean_field(alpha, volume, vacuum, sources)
     if choice.order:
-        sums = mesh_sums(lengths, choice.nodes, choice.order, alpha)
-        own = 4.0 * alpha**3 * sources.k / (3.0 * math.sqrt(math.pi)) + sources.k / volume * sums.self_mean
-        return MeshEwaldParameters(*of_pairs, own, mean, new_mesh(sums, choice.nodes, volume, count))
+        sums = mesh_sums(lengths, choice.nodes, choice.order, alpha, sources)
+        smeared = 4.0 * alpha**3 * sources.k / (3.0 * math.sqrt(math.pi))
+        if order == 0:
+            smeared = 2.0 * alpha * sources.k / math.sqrt(math.pi)
+        own = smeared + sources.k / volume * sums.self_mean
+        return MeshEwaldParameters(*of_pairs, own, mean, new_mesh(sums, choice.nodes, volume, count, sources))
     blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
     size = padded_size(count)
     return EwaldParameters(

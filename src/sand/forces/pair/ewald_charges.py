@@ -1,7 +1,8 @@
 """Loops of the Ewald sum of charges in a periodic box.
 
-The real part is summed by the loops of `generic_loops`, the reciprocal part by those of `ewald_loops`.  The energies of
-the grains are ½ q_j φ_j, with the potential φ of all images, without that of the own charge,
+The real part is summed by the loops of `generic_loops`, the reciprocal part by those of `ewald_loops` or of
+`mesh_loops`.  The energies of the grains are ½ q_j φ_j, with the potential φ of all images, without that of the own
+charge,
 
     φ_j = real part + waves − 2αk/√π q_j − πk/(Vα²) Q
 
@@ -19,6 +20,7 @@ from .ewald_formulas import real_part_of_charges
 from .ewald_loops import with_waves
 from .generic_loops import ZERO, sums_of
 from .loops import LongRangeSums, all_blocks
+from .mesh_loops import MESH_CHARGES, add_mesh_forces, mesh_rounds, remove_self_waves
 
 
 @loop
@@ -30,24 +32,43 @@ def add_wave_forces(grains, long_range, sums):
 
 
 @loop
-def add_wave_energies(grains, parameters, shares):
-    """Add ½ q (φ of the waves, less that of the own charge, with that of the background) [J] of each grain."""
-    sums, total = parameters.buffers, 0.0
-    for i in range(grains.mass.size):
-        total += grains.charge[i]
-    for i in range(grains.mass.size):
-        potential = parameters.mean_field * total - parameters.self_field * grains.charge[i]
-        for b in range(sums.wave.shape[0]):
-            potential += sums.potential[b, i]
-        shares[i] += 0.5 * grains.charge[i] * potential
+def with_wave_potential(potential, parameters, i):
+    """A potential [V], with that of the waves at a grain."""
+    sums = parameters.buffers
+    for b in range(sums.wave.shape[0]):
+        potential += sums.potential[b, i]
+    return potential
+
+
+@loop
+def with_mesh_potential(potential, parameters, i):
+    """A potential [V], with that of the mesh at a grain."""
+    return potential - parameters.mesh.field[0, i]
 
 
 @functools.cache
-def ewald_charge_sums(degree: int, listed: bool, bare: Callable) -> LongRangeSums:
+def add_energies_of(with_reciprocal: Callable) -> Callable:
+    """The loop that adds ½ q (reciprocal part of φ, less that of the own charge, with that of the background) [J]."""
+
+    @loop
+    def add_energies(grains, parameters, shares):
+        total = 0.0
+        for i in range(grains.mass.size):
+            total += grains.charge[i]
+        for i in range(grains.mass.size):
+            potential = parameters.mean_field * total - parameters.self_field * grains.charge[i]
+            shares[i] += 0.5 * grains.charge[i] * with_reciprocal(potential, parameters, i)
+
+    return add_energies
+
+
+@functools.cache
+def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0) -> LongRangeSums:
     """The loops of charges, with a polynomial of this degree, over the pairs of the Verlet list or over all pairs.
 
-    In an r-RESPA cycle the bare force of grains in contact, by the pair formula `bare`, acts in every step; the sum
-    less these forces, which are those of all images, varies slowly.
+    `order` is that of the splines of a mesh, 0 for a sum over wave vectors.  In an r-RESPA cycle the bare force of
+    grains in contact, by the pair formula `bare`, acts in every step; the sum less these forces, which are those of all
+    images, varies slowly.
     """
     loads = real_part_of_charges(degree)
 
@@ -63,9 +84,29 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable) -> LongRangeSum
         force, energy = bare(apart, a, b, parameters)
         return force, ZERO, ZERO, energy
 
-    pairs = sums_of(real_pair, False, listed)
-    begin, block, blocks = with_waves(pairs.begin, pairs.block, pairs.blocks, False)
+    pairs = sums_of(real_pair, False, listed)._replace(pair=sums_of(bare_pair, False, listed).pair)
     end_pairs, pair_energies = pairs.end, pairs.energies
+
+    if order:
+        remove_waves, add_mesh_energies = remove_self_waves(MESH_CHARGES), add_energies_of(with_mesh_potential)
+
+        @loop
+        def end_with_mesh(grains, long_range, span, parameters):
+            end_pairs(grains, long_range, span, parameters)
+            remove_waves(grains, span, parameters.mesh)
+            add_mesh_forces(grains, long_range, parameters.mesh)
+
+        @loop
+        def mesh_energies(grains, long_range, span, parameters, shares):
+            pair_energies(grains, long_range, span, parameters, shares)
+            remove_waves(grains, span, parameters.mesh)
+            add_mesh_energies(grains, parameters, shares)
+
+        rounds = mesh_rounds(order, MESH_CHARGES)
+        return pairs._replace(end=end_with_mesh, energies=mesh_energies, rounds=rounds, energies_need_rounds=True)
+
+    add_wave_energies = add_energies_of(with_wave_potential)
+    begin, block, blocks = with_waves(pairs.begin, pairs.block, pairs.blocks, False)
 
     @loop
     def end(grains, long_range, span, parameters):
@@ -80,6 +121,4 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable) -> LongRangeSum
             block(grains, long_range, span, parameters, b)
         add_wave_energies(grains, parameters, shares)
 
-    return pairs._replace(
-        begin=begin, block=block, end=end, blocks=blocks, energies=energies, pair=sums_of(bare_pair, False, listed).pair
-    )
+    return pairs._replace(begin=begin, block=block, end=end, blocks=blocks, energies=energies)

@@ -45,10 +45,12 @@ class Sources(NamedTuple):
     field: str  # the load beside the force of which the error is predicted
     force_size: float  # F²/(kq²/a²)² or F²/(kμ²/a⁴)² of the typical force, see `ewald`
     field_size: float  # φ²/(kq/a)² or B²/(kμ/a³)² of the typical potential or flux density
+    pair_cost: float  # relative cost of a pair in the real part; 1 is 8 ns (Zen 3)
+    wave_cost: float  # of a wave vector of one grain
 
 
-CHARGES = Sources("charges", 0, COULOMB, "potential", 3.0, 1.0)
-DIPOLES = Sources("dipoles", 1, MAGNETIC, "torque", 6.0, 2.0)
+CHARGES = Sources("charges", 0, COULOMB, "potential", 3.0, 1.0, 0.8, 0.11)
+DIPOLES = Sources("dipoles", 1, MAGNETIC, "torque", 6.0, 2.0, 1.0, 0.16)
 
 
 class Polynomial(NamedTuple):

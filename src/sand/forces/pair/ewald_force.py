@@ -28,14 +28,13 @@ class EwaldForce(CutoffForce):
     """A long-range force with the fields `periodic`, `accuracy` and `boundary` beside those of `CutoffForce`.
 
     Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, `accuracy: Any = DEFAULT_ACCURACY` and
-    `boundary: str = "tin-foil"`; with `reciprocal: str = "auto"` if there are loops of a mesh, and `open: str = "auto"`
-    if there is a tree.
+    `boundary: str = "tin-foil"` and `reciprocal: str = "auto"`; with `open: str = "auto"` if there is a tree.
     """
 
     periodic: str
     accuracy: Any
     boundary: str
-    reciprocal: str = "direct"
+    reciprocal: str
     open: str = "pairs"
 
     sources: ClassVar[Sources]
@@ -81,11 +80,11 @@ class EwaldForce(CutoffForce):
                 uses["accuracy"] = f"{ewald} or open = 'tree'" if type(self).open == "auto" else ewald
             for name in self._given(*uses):
                 problems.append(f"{self.name}: {name} is used only with {uses[name]}; add that, or leave it out")
-            for name in self._given("cutoff", "cut") if self.open == "tree" else ():
+            for name in self._given("cutoff", "cut") if self._given("open") and self.open in OPEN else ():
                 if getattr(self, name) is not None:
                     problems.append(
-                        f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with open = 'tree', "
-                        "which sums all pairs; leave one of them out"
+                        f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with open = "
+                        f"{shown(self.open)}, which sums all pairs; leave one of them out"
                     )
         return problems
 
@@ -96,6 +95,18 @@ class EwaldForce(CutoffForce):
     def carriers(self, grains: Grains) -> int:
         """Number of grains with a charge or moment."""
         raise NotImplementedError
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Warnings, as for all cut-offs; raises BadInput also if `open` has no effect in this box."""
+        errors = ErrorCollector()
+        if self._given("open") and not box.is_open:
+            errors.problems.append(
+                f"{self.name}: open = {shown(self.open)} is for open boxes, and the box is {box.describe()}; "
+                "leave it out, or use an open box"
+            )
+        warnings = errors.take(super().check, grains, box)
+        errors.done()
+        return warnings or []
 
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """The cut-off radius, or that of the real part of the Ewald sum, with the reason."""

@@ -41,7 +41,7 @@ from .dipole_loops import (
 )
 from .ewald_formulas import real_part
 from .loops import LongRangeSums, all_blocks, listed_blocks
-from .mesh_loops import Mesh, add_mesh, add_self_waves, mesh_rounds
+from .mesh_loops import MESH_DIPOLES, Mesh, add_mesh_field, add_mesh_forces, mesh_rounds, remove_self_waves
 
 
 class Buffers(NamedTuple):
@@ -342,13 +342,15 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
     pair_block = listed_block_of(pair_loads) if listed else all_pairs_block_of(pair_loads)
 
     if order:
+        remove_waves = remove_self_waves(MESH_DIPOLES)
 
         @loop
         def end_with_mesh(grains, long_range, span, parameters):
             if not listed:
                 add_blocks(grains, long_range, span, parameters)
-            add_self_waves(grains, span, parameters.mesh)
-            add_mesh(grains, long_range, parameters.mesh)
+            remove_waves(grains, span, parameters.mesh)
+            add_mesh_forces(grains, long_range, parameters.mesh)
+            add_mesh_field(grains, parameters.mesh)
             add_own_and_mean_field(grains, parameters.self_field, parameters.mean_field)
             add_torques(grains, long_range, span, parameters)
 
@@ -361,7 +363,7 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
             energy_shares,
             bare_pair,
             arrays=COPIES,
-            rounds=mesh_rounds(order),
+            rounds=mesh_rounds(order, MESH_DIPOLES),
         )
 
     begin, block, blocks = with_waves(pack, pair_block, blocks_of_pairs, True)

@@ -15,6 +15,7 @@ from ...constants import COULOMB, GRAVITATION
 from ...errors import ErrorCollector
 from ...grains import Grains
 from ...numerics.vec import axpy, dot, scale
+from ...ramps import rampable
 from ...units import format_quantity
 from .ewald import degree_for, ewald_parameters, mean_field
 from .ewald_charges import ewald_charge_sums
@@ -88,6 +89,7 @@ class InverseSquare(PairForce):
 
 
 @checked
+@rampable()
 @dataclass(frozen=True)
 class Charges(EwaldForce, InverseSquare):
     """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
@@ -115,12 +117,15 @@ class Charges(EwaldForce, InverseSquare):
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a conductor: no field of the polarisation).
         "vacuum" is refused: its energy depends on the total dipole moment of the charges in the box, which jumps when a
         charge crosses a wall.
+    reciprocal : str, optional
+        How the reciprocal part of the Ewald sum is computed: "direct", summed over wave vectors; "mesh", by Fourier
+        transforms on a mesh; "auto", the cheaper of both (the mesh from one to three thousand charges on).
 
     Raises
     ------
     BadInput
-        If a parameter is invalid; later, if the cut-off exceeds half the box, or a box of an Ewald sum is open along an
-        axis.
+        If a parameter is invalid; later, if the cut-off exceeds half the box, a box of an Ewald sum is open along an
+        axis, or an Ewald sum would need too many wave vectors and nodes.
     """
 
     cutoff: Any = "auto"
@@ -128,11 +133,14 @@ class Charges(EwaldForce, InverseSquare):
     periodic: str = "nearest image"
     accuracy: Any = DEFAULT_ACCURACY
     boundary: str = "tin-foil"
+    reciprocal: str = "auto"
 
     name: ClassVar[str] = "charges"
     no_effect: ClassVar[str] = "charges are switched on but no grain is charged"
     column: ClassVar[str] = "coulomb"
-    references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4; Ewald sum: Ewald 1921; Kolafa & Perram 1992"
+    references: ClassVar[str] = (
+        "Jackson 1975; Dominik & Nübold 2002, A.4; Ewald sum: Ewald 1921; Kolafa & Perram 1992; Essmann et al. 1995"
+    )
     formula = staticmethod(coulomb)
     rate = staticmethod(coulomb_rate)
     source: ClassVar[str] = "charge"
@@ -156,7 +164,8 @@ class Charges(EwaldForce, InverseSquare):
     def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
         if self.periodic == "ewald":
-            return ewald_charge_sums(degree_for(self.accuracy), listed, type(self).formula)
+            order = 0 if grains is None or box.is_open else self.ewald(grains, box).order
+            return ewald_charge_sums(degree_for(self.accuracy), listed, type(self).formula, order)
         return super().sums(box, listed)
 
     def numbers(self, grains: Grains, box: Box) -> Any:
@@ -179,6 +188,7 @@ class Charges(EwaldForce, InverseSquare):
 
 
 @checked
+@rampable()
 @dataclass(frozen=True)
 class Attraction(InverseSquare):
     """Newtonian attraction between the grains, U = −G m1 m2/r; rarely relevant below kilometres.

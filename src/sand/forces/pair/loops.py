@@ -66,6 +66,7 @@ class LongRangeSums(NamedTuple):
     pair: Callable  # (grains, span, parameters, i, j): force on i, torques on i and on j, of one pair
     arrays: tuple = ()  # names of the copies in long_range that the loops use, see state.arrays.PACKED_ARRAYS
     rounds: tuple[Round, ...] = ()  # before `begin`; each has as many blocks as a sum over all pairs, `all_blocks`
+    energies_need_rounds: bool = False  # `energies` uses what the rounds compute
     own_memory: bool = False  # blocks keep their sums in the parameters, never in long_range.block_sums
 
 

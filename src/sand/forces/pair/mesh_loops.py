@@ -9,8 +9,9 @@ and the potential φ is the convolution of ρ with the influence function G, by 
 
     U = ½ Σ_k ρ φ,  B_j = −∇ψ,  F_j = −∇ s_j ψ,  ψ(x_j) = Σ_k φ(k) Π_a M(u_aj − k_a)
 
-The loads are the exact gradients of this energy.  Dipoles need ∇ψ and the second derivatives of ψ; with p ≥ 5 the force
-is continuous with its derivative.
+The loads are the exact gradients of this energy.  Dipoles need ∇ψ and the second derivatives of ψ, charges ψ and ∇ψ;
+with p ≥ 5 the force is continuous with its derivative.  The loops are the same for both: what a grain adds to the mesh
+and what it takes from ψ are formulas (`MeshSource`).
 
 The work is done in rounds, each of blocks that are independent of one another: planes of the mesh are filled (each sums
 over its own grains, in a fixed order), transformed, and read.  Blocks depend on the number of grains alone, and so do
@@ -45,8 +46,16 @@ class Mesh(NamedTuple):
     start: np.ndarray  # (K_x + 1,) int64: first entry of each plane in `order`
     order: np.ndarray  # (N,) int64: grains by their first plane
     force: np.ndarray  # (3, N) [N]
-    field: np.ndarray  # (3, N): B [T] of dipoles; the potential (ψ, 0, 0) of charges
-    self_wave: np.ndarray  # (3, 3): amplitude T_ab of the self-interaction, see `add_self_waves`
+    field: np.ndarray  # (3, N), −∂U/∂s: B [T] of dipoles; (−ψ, 0, 0) [V] of charges
+    self_wave: np.ndarray  # (3, 3): amplitude T_ab of the self-interaction, see `remove_self_waves`
+
+
+class MeshSource(NamedTuple):
+    """The formulas of grains on a mesh."""
+
+    row: Callable  # (grains, i, m_x, d_x, m_y, d_y) → a, b: ρ along a row of nodes is a M + b M′ of z
+    loads: Callable  # (grains, i, ψ, ∇ψ, second derivatives xx, yy, zz, xy, xz, yz) → force [N], −∂U/∂s
+    own: Callable  # (grains, i) → s: μ [A m²], or (q, 0, 0) [C]
 
 
 @formula
@@ -133,6 +142,12 @@ def dipole_loads(grains, i, potential, slope, curve):
 
 
 @formula
+def dipole_moment(grains, i):
+    """μ [A m²]."""
+    return load(grains.moment, i)
+
+
+@formula
 def charge_row(grains, i, m_x, d_x, m_y, d_y):
     """As `dipole_row`, of charges: q times the product of splines."""
     return grains.charge[i] * m_x * m_y, 0.0
@@ -140,9 +155,19 @@ def charge_row(grains, i, m_x, d_x, m_y, d_y):
 
 @formula
 def charge_loads(grains, i, potential, slope, curve):
-    """Force −q ∇ψ [N], and the potential ψ in place of a flux density."""
+    """Force −q ∇ψ [N], and −ψ [V] in place of a flux density."""
     q = grains.charge[i]
-    return (-q * slope[0], -q * slope[1], -q * slope[2]), (potential, 0.0, 0.0)
+    return (-q * slope[0], -q * slope[1], -q * slope[2]), (-potential, 0.0, 0.0)
+
+
+@formula
+def charge_vector(grains, i):
+    """(q, 0, 0) [C]."""
+    return grains.charge[i], 0.0, 0.0
+
+
+MESH_DIPOLES = MeshSource(dipole_row, dipole_loads, dipole_moment)
+MESH_CHARGES = MeshSource(charge_row, charge_loads, charge_vector)
 
 
 @loop
@@ -209,13 +234,13 @@ def _complex(spectrum: np.ndarray) -> np.ndarray:
 
 
 @functools.cache
-def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole_loads) -> tuple[Round, ...]:
+def mesh_rounds(order: int, source: MeshSource) -> tuple[Round, ...]:
     """The rounds of a mesh sum with splines of this order, which set `mesh.force` and `mesh.field`.
 
-    `row` is the formula of the sources, `loads` that of the loads in the potential, such as `dipole_row` and
-    `dipole_loads`; the parameters have the field `mesh`, a `Mesh`.  Rows of splines are extended with zeros to whole
-    SIMD vectors, and the columns of the mesh with them.
+    The parameters have the field `mesh`, a `Mesh`.  Rows of splines are extended with zeros to whole SIMD vectors, and
+    the columns of the mesh with them.
     """
+    row, loads = source.row, source.loads
     one, nodes, pad = np.uint64(1), np.uint64(order), np.uint64(SIMD_WIDTH - 1)
 
     @loop
@@ -310,33 +335,40 @@ def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole
     )
 
 
-@loop
-def add_self_waves(grains, span, mesh):
-    """Remove the part of the interaction of a dipole with itself through the mesh that varies with its position.
+@functools.cache
+def remove_self_waves(source: MeshSource) -> Callable:
+    """The loop that removes a part of the interaction of a grain with itself through the mesh.
 
-    It is U = Σ_b μ_b² Σ_a T_ab cos 2πu_a, and waves of higher orders, which are smaller.
+    It is the part that varies with its position, U = Σ_b s_b² Σ_a T_ab cos 2πu_a with s = μ or (q, 0, 0); there are
+    waves of higher orders, which are smaller.
     """
-    spacing_x = mesh.density.shape[0] * span.inverse_x
-    spacing_y = mesh.density.shape[1] * span.inverse_y
-    spacing_z = (mesh.density.shape[2] - (SIMD_WIDTH - 1)) * span.inverse_z
-    inverse = spacing_x, spacing_y, spacing_z
-    for i in range(grains.mass.size):
-        x, mu = load(grains.position, i), load(grains.moment, i)
-        square = mu[0] * mu[0], mu[1] * mu[1], mu[2] * mu[2]
-        for a in range(3):
-            u = x[a] * inverse[a]
-            cosine, sine = cosine_and_sine(u - np.rint(u))
-            along = 0.0
-            for b in range(3):
-                amplitude = mesh.self_wave[a, b]
-                along += square[b] * amplitude
-                mesh.field[b, i] += 2.0 * mu[b] * amplitude * cosine
-            mesh.force[a, i] -= 2.0 * math.pi * inverse[a] * along * sine
+    own = source.own
+
+    @loop
+    def remove(grains, span, mesh):
+        spacing_x = mesh.density.shape[0] * span.inverse_x
+        spacing_y = mesh.density.shape[1] * span.inverse_y
+        spacing_z = (mesh.density.shape[2] - (SIMD_WIDTH - 1)) * span.inverse_z
+        inverse = spacing_x, spacing_y, spacing_z
+        for i in range(grains.mass.size):
+            x, s = load(grains.position, i), own(grains, i)
+            square = s[0] * s[0], s[1] * s[1], s[2] * s[2]
+            for a in range(3):
+                u = x[a] * inverse[a]
+                cosine, sine = cosine_and_sine(u - np.rint(u))
+                along = 0.0
+                for b in range(3):
+                    amplitude = mesh.self_wave[a, b]
+                    along += square[b] * amplitude
+                    mesh.field[b, i] += 2.0 * s[b] * amplitude * cosine
+                mesh.force[a, i] -= 2.0 * math.pi * inverse[a] * along * sine
+
+    return remove
 
 
 @loop
-def add_mesh(grains, long_range, mesh):
-    """Add forces and flux densities of the mesh, the forces less the net force, in proportion to the masses.
+def add_mesh_forces(grains, long_range, mesh):
+    """Add the forces of the mesh, less the net force, in proportion to the masses.
 
     The net force of the mesh is not exactly 0.  Its removal is a common acceleration of all grains: the momentum is
     kept, and no work is done in the frame of the centre of mass.
@@ -351,4 +383,10 @@ def add_mesh(grains, long_range, mesh):
         share = -grains.mass[i] / mass
         accrue(long_range.force, i, load(mesh.force, i))
         accrue(long_range.force, i, (share * x, share * y, share * z))
+
+
+@loop
+def add_mesh_field(grains, mesh):
+    """Add the flux densities of the mesh."""
+    for i in range(grains.mass.size):
         accrue(grains.field, i, load(mesh.field, i))

@@ -19,6 +19,7 @@ from ...constants import COULOMB
 from ...errors import ErrorCollector
 from ...grains import Grains
 from ...numerics.vec import dot, scale
+from ...ramps import forces_at_points, rampable
 from ...units import format_quantity, si
 from .cutoff import HALF_BOX_RATIO, CutoffChoice
 from .pair_force import PairForce
@@ -53,6 +54,7 @@ def screened_coulomb(apart, a, b, constants):
 
 
 @checked
+@rampable("screening_length")
 @dataclass(frozen=True)
 class ScreenedCharges(PairForce):
     """Screened Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r) exp(−r/λ).
@@ -62,7 +64,7 @@ class ScreenedCharges(PairForce):
     Parameters
     ----------
     screening_length : float or str
-        λ [m] > 0, in a plasma its Debye length.
+        λ [m] > 0, in a plasma its Debye length. Or a `Ramp`, with the cut-off of the largest λ.
     cutoff : float, str or None, optional
         "auto", None (no cut-off: all pairs in an open box, nearest images in a periodic one), or a length [m]. "auto"
         is 10 λ, where the interaction is below 5e-5 of the Coulomb energy, in a periodic box at most (L/2)/1.35, and
@@ -96,7 +98,8 @@ class ScreenedCharges(PairForce):
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
         """Ten screening lengths, at least two grain diameters, at most `largest`."""
-        full, shortest = CUTOFF_LENGTHS * self.screening_length, 4.0 * float(grains.radius.max())
+        longest = max(one.screening_length for one in forces_at_points(self))
+        full, shortest = CUTOFF_LENGTHS * longest, 4.0 * float(grains.radius.max())
         if max(full, shortest) >= largest:
             less = f"less than {CUTOFF_LENGTHS:g} screening lengths, {format_quantity(full, 'm')}"
             return CutoffChoice(largest, f"{self.cut}, half the box / {HALF_BOX_RATIO}, {less}")

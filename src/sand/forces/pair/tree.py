@@ -26,16 +26,8 @@ from ...constants import MAGNETIC
 from ...numerics.simd import padded_size
 from .loops import PARALLEL_FROM
 from .multipoles import LANES, tables
-from .tree_loops import (
-    LARGE_FROM,
-    LEAF,
-    MOST_BLOCKS,
-    SOME_BLOCKS,
-    SOURCES,
-    Cells,
-    Scratch,
-    TreeParameters,
-)
+from .tree_cells import LARGE_FROM, LEAF, MOST_BLOCKS, SOME_BLOCKS, Cells
+from .tree_loops import SOURCES, Scratch, TreeParameters
 
 TREE_FROM = 5000
 """Fewest grains for which "auto" uses a tree: it takes half as long as all pairs there."""

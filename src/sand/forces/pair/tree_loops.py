@@ -1,8 +1,7 @@
-"""Loops of the tree sum of dipoles in an open box: cells, multipole expansions, near pairs (Dehnen 2002).
+"""Loops of the tree sum of dipoles in an open box: walk through the cells, near pairs, loads (Dehnen 2002).
 
-A binary tree divides the grains: a cell is cut at the median of the longest side of the box around its grains, so that
-all leaves have the same level and, within one, as many grains.  Cells are numbered by level, 2c + 1 and 2c + 2 are the
-halves of cell c.  Two cells A and B with half diagonals r and distance R of their centres interact as a whole if
+Two cells A and B of the tree (`tree_cells`), with half diagonals r and distance R of their centres, interact as a whole
+if
 
     r_A + r_B < θ R  and  R > r_A + g_A + r_B + g_B
 
@@ -16,49 +15,23 @@ forces are opposite and equal to rounding.  The net torque that remains, because
 α × (x − x̄) on all grains.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...compiler.jit import loop
 from ...numerics.simd import SIMD_WIDTH, round_up_to_simd_width
-from ...numerics.vec import accrue, add, cross, dot, load, put, scale, sub
+from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load
 from .dipole_loops import COPIES, MAX_REMAINDER, energy_shares, separation_if
 from .ewald_loops import bare_pair
-from .loops import PARALLEL_FROM, LongRangeSums
-from .multipoles import (
-    LANES,
-    Tables,
-    add_derivatives,
-    add_expansions,
-    add_moments,
-    add_shifted_expansion,
-    add_shifted_moments,
-    complete,
-    fold,
-    set_derivatives,
-    set_harmonics,
-)
+from .loops import LongRangeSums
+from .multipoles import LANES, Tables, add_shifted_expansion, complete
+from .tree_cells import Cells, build_cells, first_grain, levels_below, tree_blocks
+from .tree_operators import add_batch, add_far, clear, harmonics_at, set_offset, sum_moments
 
-LEAF = 40
-"""Most grains in a leaf."""
 SOURCES = 2048
 """Grains of near leaves that are summed together, a multiple of the SIMD width."""
-SOME_BLOCKS, MOST_BLOCKS, LARGE_FROM = 8, 64, 20_000
-"""Blocks from PARALLEL_FROM grains on, and from LARGE_FROM grains on."""
-CONTACT_GAP = 1.01
-"""Grains up to this distance, in units of the sum of their radii, are summed directly: those in contact are closer."""
-
-
-class Cells(NamedTuple):
-    """The tree: cells by number, and grains in its order."""
-
-    order: np.ndarray  # (N,) uint32: grains in the order of the leaves
-    centre: np.ndarray  # (3, C) [m]
-    size: np.ndarray  # (2, C): half diagonal r, and r plus the largest radius of a grain [m]
-    moment: np.ndarray  # (C, p²) multipole moments
 
 
 class Scratch(NamedTuple):
@@ -87,171 +60,6 @@ class TreeParameters(NamedTuple):
     tables: Tables
     cells: Cells
     scratch: Scratch
-
-
-@loop
-def levels_below(grains):
-    """Level of the leaves: 0 if the root is the only cell."""
-    level, most = 0, LEAF
-    while most < grains.mass.size:
-        most *= 2
-        level += 1
-    return level
-
-
-@loop
-def tree_blocks(grains):
-    """Number of blocks of leaves."""
-    size = grains.mass.size
-    most = 1 if size < PARALLEL_FROM else SOME_BLOCKS if size < LARGE_FROM else MOST_BLOCKS
-    return min(most, 1 << levels_below(grains))
-
-
-@loop
-def first_grain(size, cell, level):
-    """Index in the order of the tree of the first grain of a cell, of `size` grains; cells 2^level − 1 … of a level."""
-    return (size * (cell + 1 - (1 << level))) >> level
-
-
-@loop
-def swap(order, position, i, j):
-    """Exchange two grains of the order, and their positions."""
-    order[i], order[j] = order[j], order[i]
-    for axis in range(3):
-        position[axis, i], position[axis, j] = position[axis, j], position[axis, i]
-
-
-@loop
-def divide(order, position, axis, first, last, middle):
-    """Sort grains first … last − 1 so that those before `middle` have coordinates at most as large as those after it.
-
-    Hoare's selection: the range that contains `middle` is divided at the median of three coordinates until it is short.
-    """
-    low, high = first, last - 1
-    while high > low:
-        a, b, c = position[axis, low], position[axis, (low + high) // 2], position[axis, high]
-        pivot = max(min(a, b), min(max(a, b), c))
-        i, j = low, high
-        while i <= j:
-            while position[axis, i] < pivot:
-                i += 1
-            while position[axis, j] > pivot:
-                j -= 1
-            if i <= j:
-                swap(order, position, i, j)
-                i += 1
-                j -= 1
-        if middle <= j:
-            high = j
-        elif middle >= i:
-            low = i
-        else:
-            break
-
-
-@loop
-def build_cells(grains, cells, position):
-    """Divide the grains into cells; `position` (3, V) gets their positions in the order of the leaves."""
-    size, levels = grains.mass.size, levels_below(grains)
-    for s in range(size):
-        cells.order[s] = s
-        put(position, s, load(grains.position, s))
-    for level in range(levels + 1):
-        for cell in range((1 << level) - 1, (1 << (level + 1)) - 1):
-            first, last = first_grain(size, cell, level), first_grain(size, cell + 1, level)
-            low = high = load(position, first)
-            largest = 0.0
-            for s in range(first, last):
-                x = load(position, s)
-                low = (min(low[0], x[0]), min(low[1], x[1]), min(low[2], x[2]))
-                high = (max(high[0], x[0]), max(high[1], x[1]), max(high[2], x[2]))
-                largest = max(largest, grains.radius[cells.order[s]])
-            side = sub(high, low)
-            half = 0.5 * math.sqrt(dot(side, side))
-            put(cells.centre, cell, scale(0.5, add(low, high)))
-            cells.size[0, cell], cells.size[1, cell] = half, half + CONTACT_GAP * largest
-            if level < levels:
-                axis = 0 if side[0] >= side[1] and side[0] >= side[2] else 1 if side[1] >= side[2] else 2
-                divide(cells.order, position, axis, first, last, first_grain(size, 2 * cell + 2, level + 1))
-
-
-@loop
-def clear(values):
-    """Set all entries to 0."""
-    for c in range(values.shape[0]):
-        for s in range(values.shape[1]):
-            values[c, s] = 0.0
-
-
-@loop
-def set_offset(offset, vector):
-    """Set a vector in lane 0."""
-    offset[0, 0], offset[1, 0], offset[2, 0] = vector
-
-
-@loop
-def harmonics_at(tables, harmonic, row, offset):
-    """h_n of the vectors in `offset` (3, LANES)."""
-    set_harmonics(tables, harmonic, row, tables.inside.size, offset[0], offset[1], offset[2])
-
-
-@loop
-def load_grains(cells, position, moment, cell, start, last, sign, offset, spins):
-    """Vectors from the centre of a cell to LANES grains from `start` on, times `sign`, and their moments; 0 beyond."""
-    centre = load(cells.centre, cell)
-    for s in range(LANES):
-        real = start + s < last
-        i = start + s if real else start
-        x, mu = sub(load(position, i), centre), load(moment, i)
-        for axis in range(3):
-            offset[axis, s] = sign * x[axis]
-            spins[axis, s] = mu[axis] if real else 0.0
-
-
-@loop
-def sum_moments(tables, cells, scratch, position, moment, size, levels):
-    """Multipole moments of all cells, from the leaves to the root."""
-    harmonic, row, total, offset = scratch.derivative[0], scratch.row[0], scratch.sum[0], scratch.distance[0]
-    values, spins = scratch.local[0, 0], scratch.moment[0]
-    for up in range(levels + 1):
-        level = levels - up
-        for cell in range((1 << level) - 1, (1 << (level + 1)) - 1):
-            for c in range(values.size):
-                values[c] = 0.0
-            if level == levels:
-                clear(total)
-                first, last = first_grain(size, cell, level), first_grain(size, cell + 1, level)
-                for start in range(first, last, LANES):
-                    load_grains(cells, position, moment, cell, start, last, -1.0, offset, spins)
-                    harmonics_at(tables, harmonic, row, offset)
-                    add_moments(tables, harmonic, spins, total)
-                for c in range(values.size):
-                    for s in range(LANES):
-                        values[c] += total[c, s]
-            else:
-                for half in range(2 * cell + 1, 2 * cell + 3):
-                    set_offset(offset, sub(load(cells.centre, cell), load(cells.centre, half)))
-                    harmonics_at(tables, harmonic, row, offset)
-                    add_shifted_moments(tables, harmonic, cells.moment[half], values)
-            fold(tables, values)
-            for c in range(cells.moment.shape[1]):
-                cells.moment[cell, c] = values[c]
-
-
-@loop
-def add_batch(tables, cells, scratch, b, cell, number):
-    """Add the expansions of the first `number` cells of the batch to the sums."""
-    for s in range(LANES):
-        source = scratch.batch[b, s]
-        apart = sub(load(cells.centre, cell), load(cells.centre, source))
-        part = 1.0 if s < number else 0.0
-        scratch.distance[b, 0, s] = apart[0] if s < number else 1.0
-        scratch.distance[b, 1, s], scratch.distance[b, 2, s] = part * apart[1], part * apart[2]
-        for c in range(cells.moment.shape[1]):
-            scratch.moment[b, c, s] = part * cells.moment[source, c]
-    distance = scratch.distance[b]
-    set_derivatives(tables, scratch.derivative[b], scratch.row[b], distance[0], distance[1], distance[2])
-    add_expansions(tables, scratch.derivative[b], scratch.moment[b], scratch.sum[b])
 
 
 @loop
@@ -320,29 +128,6 @@ def visit(parameters, b, cell, level, levels):
         add_shifted_expansion(tables, scratch.derivative[b], scratch.local[b, level - 1], local)
     complete(tables, local)
     return passed
-
-
-@loop
-def add_far(tables, cells, scratch, position, moment, b, cell, level, first, last, k):
-    """Loads of the grains of a leaf by its local expansion: B = −∇φ, F = (μ·∇) B; sets `load`."""
-    offset, spins, derivative = scratch.distance[b], scratch.moment[b], scratch.sum[b]
-    for start in range(first, last, LANES):
-        load_grains(cells, position, moment, cell, start, last, 1.0, offset, spins)
-        harmonics_at(tables, scratch.derivative[b], scratch.row[b], offset)
-        for c in range(9):
-            for s in range(LANES):
-                derivative[c, s] = 0.0
-        add_derivatives(tables, scratch.derivative[b], scratch.local[b, level], derivative)
-        for s in range(LANES):
-            i = start - first + s
-            xx, xy, yy = derivative[4, s], derivative[5, s], derivative[6, s]
-            xz, yz = derivative[7, s], derivative[8, s]
-            x, y, z = spins[0, s], spins[1, s], spins[2, s]
-            scratch.load[b, 0, i] = -k * (x * xx + y * xy + z * xz)
-            scratch.load[b, 1, i] = -k * (x * xy + y * yy + z * yz)
-            scratch.load[b, 2, i] = -k * (x * xz + y * yz - z * (xx + yy))
-            for axis in range(3):
-                scratch.load[b, 3 + axis, i] = -k * derivative[1 + axis, s]
 
 
 @loop

@@ -1,0 +1,70 @@
+"""Mechanics of the contact of a grain with a plane wall: the limit r2 → ∞ of the contact of two grains (`mechanics`).
+
+R = r1 and n2 = n, the normal of the wall towards the grains.  The contact pointer of the wall becomes a point A, the
+anchor, that is fixed to the wall.  Limits, slip, losses and stored energies are those of `mechanics`.
+"""
+
+import math
+from typing import NamedTuple
+
+from ..compiler.jit import formula
+from ..numerics.vec import across, add, axpy, cross, dot, scale, sub
+from .mechanics import Displacements
+
+
+class WallPose(NamedTuple):
+    """Position and orientation of a grain in contact with a wall."""
+
+    n: tuple  # normal of the wall, from the wall to the grain
+    height: float  # distance of the centre of the grain from the plane [m]
+    offset: tuple  # part of x − A along the plane [m]
+    n1: tuple  # contact pointer of the grain, laboratory frame
+    twist: float  # φ [rad]
+
+
+@formula
+def wall_displacements(pose, radius):
+    """Displacements: δ = r1 − h, ζ = (x − A)_∥ + r1 (n1)_∥, the vector r1 (n1 + n) of rolling, φ.
+
+    From `tangential.sliding` with x2 = x1 − D n and A = x2 + r2 n2: ζ = (r1 n1 − r2 n2)_∥ = r1 (n1)_∥ − (A − x1)_∥.
+    """
+    slide = axpy(radius, across(pose.n1, pose.n), pose.offset)
+    return Displacements(radius - pose.height, slide, scale(radius, add(pose.n1, pose.n)), pose.twist)
+
+
+@formula
+def wall_load(pose, slide, normal, radius, constants):
+    """Force on the grain [N], its opposite on the wall, and torque on the grain [N m].
+
+        F = F_n n − k_s ζ
+        M = −r1 k_s n1×ζ − r1² k_r n1×n − k_t φ n
+
+    The limit of `mechanics.contact_load`, where (d·n)/D → −1.
+
+    Parameters
+    ----------
+    pose : WallPose
+        The pose.
+    slide : tuple
+        ζ [m].
+    normal : float
+        Normal force F_n [N] of the contact law, positive in compression.
+    radius : float
+        r1 [m].
+    constants : ContactConstants
+        Constants with the present stiffnesses.
+    """
+    force = axpy(normal, pose.n, scale(-constants.slide_stiffness, slide))
+    roll = scale(radius * radius * constants.roll_stiffness, cross(pose.n1, pose.n))
+    torque = axpy(constants.twist_stiffness * pose.twist, pose.n, roll)
+    return force, sub(scale(-radius * constants.slide_stiffness, cross(pose.n1, slide)), torque)
+
+
+@formula
+def wall_pointers(slide, roll, n, radius):
+    """Contact pointer n1 and (x − A)_∥ with the given displacements ζ and ξ, both along the plane.
+
+    The limit of `tangential.pointers_for`: t1 = ξ/r1, n1 = −n √(1 − t1²) + t1, (x − A)_∥ = ζ − ξ.
+    """
+    t1 = scale(1.0 / radius, roll)
+    return axpy(-math.sqrt(max(1.0 - dot(t1, t1), 0.0)), n, t1), sub(slide, roll)

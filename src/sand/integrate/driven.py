@@ -1,0 +1,99 @@
+"""Grains whose velocity and spin are prescribed.
+
+Their loads are computed as those of all grains, but in the parts of a step that change velocities they have another
+mass and moment of inertia: infinite in kicks, which then change nothing, and so large in contact events that impulses
+between two grains act with the reduced mass of the other one.  The work of the drive is minus that of the loads on
+driven grains, ½ Δt (F·v + M·ω) with the loads at either end of a step, and minus J·v for an impulse J.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.jit import loop
+from ..compiler.stage import stage
+from ..numerics.vec import add, dot, load, put, sub
+from ..state.state import OUTSIDE
+from .parts import DT
+
+HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)
+"""What the stage does: masses before and after kicks, and around contact events; velocities and spins after drag."""
+HEAVY = 2.0**30
+"""Factor of masses in contact events, whose impulses are read from the remaining changes of velocity."""
+
+
+class DrivenArrays(NamedTuple):
+    """Driven grains."""
+
+    grain: np.ndarray  # (K,) int64, indices
+    velocity: np.ndarray  # (3, K) [m/s]
+    spin: np.ndarray  # (3, K) [rad/s]
+    mass: np.ndarray  # (K,) [kg], as of other grains
+    inertia: np.ndarray  # (K,) [kg m²]
+
+
+@loop
+def set_masses(grains, driven, factor):
+    """Set masses and moments of inertia of driven grains to a multiple of theirs."""
+    for k in range(driven.grain.size):
+        grains.mass[driven.grain[k]] = factor * driven.mass[k]
+        grains.inertia[driven.grain[k]] = factor * driven.inertia[k]
+
+
+@loop
+def work_of_loads(grains, driven):
+    """Power F·v + M·ω [W] of the loads on driven grains."""
+    power = 0.0
+    for k in range(driven.grain.size):
+        i = driven.grain[k]
+        power += dot(load(grains.force, i), load(driven.velocity, k))
+        power += dot(load(grains.torque, i), load(driven.spin, k))
+    return power
+
+
+@loop
+def restore_velocities(grains, driven):
+    """Set velocities and spins to the prescribed ones; returns the work [J] of the impulses that changed them.
+
+    m Δv·v + I Δω·ω, which leaves out the energy m Δv²/2 of a finite mass.
+    """
+    work = 0.0
+    for k in range(driven.grain.size):
+        i, v, w = driven.grain[k], load(driven.velocity, k), load(driven.spin, k)
+        work += grains.mass[i] * dot(sub(load(grains.velocity, i), v), v)
+        work += grains.inertia[i] * dot(sub(load(grains.spin, i), w), w)
+        put(grains.velocity, i, v)
+        put(grains.spin, i, w)
+    return work
+
+
+@loop
+def kinetic_energy(grains, driven):
+    """Kinetic energy [J] of the driven grains beyond that of the prescribed motion."""
+    energy = 0.0
+    for k in range(driven.grain.size):
+        i, v, w = driven.grain[k], load(driven.velocity, k), load(driven.spin, k)
+        present, spin = load(grains.velocity, i), load(grains.spin, i)
+        energy += 0.5 * grains.mass[i] * dot(sub(present, v), add(present, v))
+        energy += 0.5 * grains.inertia[i] * dot(sub(spin, w), add(spin, w))
+    return energy
+
+
+@stage("the drive of grains")
+def drive(grains, lost, scratch, parameters, block):
+    """Hold or release the driven grains (`parameters`, DrivenArrays), and log the work of the drive."""
+    if block == HOLD:
+        set_masses(grains, parameters, math.inf)
+    elif block == RELEASE:
+        set_masses(grains, parameters, 1.0)
+        lost[OUTSIDE] += 0.5 * scratch[DT] * work_of_loads(grains, parameters)
+    elif block == HOLD_IN_EVENTS:
+        set_masses(grains, parameters, HEAVY)
+    elif block == RELEASE_FROM_EVENTS:
+        lost[OUTSIDE] += restore_velocities(grains, parameters)
+        set_masses(grains, parameters, 1.0)
+    else:  # RESET, after drag and random kicks
+        lost[OUTSIDE] += kinetic_energy(grains, parameters)
+        restore_velocities(grains, parameters)
+    return 0

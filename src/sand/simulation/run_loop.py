@@ -1,0 +1,129 @@
+"""The loop of a run: steps of the engine between outputs, updaters, checks of the condition, and signals."""
+
+from __future__ import annotations
+
+import math
+import time as wall
+from typing import Any
+
+from ..integrate.parts import Stop
+from .cadence import Cadence, Schedule, read_cadence
+from .condition import EVERY, Condition, OwnCondition
+from .ledger import COUNTED, count_row
+from .observers import call_ticks
+from .outcome import OUTCOME_OF_STOP, Outcome
+from .pace import RunTimeEstimate
+from .signals import Signals
+from .stop import StopCriteria
+from .updater import UpdateSchedule
+
+Simulation = Any
+"""`sand.Simulation`, which imports this module."""
+RETURN_EVERY = 0.1
+"""Approximate wall time [s] between two returns of the compiled driver to Python, for signals and output."""
+ENERGY_CHECK_EVERY = 10_000
+"""Steps between two checks of the energy error."""
+
+
+def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -> Outcome:
+    """Take steps, write output and check the condition, call updaters, until a criterion is met or a signal arrives."""
+    end, last, condition = criteria
+    simulation._stopped_by = ""
+    if condition is not None and simulation._met == (key_of(condition), simulation.steps):
+        return Outcome.CONDITION_MET
+    frames, rows, saves = _schedules(simulation)
+    checks = Schedule(None if condition is None else Cadence("steps", EVERY), simulation.time, simulation.steps)
+    updates = UpdateSchedule(simulation)
+    if condition is not None and simulation.steps == 0.0 == simulation.time and _is_met(simulation, condition):
+        return Outcome.CONDITION_MET
+    steps_per_call, checked_at, estimate = 64, simulation.steps, RunTimeEstimate(end, last, simulation._warn)
+    while True:
+        logged = [row["time"] for row in simulation.ledger.rows[-1:]]
+        began = wall.monotonic()
+        step = min(last, *(each.step_due for each in (frames, rows, saves, checks, updates)))
+        most_steps = max(
+            min(steps_per_call, step - simulation.steps, checked_at + ENERGY_CHECK_EVERY - simulation.steps), 0
+        )
+        shown = rows.next(frames.next(end))
+        goal, most_steps = updates.limit(saves.next(shown), most_steps)
+        stop = simulation._engine.advance(goal, most_steps)
+        while stop is Stop.NONE and simulation.time < max(logged, default=0.0):  # an event ended the step before it
+            stop = simulation._engine.advance(goal, 1)
+        simulation._warn_of_engine()
+        unsound = simulation.steps - checked_at >= ENERGY_CHECK_EVERY and not simulation.is_sound
+        if simulation.steps - checked_at >= ENERGY_CHECK_EVERY:
+            checked_at = simulation.steps
+        reached = simulation.time
+        if stop is Stop.TIME_REACHED and simulation.steps < step:  # before the first step that would pass this time
+            if goal == shown:
+                stop = simulation._engine.go_to(goal, min(step, simulation.steps + 1) if updates.is_near else step)
+            else:
+                stop = Stop.NONE
+                updates.approach(goal)
+            reached = simulation.time if stop is Stop.NONE and goal == shown else goal
+        seconds = wall.monotonic() - began
+        if most_steps == steps_per_call:
+            growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)
+            steps_per_call = max(64, min(int(steps_per_call * growth), 10**7))
+        if stop in OUTCOME_OF_STOP:
+            return OUTCOME_OF_STOP[stop]
+        if unsound:
+            return Outcome.RUNAWAY
+        simulation._stopped_by = updates.act()
+        estimate.update(simulation.time, simulation.steps, seconds)
+        done = simulation.time >= end or simulation.steps >= last
+        met = bool(simulation._stopped_by)
+        if condition is not None and checks.is_due(simulation.time, simulation.steps):
+            checks.advance(simulation.time, simulation.steps)
+            met = _is_met(simulation, condition) or met
+        with_frame = done or met or frames.is_due(simulation.time, simulation.steps)
+        output = with_frame or rows.is_due(simulation.time, simulation.steps)
+        if output:
+            simulation._record_output(with_frame)
+            rows.advance(simulation.time, simulation.steps)
+        if with_frame:
+            frames.advance(simulation.time, simulation.steps)
+        if done or met:
+            ended = Outcome.CONDITION_MET if met else Outcome.FINISHED
+            return ended if simulation.is_sound else Outcome.RUNAWAY
+        due = saves.is_due(reached, simulation.steps)
+        if due:
+            saves.advance(reached, simulation.steps)
+        if simulation.writer:
+            simulation.writer.tick(simulation, output, due)
+        call_ticks(simulation.observers, simulation)
+        if signals.received:
+            return Outcome.INTERRUPTED
+
+
+def _schedules(simulation: Simulation) -> list[Schedule]:
+    """Schedules of frames, rows of the ledger and checkpoints, which continue those of earlier runs."""
+    last = {"frame_every": simulation._frame_times, "row_every": [row["time"] for row in simulation.ledger.rows[-1:]]}
+    return [
+        Schedule(
+            None if setting is None else read_cadence(setting, name, wall=True),
+            simulation.time,
+            simulation.steps,
+            max(last.get(name, [])[-1:], default=-math.inf),
+        )
+        for name in ("frame_every", "row_every", "checkpoint_every")
+        for setting in [getattr(simulation, name)]
+    ]
+
+
+def _is_met(simulation: Simulation, condition: Condition | OwnCondition) -> bool:
+    """Whether the present regular state meets a condition."""
+    if isinstance(condition, OwnCondition):
+        holds = condition.holds(simulation)
+    else:
+        holds = condition.holds(
+            count_row(simulation.state) if COUNTED.issuperset(condition.names) else simulation._log_row()
+        )
+    if holds:
+        simulation._met = (key_of(condition), simulation.steps)
+    return holds
+
+
+def key_of(condition: Condition | OwnCondition) -> Any:
+    """What identifies a condition."""
+    return condition.function if isinstance(condition, OwnCondition) else condition.text

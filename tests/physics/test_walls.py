@@ -1,0 +1,309 @@
+"""Walls: the limit of a huge sphere, energy, momentum, pull-off, approach, restarts, bits."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand.simulation.outcome import Outcome
+from sand.state.state import WALL_CONTACTS
+
+from .setups import rest_distance
+from .test_reproducibility import state
+
+R = 5e-7
+FLOOR = sand.Wall([0, 0, 0], [0, 0, 1], "silica")
+SPINNING = {"velocity": [0.0004, 0.0007, -0.04], "spin": [7e4, -2e5, 3e5]}
+"""Motion that stretches, slides, rolls and twists the contact, and rolls it beyond its limit."""
+
+
+def grain(gap=2.5e-10, **motion):
+    """One grain above the plane z = 0."""
+    return sand.Grains([[0, 0, R + gap]], R, "silica", **{name: [v] for name, v in (SPINNING | motion).items()})
+
+
+def beside_sphere(ratio, **motion):
+    """The same grain above a sphere of `ratio` times its radius and `ratio`³ times its mass."""
+    one, motion = grain(), SPINNING | motion
+    return sand.Grains(
+        [[0, 0, R + 2.5e-10], [0, 0, -ratio * R]],
+        [R, ratio * R],
+        "silica",
+        mass=[one.mass[0], one.mass[0] * ratio**3],
+        velocity=[motion["velocity"], [0, 0, 0]],
+        spin=[motion["spin"], [0, 0, 0]],
+    )
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:grain 1 has a radius")
+@pytest.mark.parametrize("damping", ["none", "critical"])
+def test_limit_of_a_huge_sphere(damping):
+    """A grain that hits, rolls, slides and twists on a wall moves as on a sphere of r2 = 1e4 r1 and 1e5 r1.
+
+    The difference is of first order in r1/r2, so that it falls by a factor of ten (to 5 %), and is below 2e-3 for
+    1e5: the phase of 30 vibrations multiplies r1/r2 by about a hundred.  Energies dissipated agree to 1e-4.
+    """
+    contact, stepping = sand.Contact(damping=damping), sand.Verlet(step=2e-11)
+    wall = sand.Simulation(grain(), [contact], walls=[FLOOR], stepping=stepping)
+    wall.run(until="0.2 us")
+    assert wall.walls[0].contacts == 1 and wall.ledger["lost_rolling"][-1] > 0.0
+    differences = []
+    for ratio in (1e4, 1e5):
+        sphere = sand.Simulation(beside_sphere(ratio), [contact], stepping=stepping)
+        sphere.run(until="0.2 us")
+        found = [(getattr(one.grains, key)[0]) for key in ("velocity", "spin", "torque") for one in (wall, sphere)]
+        differences.append(
+            [np.abs(a - b).max() / np.abs(a).max() for a, b in zip(found[::2], found[1::2], strict=True)]
+        )
+        for name in ("lost_forming", "lost_rolling", *(["lost_damping_rolling"] if damping == "critical" else [])):
+            assert sphere.ledger[name][-1] == pytest.approx(wall.ledger[name][-1], rel=10.0 / ratio, abs=0.0)
+    assert np.max(differences[1]) < 2e-3
+    np.testing.assert_allclose(differences[0], 10.0 * np.array(differences[1]), rtol=0.05)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:grain 1 has a radius")
+@pytest.mark.parametrize("damping", ["none", "critical"])
+def test_a_bounce_as_from_a_huge_sphere(damping):
+    """A fast grain forms and breaks a contact with a wall as with a sphere of 1e5 times its radius, step by step.
+
+    Velocity and spin after the bounce agree to 1e-4, ten times r1/r2.  The impulses of forming and breaking for parts
+    of a step change the velocity by F dt/m, a hundred times more.
+    """
+    fast = {"velocity": [0.01, 0.02, -0.6], "spin": [2e5, 1e5, 3e5]}
+    contact = sand.Contact(damping=damping, **({"damping_ratio": 0.02} if damping == "critical" else {}))
+    ends = []
+    for grains, walls in ((grain(**fast), [FLOOR]), (beside_sphere(1e5, **fast), [])):
+        sim = sand.Simulation(grains, [contact], walls=walls, stepping=sand.Verlet(step=1.5e-10))
+        sim.run(until="60 ns")
+        assert min(sim.ledger["lost_forming"][-1], sim.ledger["lost_breaking"][-1]) > 0.0
+        lost = [sim.ledger[f"lost_{name}"][-1] for name in ("forming", "breaking", "damping_normal")]
+        ends.append([sim.grains.velocity[0], sim.grains.spin[0], lost])
+    for at_wall, at_sphere in zip(*ends, strict=True):
+        assert np.abs(np.subtract(at_wall, at_sphere)).max() <= 1e-4 * np.abs(at_wall).max()
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.parametrize("law", ["jkr", "dmt"])
+@pytest.mark.parametrize("damping", ["none", "critical"])
+@pytest.mark.parametrize(
+    "wall",
+    [FLOOR, sand.Wall([0, 0, 0], [0, 0, 1], "silica", velocity=[0.003, 0.002, 0.02])],
+    ids=["fixed", "moving"],
+)
+def test_ledger_closes_and_momentum_balances(law, damping, wall):
+    """Total energy constant to second order, momentum of the grain plus impulse of the wall constant to rounding.
+
+    Velocity Verlet: the error is at most a few (ω dt)²/24 of the energies of the impact, 1e-3 of all dissipation with
+    100 steps per period.  Work of a wall of constant velocity V: the impulse on the grain times V.
+    """
+    sim = sand.Simulation(grain(), [sand.Contact(law=law, damping=damping)], walls=wall,
+                          stepping=sand.Verlet(steps_per_period=100))  # fmt: skip
+    before = sim.grains.mass[:, None] * sim.grains.velocity
+    sim.run(until="1 us")
+    (found,) = sim.walls
+    # without damping a DMT contact dissipates no energy of the normal motion, and the grain bounces
+    bounces = (law, damping) == ("dmt", "none")
+    assert found.contacts == (0 if bounces else 1) and (sim.ledger["lost_rolling"][-1] > 0.0) != bounces
+    assert sim.ledger.drift < 1e-3
+    change = (sim.grains.mass[:, None] * sim.grains.velocity - before).sum(axis=0)
+    np.testing.assert_allclose(change, -found.impulse, rtol=1e-9, atol=1e-11 * np.abs(found.impulse).max())
+    assert sim.ledger["lost_walls"][-1] == pytest.approx(found.impulse @ wall.velocity, rel=1e-9, abs=1e-40)
+    np.testing.assert_allclose(found.position, np.multiply(wall.velocity, sim.time), rtol=1e-9, atol=0.0)
+    assert sim.ledger["wall1_force_z"][-1] == found.force[2] == -sim.grains.force[0, 2]
+
+
+@pytest.mark.compiled("contacts")
+def test_changing_stiffnesses():
+    """Stiffness "dt97" at a wall: the energy that it creates or destroys is in `lost_stiffness`; drift below 1e-3."""
+    sim = sand.Simulation(grain(), [sand.Contact(stiffness="dt97")], walls=[FLOOR],
+                          stepping=sand.Verlet(steps_per_period=100))  # fmt: skip
+    sim.run(until="1 us")
+    assert sim.ledger["lost_stiffness"][-1] != 0.0 and sim.ledger.drift < 1e-3
+
+
+@pytest.mark.compiled("contacts")
+def test_a_moving_frame():
+    """Wall and grain with a common additional velocity: the same relative motion, to the rounding of x + V t, 1e-5."""
+    V = np.array([0.02, -0.01, 0.03])
+    rest = sand.Simulation(grain(), [sand.Contact()], walls=[FLOOR], stepping=sand.Verlet(step=2e-10))
+    boosted = sand.Wall(FLOOR.point, FLOOR.normal, "silica", velocity=V)
+    moving = sand.Simulation(
+        grain(velocity=V + SPINNING["velocity"]), [sand.Contact()], walls=[boosted], stepping=sand.Verlet(step=2e-10)
+    )
+    for sim in (rest, moving):
+        sim.run(until="0.3 us")
+    np.testing.assert_allclose(moving.grains.velocity - V, rest.grains.velocity, atol=1e-5 * 0.04, rtol=0.0)
+    np.testing.assert_allclose(moving.grains.spin, rest.grains.spin, atol=1e-5 * 3e5, rtol=0.0)
+
+
+@pytest.mark.compiled("contacts")
+def test_pull_off_force_of_a_wall():
+    """A grain between two walls breaks from that of the smaller γ, at F = 3π √(γ1 γ2) r1 (JKR, R = r1).
+
+    The wall moves slowly (v √(k m) is 0.1 % of F) and the row nearest the maximum is within 0.1 % of it.
+    """
+    weak = sand.SILICA.but(name="weak", surface_energy=0.0125)
+    rest = [R + 1e6 * R - rest_distance(sand.SILICA, R, 1e6 * R, m) for m in (sand.SILICA, weak)]
+    z = R - rest[0]
+    walls = [
+        sand.Wall([0, 0, 0], [0, 0, 1], "silica", name="held"),
+        sand.Wall([0, 0, z + R - rest[1]], [0, 0, -1], weak, velocity=[0, 0, 5e-4], name="pulled"),
+    ]
+    one = sand.Grains([[0, 0, z]], R, "silica")
+    sim = sand.Simulation(one, [sand.Contact(damping="critical")], walls=walls, row_every="5 ns")
+    sim.run(until="10 us", stop="wall_contacts == 1")
+    force = 3.0 * math.pi * math.sqrt(0.025 * 0.0125) * R
+    assert [wall.contacts for wall in sim.walls] == [1, 0]
+    assert sim.ledger["held_force_z"].max() == pytest.approx(force, rel=3e-3, abs=0.0)
+    assert -sim.ledger["pulled_force_z"].min() == pytest.approx(force, rel=3e-3, abs=0.0)
+
+
+@pytest.mark.compiled("contacts")
+def test_wall_with_a_mass():
+    """A damped wall pressed on a grain on a fixed wall comes to rest: both contacts carry the force; energy is kept.
+
+    The work of the force, less the kinetic energy of the wall, is −lost_walls; momentum of grain and wall changes by
+    the impulse of the force and of the floor.
+    """
+    press = sand.Wall([0, 0, 2 * R + 3e-10], [0, 0, -1], "silica", mass="5e-15 kg", force="20 nN", name="press")
+    one = sand.Grains([[0, 0, R]], R, "silica")
+    sim = sand.Simulation(one, [sand.Contact(damping="critical", damping_ratio=1.0)], walls=[FLOOR, press])
+    sim.run(until="3 us")
+    floor, lid = sim.walls
+    assert [floor.contacts, lid.contacts] == [1, 1]
+    assert floor.force[2] == pytest.approx(-2e-8, rel=1e-3, abs=0.0) and lid.force[2] == pytest.approx(
+        2e-8, rel=1e-3, abs=0.0
+    )
+    changes = np.abs(sim.ledger["total"] - sim.ledger["total"][0])  # also while the wall moves
+    assert changes.max() < 3e-3 * sim.ledger.dissipated
+    kinetic = 0.5 * 5e-15 * lid.velocity[2] ** 2
+    work = -2e-8 * (lid.position[2] - press.point[2])
+    assert -sim.ledger["lost_walls"][-1] == pytest.approx(work - kinetic, rel=1e-9, abs=0.0)
+    momentum = sim.grains.mass[0] * sim.grains.velocity[0, 2] + 5e-15 * lid.velocity[2]
+    given = -2e-8 * sim.time - floor.impulse[2]
+    assert momentum == pytest.approx(given, abs=1e-9 * 2e-8 * sim.time)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.parametrize("speed", [0.01, 3.0, 300.0])
+def test_a_flying_grain_is_found_when_it_touches(speed):
+    """A grain from 50 radii away touches the wall with less than δ_c/10 of overlap per step: its contact is resolved.
+
+    At 0.01 m/s it sticks; faster ones bounce and fly away with most of their energy (what is lost is lost in forming
+    and breaking), none passes the plane.  The time of formation is that of free flight.
+    """
+    one = grain(gap=50 * R, velocity=[0, 0, -speed], spin=[0, 0, 0])
+    sim = sand.Simulation(one, [sand.Contact()], walls=[FLOOR])
+    result = sim.run(until=51 * R / speed)
+    made = sim.ledger["lost_forming"][-1] != 0.0
+    assert result.outcome is Outcome.FINISHED and made and sim.grains.position[0, 2] > 0.9 * R
+    assert sim.ledger.drift < 1e-3
+    if speed > 1.0:
+        lost = sim.ledger["lost_forming"][-1] + sim.ledger["lost_breaking"][-1]
+        kinetic = 0.5 * sim.grains.mass[0] * (speed**2 - sim.grains.velocity[0, 2] ** 2)
+        assert sim.grains.velocity[0, 2] > 0.0
+        before = 0.5 * sim.grains.mass[0] * speed**2
+        assert kinetic == pytest.approx(lost, rel=0.05, abs=1e-5 * before)
+
+
+def bouncing(order="as given", **options):
+    """Grains that fly between two walls in a box that is periodic along x and y, with a damped contact model."""
+    rng, box = np.random.default_rng(5), sand.Box.periodic("8 um", "8 um", None)
+    position = np.stack(np.meshgrid(*3 * [np.arange(5.0)], indexing="ij"), -1).reshape(-1, 3) * 1.3e-6
+    position -= position.mean(axis=0)
+    grains = sand.Grains(
+        position, R, "silica", velocity=0.3 * rng.normal(size=(125, 3)), spin=1e5 * rng.normal(size=(125, 3))
+    )
+    walls = [
+        sand.Wall([0, 0, -3.2e-6], [0, 0, 1], "silica"),
+        sand.Wall([0, 0, 3.2e-6], [0, 0, -1], "silica", velocity=[0.1, 0, -0.05]),
+    ]
+    contact = sand.Contact(damping="critical", bath_temperature="300 K")
+    neighbours = sand.Neighbours(order=order)
+    return sand.Simulation(grains, [contact], box=box, walls=walls, seed=3, neighbours=neighbours, **options)
+
+
+@pytest.mark.compiled("contacts")
+def test_output_split_and_resume_change_no_bit(tmp_path):
+    """One run, a run with many frames, and one that is stopped, read from its checkpoint and continued."""
+    one, often = bouncing(), bouncing(frame_every="3 ns", row_every="1 ns")
+    first = bouncing(out=tmp_path / "run", frame_every="0.1 us")
+    one.run(until="0.9 us")
+    often.run(until="0.9 us")
+    first.run(until="0.31 us")
+    del first
+    second = sand.resume(tmp_path / "run")
+    second.run(until="0.9 us")
+    assert one.state.count[WALL_CONTACTS] > 16  # more than were allocated at first
+    assert state(one) == state(often) == state(second)
+    assert one.ledger.rows[-1] == second.ledger.rows[-1]
+    stored = sand.open(tmp_path / "run").ledger
+    assert stored["wall2_force_z"][-1] == one.walls[1].force[2] != 0.0
+
+
+@pytest.mark.compiled("contacts")
+def test_order_in_memory_and_threads(monkeypatch):
+    """Sorted arrays change results by rounding only; threads change no bit."""
+    from sand.integrate import task_queue
+    from sand.simulation import engine
+
+    plain, ordered = bouncing(), bouncing(order="curve")
+    for sim in (plain, ordered):
+        sim.run(steps=1000)
+        sim.run(steps=500)  # the user's order is restored between the runs
+    at_walls = [sim.state.wall_contacts.pair[:, : sim.state.count[WALL_CONTACTS]].T for sim in (plain, ordered)]
+    assert sorted(at_walls[0].tolist()) == sorted(at_walls[1].tolist())
+    assert plain.state.count[WALL_CONTACTS] == ordered.state.count[WALL_CONTACTS] > 0
+    np.testing.assert_allclose(ordered.grains.position, plain.grains.position, rtol=0.0, atol=1e-6 * R)
+    for module in (task_queue, engine):
+        monkeypatch.setattr(module, "uses_task_queue", lambda grains: True)
+    ends = []
+    for number in (1, 2):
+        sand.set_threads(number)
+        sim = bouncing()
+        sim.run(steps=1500)
+        ends.append(state(sim))
+    sand.set_threads(None)
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.compiled("contacts")
+def test_change_keeps_walls():
+    """A change between runs keeps walls and their contacts, and an unchanged one changes no energy."""
+    sim = sand.Simulation(grain(), [sand.Contact()], walls=[FLOOR])
+    sim.run(until="0.2 us")
+    with sim.change() as change:
+        change.velocity[0, 0] += 1e-4
+    assert sim.walls[0].contacts == 1 and sim.ledger["wall_contacts"][-1] == 1
+    sim.run(until="0.3 us")
+    assert sim.walls[0].contacts == 1 and sim.ledger.drift < 0.01
+
+
+@pytest.mark.compiled("contacts")
+def test_a_driven_grain_pulls_another_from_a_wall():
+    """The chain wall, grain, driven grain breaks between the grains, F = 3πγR; the work of the drive is booked."""
+    height = R - sand.theory.contact("silica", R, other_radius=1.0).rest_overlap
+    chain = sand.Grains([[0, 0, height], [0, 0, height + rest_distance(sand.SILICA, R, R)]], R, "silica")
+    driven = sand.Driven([1], velocity=[0, 0, "1 mm/s"])
+    sim = sand.Simulation(
+        chain, [sand.Contact(damping="critical")], walls=[FLOOR], driven=driven, row_every="10 ns"
+    )  # fmt: skip
+    sim.run(until="60 us", stop="broken == 1")
+    assert sim.walls[0].contacts == 1
+    force = 3.0 * math.pi * sand.SILICA.surface_energy * R / 2.0
+    assert sim.ledger["wall1_force_z"].max() == pytest.approx(force, rel=0.01, abs=0.0)
+    assert sim.ledger["lost_outside"][-1] < 0.0 and sim.ledger.drift < 1e-3
+
+
+@pytest.mark.compiled("contacts")
+def test_changes_that_walls_refuse():
+    """With walls no grain is removed, and the box stays."""
+    sim = sand.Simulation(grain(), [sand.Contact()], walls=[FLOOR])
+    with pytest.raises(sand.BadInput, match="with walls a change cannot add or remove"), sim.change() as change:
+        change.box = sand.Box.periodic("8 um", "8 um", None)
+    with pytest.raises(sand.BadInput, match="with walls a change cannot add or remove"), sim.change() as change:
+        change.add(sand.Grains([[0, 0, 10 * R]], R, "silica"))
+    assert len(sim.grains) == 1
