@@ -192,6 +192,23 @@ def test_no_pickle_no_network():
     assert not [f"{path.relative_to(TOP)}:{call.lineno}" for path, call in loads if not refuses_pickles(call)]
 
 
+def test_bounds_of_tests_state_their_absolute_part():
+    """Every `approx` states `abs`: the default of pytest, 1e-12, is larger than most SI quantities of grains."""
+    calls = [
+        (path, node)
+        for path in sorted((TOP / "tests").rglob("*.py"))
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "approx"
+    ]
+    silent = [f"{path.relative_to(TOP)}:{call.lineno}" for path, call in calls if "abs" not in named(call)]
+    assert calls and not silent
+
+
+def named(call: ast.Call) -> set[str | None]:
+    """Names of the keyword arguments of a call."""
+    return {word.arg for word in call.keywords}
+
+
 def test_help_imports_no_heavy_package():
     """`import sand` and the command line's parser import neither numba nor NumPy nor similar packages."""
     program = (
