@@ -32,6 +32,8 @@ TEMPERATURE = "100 K"
 SPECIFIC_MOMENT = 200.0
 ROWS = 20
 """Number of times at which a box is measured."""
+LEGEND_ROW = 0.1
+"""Height of a row of a legend, relative to the range of the data."""
 
 
 class Sample(NamedTuple):
@@ -116,6 +118,9 @@ def figure(time: np.ndarray, mean: Sample, error: Sample, expected: np.ndarray):
         panels[2].plot(time * 1e6, expected, color=BLUE, ls=":", label="kinetic theory, without moments")
         panels[2].plot(time * 1e6, 2.0 * expected, color=GREEN, ls=":", label="the same, mixed")
         for axes in panels:
+            low, high = axes.get_ylim()
+            entries = len(axes.get_legend_handles_labels()[0])
+            axes.set_ylim(low, high + LEGEND_ROW * entries * (high - low))  # space for the legend
             axes.legend(loc="upper left")
     return drawn
 

@@ -94,9 +94,65 @@ simulation.run(until="40 ns", stop="time > 25 ns and contacts >= 3")
 """
 
 
-def changed_run(folder):
-    """A process that runs the script CHANGED, or goes on with it."""
-    return subprocess.Popen([sys.executable, "-c", CHANGED, str(folder)], stderr=subprocess.PIPE)
+OUTPUT = """
+import sys
+from pathlib import Path
+
+import sand
+import sand.simulation.run_writer as writer
+
+writer.CHECKPOINT_EVERY = writer.AT_OUTPUT_EVERY = 0.02
+writer.RunWriter.draw = lambda *_: None
+folder = Path(sys.argv[1])
+iron = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg"}
+options = {"seed": 3, "frame_every": "0.2 ns", "out": folder, "overwrite": True}
+contact = sand.Contact(damping="critical", damping_ratio=0.2, bath_temperature="100 K")
+"""
+
+WALLS = """
+box = sand.Box.periodic("0.2 um", "0.2 um", None)
+grains = sand.setup.gas(40, box, extent="0.3 um", temperature="3000 K", seed=5, **iron)
+walls = [
+    sand.Wall([0, 0, "-0.15 um"], [0, 0, 1], "iron", velocity=["1 m/s", 0, "1 m/s"]),
+    sand.Wall([0, 0, "0.15 um"], [0, 0, -1], "silica", mass="1e-18 kg", force="1e-10 N"),
+]
+fresh = lambda: sand.Simulation(grains, [contact, sand.Dipoles(cutoff="90 nm")], box=box, walls=walls, **options)
+"""
+
+RAMPS = """
+times = ["5 ns", "35 ns"]
+grains = sand.setup.gas(40, "0.3 um", temperature="3000 K", seed=5, **iron)
+weaker = sand.Contact(
+    damping="critical", damping_ratio=sand.Ramp([0.2, 0.4], times), surface_energy_factor=sand.Ramp([1.0, 0.7], times)
+)
+gas = sand.Gas(temperature="100 K", pressure=sand.Ramp(["1 mbar", "1 bar"], times))
+field = sand.Field(sand.Ramp(["10 mT", "0 T"], times))
+fresh = lambda: sand.Simulation(grains, [weaker, sand.Dipoles(), gas, field], box="0.3 um", **options)
+"""
+
+DRIVEN = """
+grains = sand.setup.gas(40, "0.3 um", temperature="3000 K", seed=5, **iron)
+driven = [sand.Driven([3, 5]), sand.Driven([7], velocity=["10 m/s", 0, 0], spin=[0, 1e8, 0])]
+forces = [contact, sand.Dipoles(), sand.Gas(temperature="100 K", pressure="1 mbar")]
+fresh = lambda: sand.Simulation(grains, forces, box="0.3 um", driven=driven, **options)
+"""
+
+ENDING = """
+simulation = sand.resume(folder) if list(folder.glob("checkpoint-*.npz")) else fresh()
+simulation.run(until="40 ns")
+"""
+
+SCRIPTS = {
+    "changes, an updater and a condition": CHANGED,
+    "walls": OUTPUT + WALLS + ENDING,
+    "ramps": OUTPUT + RAMPS + ENDING,
+    "driven grains": OUTPUT + DRIVEN + ENDING,
+}
+
+
+def script_run(script, folder):
+    """A process that runs a script, or goes on with its run."""
+    return subprocess.Popen([sys.executable, "-c", script, str(folder)], stderr=subprocess.PIPE)
 
 
 def sand_command(*words):
@@ -194,33 +250,38 @@ def test_stopped_four_times(undisturbed_run, tmp_path, seed, kind):
     )
 
 
-@pytest.fixture(scope="module")
-def undisturbed_change(tmp_path_factory):
-    """Folder of a run with changes by the script and by an updater, and the number of its rows."""
-    folder = tmp_path_factory.mktemp("changed") / "run"
-    job = changed_run(folder)
+@pytest.fixture(scope="module", params=SCRIPTS)
+def undisturbed_script(request, tmp_path_factory):
+    """Script of a run, the folder of this run without interruptions, and the number of its frames."""
+    script, folder = SCRIPTS[request.param], tmp_path_factory.mktemp("script") / "run"
+    job = script_run(script, folder)
     errors = job.communicate()[1].decode()
     assert job.returncode == 0, errors
     frames = read_frames(folder / "trajectory.gsd")
-    assert len({frame.id.tobytes() for frame in frames}) >= 3 and len(frames[-1].pair) >= 3
-    assert frames[-1].time < 40e-9 and len(frames[-1].materials) == 2
-    return None, folder, len(frames)
+    assert len(frames[-1].pair) >= 3
+    if script is CHANGED:
+        assert len({frame.id.tobytes() for frame in frames}) >= 3
+        assert frames[-1].time < 40e-9 and len(frames[-1].materials) == 2
+    if WALLS in script:
+        assert "wall_contacts" in (folder / "ledger.csv").read_text()
+        arrays, _ = newest_checkpoint(folder)
+        assert arrays["wall_contacts/pair"].shape[1] >= 2
+    return script, folder, len(frames)
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("moment", range(1, 11))
-def test_killed_with_changes_an_updater_and_a_condition(undisturbed_change, tmp_path, moment):
-    """Grains removed and added, a scaled box, a force left out; killed after each eleventh of the rows: same bits."""
+def test_killed_scripts(undisturbed_script, tmp_path, moment):
+    """Walls; ramps; driven grains; changes of everything: killed after each eleventh of the rows, same bits."""
+    script, _, rows = undisturbed_script
     folder, ledger = tmp_path / "run", tmp_path / "run" / "ledger.csv"
-    job = changed_run(folder)
-    while job.poll() is None and not (
-        ledger.exists() and len(ledger.read_text().splitlines()) > undisturbed_change[2] * moment / 11
-    ):
+    job = script_run(script, folder)
+    while job.poll() is None and not (ledger.exists() and len(ledger.read_text().splitlines()) > rows * moment / 11):
         time.sleep(0.002)
     assert job.poll() is None
     job.send_signal(KILL)
     job.communicate()
-    job = changed_run(folder)
+    job = script_run(script, folder)
     errors = job.communicate()[1].decode()
     assert job.returncode == 0, errors
-    assert_same_as_undisturbed(undisturbed_change, folder)
+    assert_same_as_undisturbed(undisturbed_script, folder)

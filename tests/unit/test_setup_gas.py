@@ -1,5 +1,7 @@
 """A gas of grains: thermal velocities, no overlaps, reproducible."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -112,13 +114,34 @@ def test_the_seed_determines_the_grains():
     assert (hot.position == one.position).all()
 
 
+@pytest.mark.parametrize("extent", ["0.3 um", ["periodic", "0.3 um", "periodic"]])
+def test_a_gas_between_walls(extent):
+    """Along an open axis, all grains are inside the extent and fill it: ⟨y²⟩ = h²/3 for centres in −h … h."""
+    box = sand.Box.periodic("0.4 um", None, "0.4 um")
+    grains = sand.setup.gas(150, box, extent=extent, seed=1, **ARGS)
+    reach = np.abs(grains.position[:, 1]) + grains.radius
+    assert reach.max() < 0.15e-6 and reach.max() > 0.9 * 0.15e-6
+    middle = 0.15e-6 - 1.1 * grains.radius[0]
+    spread = (grains.position[:, 1] ** 2).mean() / (middle**2 / 3.0)
+    assert abs(spread - 1.0) < 5.0 * math.sqrt(0.8 / 150)  # variance of y²/⟨y²⟩ is 9/5 − 1
+    pairs = box.close_pairs(grains.position, 2.0 * grains.radius[0])
+    assert len(pairs) == 0
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"number": 0}, "number = 0"),
         ({"number": 60, "box": "80 nm"}, "the box is too full"),
         ({"box": "40 nm"}, "too small"),
-        ({"box": None}, "periodic on all three axes"),
+        ({"box": None}, "open along x, y, z; use another box, or give extent"),
+        ({"box": ["1 um", None, "1 um"], "extent": ["1 um", "1 um", "periodic"]}, "periodic along x; give extent"),
+        ({"box": ["1 um", None, None], "extent": ["periodic", "1 um", "periodic"]}, "open along z"),
+        ({"box": None, "extent": "1 s"}, "extent along x"),
+        ({"box": None, "extent": "-1 m"}, "extent along x"),
+        ({"box": None, "extent": ["1 um", "1 um"]}, "must be one length, or three"),
+        ({"extent": "1 um"}, "periodic along x, y, z; give extent along open axes only"),
+        ({"box": None, "extent": "40 nm"}, "too small"),
         ({"spins": "kt"}, "spins = 'kt'"),
         ({"temperature": "-3 K"}, "at least 0 K"),
         ({"seed": -1}, "seed = -1"),

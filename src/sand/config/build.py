@@ -83,7 +83,10 @@ def _refuse_own_source(source: Path, out: Path) -> None:
 
 def _of_gas(case: Case) -> Start:
     section = case.grains
-    given = {name: getattr(section, name) for name in ("radius", "material", "moment", "charge", "classes", *THERMAL)}
+    given = {
+        name: getattr(section, name)
+        for name in ("radius", "material", "moment", "charge", "classes", "extent", *THERMAL)
+    }
     try:
         return gas_with_contacts(
             section.number, case.box.periodic, seed=case.run.seed, materials=case.materials_by_name(), **given

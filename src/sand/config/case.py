@@ -143,6 +143,9 @@ class GrainsSection(Section):
     """Whether velocities and spins are scaled to exactly this temperature; otherwise they are random draws."""
     classes: list[GrainClass] = Field(default_factory=list)
     """Classes of grains and aggregates, each a table [[grains.classes]]; see below."""
+    extent: Any = None
+    """Length of the gas along open axes of the box [m]: one, or three with "periodic" along periodic axes; the gas is
+    centred on the origin, and its members are wholly inside."""
     file: PathName | None = None
     """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
@@ -187,8 +190,8 @@ THERMAL = ("temperature", "spins", "exact_temperature")
 """Keys of velocities and spins, which a file gives itself."""
 GRAINS_KEYS: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
     "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame", "length")),
-    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "classes", *THERMAL)),
-    "given": ({"number": "125"}, ("file", "frame", "length", "classes")),
+    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "classes", "extent", *THERMAL)),
+    "given": ({"number": "125"}, ("file", "frame", "length", "classes", "extent")),
 }
 """By kind: required keys, each with an example, and keys that do not apply."""
 

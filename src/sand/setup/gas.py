@@ -13,7 +13,7 @@ import numpy as np
 from ..arguments import MOST_GRAINS, checked
 from ..box import Box, Span, as_box
 from ..constants import BOLTZMANN, LIGHT
-from ..errors import BadInput, ErrorCollector, did_you_mean, warn
+from ..errors import BadInput, ErrorCollector, did_you_mean, shown, warn
 from ..grains import Grains
 from ..material import PRESETS, Material
 from ..units import MELTED, format_quantity, in_unit, seed_given, si, whole_number
@@ -51,6 +51,7 @@ def gas(
     spins: str = "kT/2",
     exact_temperature: bool = True,
     classes: Sequence[Any] = (),
+    extent: Any = None,
     seed: int = 0,
 ) -> Grains:
     """Thermal gas of grains, or of grains and aggregates, at random positions without overlaps, with random moments.
@@ -59,8 +60,8 @@ def gas(
     ----------
     number : int or None
         Number of members N ≥ 1: grains, and with `classes` also aggregates. None if each class has a number.
-    box : Box or float or str
-        Box periodic along all axes, or the length of a cubic one.
+    box : Box or float or str or None
+        Box, or the length of a cubic one; None is open space. `extent` is the length of the gas along open axes.
     radius : float or str or array_like or Lognormal or PowerLaw
         One radius or (N,) [m], or a distribution: `Lognormal`, `PowerLaw`, or text as for `bpca`.
     material : Material or str or sequence or mapping
@@ -85,6 +86,10 @@ def gas(
     classes : sequence of GrainClass or dict, optional
         Classes of members, with the keys of `GrainClass`; keys that a class lacks are the arguments above. Grains have
         the order of the classes.
+    extent : float or str or sequence, optional
+        Length [m] of the region that the gas fills, centred on the origin, along each open axis of the box: one length,
+        or three with "periodic" along periodic axes. Members are wholly inside it, as between walls at its
+        ends.
     seed : int, optional
         Seed of the random numbers. Positions, velocities, spins, moments and each class use separate streams.
 
@@ -100,7 +105,8 @@ def gas(
     that encloses it.
     """
     given = {"radius": radius, "material": material, "moment": moment, "charge": charge, "temperature": temperature}
-    given |= {"spins": spins, "exact_temperature": exact_temperature, "classes": classes, "seed": seed}
+    given |= {"spins": spins, "exact_temperature": exact_temperature, "classes": classes}
+    given |= {"extent": extent, "seed": seed}
     start = gas_with_contacts(number, box, **given)
     if start.contacts is not None:
         raise BadInput(
@@ -123,6 +129,7 @@ def gas_with_contacts(
     spins: str = "kT/2",
     exact_temperature: bool = True,
     classes: Sequence[Any] = (),
+    extent: Any = None,
     seed: int = 0,
     materials: Mapping[str, Material] = PRESETS,
 ) -> Start:
@@ -130,7 +137,7 @@ def gas_with_contacts(
 
     Parameters
     ----------
-    number, box, radius, material, moment, charge, temperature, spins, exact_temperature, classes, seed
+    number, box, radius, material, moment, charge, temperature, spins, exact_temperature, classes, extent, seed
         As for `gas`.
     materials : mapping of str to Material, optional
         Materials by name; by default the presets.
@@ -146,8 +153,7 @@ def gas_with_contacts(
         If an argument is invalid, or the box is too full for random positions.
     """
     space = as_box(box)
-    if any(v is None for v in space.lengths):
-        raise BadInput("a gas needs a box that is periodic on all three axes")
+    region = _region(space, extent)
     if spins not in SPINS:
         raise BadInput(f"spins = {spins!r}; {did_you_mean(spins, list(SPINS))}")
     if number is not None or not classes:
@@ -156,10 +162,10 @@ def gas_with_contacts(
     streams = np.random.SeedSequence(seed_given(seed)).spawn(4 + max(1, len(classes)))
     places, speeds, turns, axes = (np.random.default_rng(stream) for stream in streams[:4])
     defaults = {"radius": radius, "material": material, "moment": moment, "charge": charge}
-    members = _members(number, space, classes, defaults, streams[4:], materials)
+    members = _members(number, region, classes, defaults, streams[4:], materials)
     grains, of, count = members.grains, members.member, len(members.reach)
     _refuse_hot(grains, kelvin)
-    centre = scatter(members.reach, space, places)
+    centre = scatter(members.reach, region, space, places)
     rigid = rigid_bodies(grains, of, count)
     mass = rigid.mass[:, None]
     velocity = speeds.normal(size=(count, 3)) * np.sqrt(BOLTZMANN * kelvin / mass)
@@ -181,9 +187,34 @@ def gas_with_contacts(
     return Start(grains, members.contacts, space, "")
 
 
+def _region(box: Box, extent: Any) -> Box:
+    """Region that a gas fills: the box, with `extent` along its open axes.  Raises BadInput."""
+    if isinstance(extent, (list, tuple)) or np.ndim(extent) == 1:
+        given = [None if own == "periodic" else own for own in extent]
+    else:
+        given = [extent if length is None else None for length in box.lengths]
+    if len(given) != 3:
+        raise BadInput(f"extent = {shown(extent)} must be one length, or three, 'periodic' along periodic axes")
+    missing = [a for a, length, own in zip("xyz", box.lengths, given, strict=True) if length is None and own is None]
+    if missing:
+        raise BadInput(
+            f"a gas needs a box that is periodic on all three axes, and this one is open along {', '.join(missing)}; "
+            "use another box, or give extent, the length of the gas along open axes, such as '1 um'"
+        )
+    periodic = [a for a, length, own in zip("xyz", box.lengths, given, strict=True) if None not in (length, own)]
+    if periodic or (extent is not None and None not in box.lengths):
+        along = ", ".join(periodic or "xyz")
+        raise BadInput(f"extent: the box is periodic along {along}; give extent along open axes only")
+    lengths = [
+        si(own, "m", f"extent along {axis}", above=0.0) if length is None else length
+        for axis, length, own in zip("xyz", box.lengths, given, strict=True)
+    ]
+    return Box(tuple(lengths))  # type: ignore[arg-type]
+
+
 def _members(
     number: int | None,
-    space: Box,
+    region: Box,
     classes: Sequence[Any],
     defaults: Mapping[str, Any],
     streams: Sequence[np.random.SeedSequence],
@@ -195,7 +226,7 @@ def _members(
             raise BadInput(f"gas: {name} is missing; add {name}=…" for name in missing)
         size = in_unit(defaults["radius"], "m")
         if number is not None and number > MANY and size is not None and np.ndim(size) == 0:
-            _refuse_full(np.full(1, size), number, space)  # before arrays of this length are allocated
+            _refuse_full(np.full(1, size), number, region)  # before arrays of this length are allocated
         return members_of(GrainClass(number=number, **defaults), number or 0, streams[0], materials)
     errors, groups = ErrorCollector(), []
     found = [errors.take(class_from, one, defaults, f"classes.{k}") for k, one in enumerate(classes)]
@@ -274,22 +305,25 @@ def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
         )
 
 
-def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarray:
-    """Random centres (N, 3) [m] in a periodic box, placed in order of decreasing radius with gaps of `CLEARANCE`.
+def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator) -> np.ndarray:
+    """Random centres (N, 3) [m] in a region, placed in order of decreasing radius with gaps of `CLEARANCE`.
+
+    Spheres are wholly inside the region along open axes of the box, where its surfaces count as those of spheres.
 
     Raises
     ------
     BadInput
         If no position was found for a grain in `TRIES` attempts.
     """
-    lengths = np.array(box.lengths, dtype=np.float64)
+    lengths = np.array(region.lengths, dtype=np.float64)
+    is_open = [v is None for v in box.lengths]
     gap = CLEARANCE * float(radius.mean())
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
         raise BadInput(
             f"a box of {format_quantity(lengths.min(), 'm')} is too small for grains of radius "
             f"{format_quantity(radius.max(), 'm')}; use one of at least 3 diameters"
         )
-    _refuse_full(radius, len(radius), box)
+    _refuse_full(radius, len(radius), region)
     # cells wider than the interaction range, so that only the 27 cells around a position are searched
     sides = np.floor(lengths / (2.0 * radius.max() + gap)).astype(int).tolist()
     near: dict[tuple[int, ...], list[tuple[float, ...]]] = {}  # spheres in and around each cell
@@ -297,8 +331,10 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
     start, warned = wall.monotonic(), False
     for n, i in enumerate(np.argsort(-radius, kind="stable").tolist()):
         own = float(radius[i])
+        most = [0.5 * v - own - gap if opened else math.inf for v, opened in zip(lengths, is_open, strict=True)]
         for position, cell in itertools.islice(attempts, TRIES):
-            if _is_free(position, own, gap, near.get(cell, ()), box.span):
+            inside = all(abs(x) <= end for x, end in zip(position, most, strict=True))
+            if inside and _is_free(position, own, gap, near.get(cell, ()), box.span):
                 placed[i] = position
                 around = itertools.product(
                     *({(c + k) % m for k in (-1, 0, 1)} for c, m in zip(cell, sides, strict=True))
