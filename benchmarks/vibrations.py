@@ -19,8 +19,9 @@ import numpy as np
 import sand
 from sand.analysis.clusters import cluster_labels
 from sand.constants import BOLTZMANN
-from sand.contact.law import contact_constants, ringing_energy
+from sand.contact.law import contact_constants
 from sand.io.table import write_table
+from sand.state.state import BROKEN, MADE
 
 TABLE = Path(__file__).parents[1] / "docs" / "physics" / "vibrations.csv"
 BOX, TEMPERATURE, UNTIL = 1.2e-6, 100.0, 5e-6
@@ -89,7 +90,9 @@ def vibrational_energies(grains: sand.Grains, position: np.ndarray, groups: list
         angular = (mass * np.cross(s, u) + inertia[own] * w).sum(axis=0)
         square = (mass * s**2).sum() + inertia[own].sum()
         tensor = square * np.eye(3) - (mass * s).T @ s
-        yield 0.5 * float((mass * u**2).sum() + (inertia[own] * w**2).sum() - angular @ np.linalg.solve(tensor, angular))
+        yield 0.5 * float(
+            (mass * u**2).sum() + (inertia[own] * w**2).sum() - angular @ np.linalg.solve(tensor, angular)
+        )
 
 
 def follow(given: tuple[Variant, int, float]) -> list[tuple[int, int, float, float, float]]:
@@ -120,7 +123,7 @@ def follow(given: tuple[Variant, int, float]) -> list[tuple[int, int, float, flo
         now = sim.grains.position
         here += sim.box.nearest(now - last)
         last = now.copy()
-        count = int(sim.state.count[4] + sim.state.count[5])  # formed and broken
+        count = int(sim.state.count[MADE] + sim.state.count[BROKEN])
         table = sim.contacts if count else None
         if table is None:
             continue
@@ -164,7 +167,7 @@ def awake(rows: list[tuple[int, int, float, float, float]], threshold: int, unti
     return covered / until, of_grains / (100 * until)
 
 
-def measure(seeds: int, until: float = UNTIL, table: Path = TABLE) -> None:
+def write(seeds: int = 4, until: float = UNTIL, table: Path = TABLE) -> Path:
     """Write durations, shares of time and removed energies of all variants, thresholds and sizes."""
     jobs = [(variant, seed, until) for variant in VARIANTS for seed in range(1, seeds + 1)]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
@@ -188,11 +191,5 @@ def measure(seeds: int, until: float = UNTIL, table: Path = TABLE) -> None:
             removed = [math.fsum(row[3] for row in rows if row[0] == k and row[3] > 0.0) / KT for rows in runs]
             line["removed [kT per run]"] = f"{np.mean(removed):.3g}"
             lines.append(line)
-            print(line, flush=True)
     write_table(table, lines)
-
-
-if __name__ == "__main__":
-    import sys
-
-    measure(int(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else UNTIL, Path(sys.argv[3]))
+    return table

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.constants import BOLTZMANN
 from sand.simulation.outcome import Outcome
 from sand.state.state import WALL_CONTACTS
 
@@ -225,6 +226,36 @@ def bouncing(order="as given", **options):
     contact = sand.Contact(damping="critical", bath_temperature="300 K")
     neighbours = sand.Neighbours(order=order)
     return sand.Simulation(grains, [contact], box=box, walls=walls, seed=3, neighbours=neighbours, **options)
+
+
+@pytest.mark.filterwarnings("ignore:contacts of iron")
+@pytest.mark.compiled("contacts")
+def test_a_bath_gives_every_mode_of_grains_on_a_wall_its_share():
+    """⟨U⟩ = ½ kT per degree of freedom: normal 1, sliding 2, rolling 2, twisting 1; no heat flows in the mean.
+
+    60 samples of 400 grains, 0.2 ns apart, count as 24,000 independent ones; the variance of f/2 kT is f/2 (kT)².
+    Four standard errors √(2/(24,000 f)), and (ω dt)²/4 = 1.6 % at 25 steps per period, the change of ⟨U⟩ by velocity
+    Verlet.  The heat is a difference of energies with f degrees of freedom of U and as many of K: variance 2 f/400.
+    """
+    radius, temperature, freedom = 1e-8, 100.0, np.array([1, 2, 2, 1])
+    side = 5e-8 * np.arange(20)
+    position = np.array([(x, y, 0.0) for x in side for y in side])
+    position[:, 2] = radius - sand.theory.contact("iron", 2.0 * radius).rest_overlap  # R = r for a wall, r/2 for a pair
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, bath_temperature=temperature)
+    wall = sand.Wall([0, 0, 0], [0, 0, 1], "iron")
+    sim = sand.Simulation(sand.Grains(position, radius, "iron"), [contact], walls=[wall], seed=5, frame_every="1 s")
+    sim.run(until="1 ns")
+    rest, rows = sim.ledger.rows[0], [sim.ledger.rows[-1]]
+    for _ in range(60):
+        sim.run(until=sim.time + 2e-10)
+        rows.append(sim.ledger.rows[-1])
+    modes, share = ("normal", "sliding", "rolling", "twisting"), 400 * BOLTZMANN * temperature
+    stored = np.array([[row[name] - rest[name] for name in modes] for row in rows[1:]]).mean(axis=0) / share
+    step_error = (2.0 * math.pi / 25) ** 2 / 4
+    assert (np.abs(stored / (freedom / 2) - 1.0) < 4.0 * np.sqrt(2.0 / (24_000 * freedom)) + step_error).all()
+    heat = sum(rows[-1][f"lost_damping_{name}"] - rows[0][f"lost_damping_{name}"] for name in modes) / share
+    assert abs(heat) < 4.0 * math.sqrt(12.0 / 400)
+    assert sim.ledger["wall_contacts"][-1] == 400 and rows[-1]["moved"] == 0
 
 
 @pytest.mark.compiled("contacts")

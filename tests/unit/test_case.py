@@ -278,6 +278,17 @@ def test_velocities_of_a_case_are_scaled_or_drawn(exact):
     assert case.grains.recipe()["exact_temperature"] is exact
 
 
+def test_a_gas_between_walls_of_a_case():
+    """`extent` of [grains] is that of `sand.setup.gas`; the run's folder keeps it; other kinds refuse it."""
+    case = check_case(changed(box__periodic=["400 nm", "400 nm", "open"], grains__extent="0.5 um"), "some.toml")
+    given = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg", "temperature": "300 K", "seed": 4}
+    grains = sand.setup.gas(8, sand.Box.periodic("400 nm", "400 nm", None), extent="0.5 um", **given)
+    assert (simulation_of(case, None).grains.position == grains.position).all()
+    assert case.grains.recipe()["extent"] == "0.5 um"
+    with pytest.raises(sand.BadInput, match="extent is not for kind = 'file'"):
+        check_case(changed(grains={"kind": "file", "file": "a.gsd", "extent": "1 um"}), "some.toml")
+
+
 def test_an_empty_name_of_a_material_is_refused():
     """An empty string is an unknown material, not a missing key."""
     with pytest.raises(sand.BadInput, match=r"grains.material: unknown material ''"):
