@@ -171,7 +171,10 @@ def write(seeds: int = 4, until: float = UNTIL, table: Path = TABLE) -> Path:
     """Write durations, shares of time and removed energies of all variants, thresholds and sizes."""
     jobs = [(variant, seed, until) for variant in VARIANTS for seed in range(1, seeds + 1)]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
-        found = pool.map(follow, jobs, chunksize=1)
+        found = []
+        for (variant, seed, _), rows in zip(jobs, pool.imap(follow, jobs), strict=True):
+            found.append(rows)
+            print(f"{variant}, seed {seed}: {len(rows)} rows", flush=True)  # a job takes about ten minutes
     lines = []
     for v, variant in enumerate(VARIANTS):
         runs = found[v * seeds : (v + 1) * seeds]
