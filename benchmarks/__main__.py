@@ -28,9 +28,7 @@ def main() -> None:
         "--main-job", action="store_true", help="time the main job and write docs/main-job.json, instead"
     )
     parser.add_argument("--settling", action="store_true", help="write docs/physics/settling.csv, instead (a minute)")
-    parser.add_argument(
-        "--vibrations", action="store_true", help="write docs/physics/vibrations.csv, instead (an hour)"
-    )
+    parser.add_argument("--vibrations", action="store_true", help="write docs/physics/vibrations.csv, instead (hours)")
     parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
     parser.add_argument("--compare", metavar="REV", help="this working tree beside another revision, in turns, instead")
     parser.add_argument("--rounds", type=int, default=compare.ROUNDS, help="of --compare, at least 6 (default 7)")

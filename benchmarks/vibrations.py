@@ -47,8 +47,8 @@ VARIANTS = (Variant(0.2, None), Variant(0.2, 5e-9))
 class Cluster:
     """A cluster since its last event."""
 
-    def __init__(self, time: float):
-        self.since = time
+    def __init__(self, time: float, size: int):
+        self.since, self.size = time, size
         self.loud = [time] * len(THRESHOLDS)
         self.calm: list[float | None] = [None] * len(THRESHOLDS)  # time at which it became calm
         self.removed = [0.0] * len(THRESHOLDS)
@@ -110,13 +110,16 @@ def follow(given: tuple[Variant, int, float]) -> list[tuple[int, int, float, flo
     here = sim.grains.position.copy()
     last, events, clusters = here.copy(), -1, dict[bytes, Cluster]()
     groups: list[np.ndarray] = []
+    keys: list[bytes] = []  # members and contacts of each group
     rows: list[tuple[int, int, float, float, float]] = []
 
     def close(key: bytes) -> None:
-        cluster, size = clusters.pop(key), np.frombuffer(key, np.int64).size
+        cluster = clusters.pop(key)
         for k, calm in enumerate(cluster.calm):
             end = sim.time if calm is None else calm
-            rows.append((k, size, end - cluster.since, -1.0 if calm is None else cluster.removed[k], cluster.since))
+            rows.append(
+                (k, cluster.size, end - cluster.since, -1.0 if calm is None else cluster.removed[k], cluster.since)
+            )
 
     while sim.time < until:
         sim.run(steps=SAMPLE_STEPS)
@@ -135,16 +138,19 @@ def follow(given: tuple[Variant, int, float]) -> list[tuple[int, int, float, flo
             labels = cluster_labels(len(grains), pair)
             order = np.argsort(labels, kind="stable")
             groups = [g for g in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1) if len(g) > 1]
-            keys = {g.astype(np.int64).tobytes() for g in groups}
+            bonds = [pair[np.isin(pair[:, 0], g)] for g in groups]
+            keys = [
+                g.tobytes() + np.unique(np.sort(own), axis=0).tobytes() for g, own in zip(groups, bonds, strict=True)
+            ]
             for key in [key for key in clusters if key not in keys]:
                 close(key)
-            for g in groups:
-                if g.astype(np.int64).tobytes() not in clusters:
-                    clusters[g.astype(np.int64).tobytes()] = Cluster(sim.time)
-                    connected(here, sim.box, g, pair[np.isin(pair[:, 0], g)])
+            for key, g, own in zip(keys, groups, bonds, strict=True):
+                if key not in clusters:
+                    clusters[key] = Cluster(sim.time, len(g))
+                    connected(here, sim.box, g, own)
             events = count
-        for own, energy in zip(groups, vibrational_energies(sim.grains, here, groups), strict=True):
-            cluster, wait = clusters[own.astype(np.int64).tobytes()], window(len(own))
+        for key, own, energy in zip(keys, groups, vibrational_energies(sim.grains, here, groups), strict=True):
+            cluster, wait = clusters[key], window(len(own))
             for k, threshold in enumerate(THRESHOLDS):
                 if energy > threshold * smallest:
                     cluster.loud[k] = sim.time
@@ -174,7 +180,7 @@ def write(seeds: int = 4, until: float = UNTIL, table: Path = TABLE) -> Path:
         found = []
         for (variant, seed, _), rows in zip(jobs, pool.imap(follow, jobs), strict=True):
             found.append(rows)
-            print(f"{variant}, seed {seed}: {len(rows)} rows", flush=True)  # a job takes about ten minutes
+            print(f"{variant}, seed {seed}: {len(rows)} rows", flush=True)
     lines = []
     for v, variant in enumerate(VARIANTS):
         runs = found[v * seeds : (v + 1) * seeds]

@@ -235,7 +235,9 @@ def test_a_bath_gives_every_mode_of_grains_on_a_wall_its_share():
 
     60 samples of 400 grains, 0.2 ns apart, count as 24,000 independent ones; the variance of f/2 kT is f/2 (kT)².
     Four standard errors √(2/(24,000 f)), and (ω dt)²/4 = 1.6 % at 25 steps per period, the change of ⟨U⟩ by velocity
-    Verlet.  The heat is a difference of energies with f degrees of freedom of U and as many of K: variance 2 f/400.
+    Verlet.  The heat is a difference of energies with 6 degrees of freedom of U and as many of K: variance 12/400.
+    That of sliding or rolling alone is a random walk: on a wall both dashpots act on the same coordinates and
+    exchange heat.
     """
     radius, temperature, freedom = 1e-8, 100.0, np.array([1, 2, 2, 1])
     side = 5e-8 * np.arange(20)

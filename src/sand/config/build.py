@@ -93,7 +93,9 @@ def _of_gas(case: Case) -> Start:
         )
     except BadInput as error:
         problems = error.problems
-        raise BadInput(f"grains.{line}" if line.startswith("classes") else line for line in problems) from None
+        raise BadInput(
+            f"grains.{line}" if line.startswith(("classes", "extent")) else line for line in problems
+        ) from None
 
 
 def _of_file(case: Case) -> Start:

@@ -88,8 +88,7 @@ def gas(
         the order of the classes.
     extent : float or str or sequence, optional
         Length [m] of the region that the gas fills, centred on the origin, along each open axis of the box: one length,
-        or three with "periodic" along periodic axes. Members are wholly inside it, as between walls at its
-        ends.
+        or three with "periodic" along periodic axes. Members are wholly inside it, as between walls at its ends.
     seed : int, optional
         Seed of the random numbers. Positions, velocities, spins, moments and each class use separate streams.
 
@@ -198,8 +197,8 @@ def _region(box: Box, extent: Any) -> Box:
     missing = [a for a, length, own in zip("xyz", box.lengths, given, strict=True) if length is None and own is None]
     if missing:
         raise BadInput(
-            f"a gas needs a box that is periodic on all three axes, and this one is open along {', '.join(missing)}; "
-            "use another box, or give extent, the length of the gas along open axes, such as '1 um'"
+            f"a gas needs a box that is periodic, or its extent along open axes, and this box is open along "
+            f"{', '.join(missing)}; give extent, such as '1 um'"
         )
     periodic = [a for a, length, own in zip("xyz", box.lengths, given, strict=True) if None not in (length, own)]
     if periodic or (extent is not None and None not in box.lengths):
@@ -308,7 +307,7 @@ def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
 def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator) -> np.ndarray:
     """Random centres (N, 3) [m] in a region, placed in order of decreasing radius with gaps of `CLEARANCE`.
 
-    Spheres are wholly inside the region along open axes of the box, where its surfaces count as those of spheres.
+    Along open axes of the box, spheres are wholly inside the region and keep the gap from its ends.
 
     Raises
     ------
@@ -320,7 +319,7 @@ def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator)
     gap = CLEARANCE * float(radius.mean())
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
         raise BadInput(
-            f"a box of {format_quantity(lengths.min(), 'm')} is too small for grains of radius "
+            f"a box or extent of {format_quantity(lengths.min(), 'm')} is too small for grains of radius "
             f"{format_quantity(radius.max(), 'm')}; use one of at least 3 diameters"
         )
     _refuse_full(radius, len(radius), region)
