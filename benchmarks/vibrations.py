@@ -127,9 +127,9 @@ def follow(given: tuple[Variant, int, float]) -> list[tuple[int, int, float, flo
         here += sim.box.nearest(now - last)
         last = now.copy()
         count = int(sim.state.count[MADE] + sim.state.count[BROKEN])
-        table = sim.contacts if count else None
-        if table is None:
+        if count == 0 or (count == events and all(None not in cluster.calm for cluster in clusters.values())):
             continue
+        table = sim.contacts
         pair, share = table["pair"], np.zeros(len(grains))
         for name in ("slide_share", "roll_share", "twist_share"):
             for side in range(2):

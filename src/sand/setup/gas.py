@@ -318,8 +318,9 @@ def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator)
     is_open = [v is None for v in box.lengths]
     gap = CLEARANCE * float(radius.mean())
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
+        name = "an extent" if is_open[int(lengths.argmin())] else "a box"
         raise BadInput(
-            f"a box or extent of {format_quantity(lengths.min(), 'm')} is too small for grains of radius "
+            f"{name} of {format_quantity(lengths.min(), 'm')} is too small for grains of radius "
             f"{format_quantity(radius.max(), 'm')}; use one of at least 3 diameters"
         )
     _refuse_full(radius, len(radius), region)
