@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from .grains import Grains as Grains
     from .integrate.adaptive import Adaptive as Adaptive
     from .integrate.forest_ruth import ForestRuth as ForestRuth
+    from .integrate.rigid_clusters import RigidClusters as RigidClusters
     from .integrate.verlet import Verlet as Verlet
     from .material import FORSTERITE as FORSTERITE
     from .material import GRAPHITE as GRAPHITE

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 PARTS = (
     # arrays of the state
     *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts"),
-    *("clock", "count", "lost"),
+    *("bodies", "clock", "count", "lost"),
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
     # data of one call of the driver
@@ -43,6 +43,9 @@ class Stop(IntEnum):
     LIST_FULL = 9
     CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
     WALL_CONTACTS_FULL = 11
+    TOUCH_AHEAD = 12  # bodies may touch within the next step: they have to wake
+    AWAKE_STEPS = 13  # awake clusters have to take their contact steps
+    AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep
 
 
 class ContactParameters(NamedTuple):

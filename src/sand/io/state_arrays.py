@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import BadInput
 from ..schema import FIELDS
-from ..state.arrays import SAVED_LONG_RANGE, SAVED_WALLS
+from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
 from ..state.state import (
     CLOCK,
     CONTACTS,
@@ -84,6 +84,13 @@ STORED = {
     "wall_contacts/lost": ArraySpec("f8", ((4, 6), "K"), required=False),
     "wall_contacts/damping": ArraySpec("f8", (12, (0, "K")), required=False),
     "wall_contacts/flag": ArraySpec("u1", ("K",), "any", required=False),
+    **{
+        f"bodies/{name}": ArraySpec("f8", ("N",) if array.ndim == 1 else (len(array), "N"), "no nan", required=False)
+        for name, array in body_arrays(1)._asdict().items()
+        if name in SAVED_BODIES
+    },
+    "bodies/first": ArraySpec("u4", ("N",), "bodies", required=False),
+    "bodies/asleep": ArraySpec("u1", ("N",), "boolean", required=False),
 }
 """All arrays of a checkpoint."""
 NUMBERS = {"steps": int, "time": float, "output_time": float, "wall_seconds": float, "temperature": float}
@@ -208,6 +215,11 @@ def _ascending(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     return "" if (array[1:] > array[:-1]).all() else "does not hold ascending numbers, each once"
 
 
+def _bodies(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+    good = (array <= np.arange(array.size)).all() and (array[array] == array).all()
+    return "" if good else "does not name the first grain of each body"
+
+
 def _starts(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     good = array[0] == 0 and array[-1] == sizes["2C"] and (array[1:] >= array[:-1]).all()
     return "" if good else f"does not grow from 0 to {sizes['2C']}"
@@ -226,6 +238,7 @@ RULES: dict[str, Callable[[np.ndarray, Any], str]] = {
     "order": _order,
     "ascending": _ascending,
     "starts": _starts,
+    "bodies": _bodies,
 }
 """Functions that return what is wrong with the values of an array, or an empty string."""
 

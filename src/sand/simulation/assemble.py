@@ -18,6 +18,7 @@ from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
+from ..forces.pair.ewald_force import EwaldForce
 from ..forces.pair.loops import LongRangeSums, all_blocks
 from ..grains import Grains
 from ..integrate.base import Integrator
@@ -30,6 +31,7 @@ from ..integrate.parts import (
     StepParameters,
 )
 from ..integrate.program import Components
+from ..integrate.rigid_clusters import RigidClusters
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
 from ..material import SILICA
@@ -45,6 +47,7 @@ from ..state.arrays import (
     PACKED_ARRAYS,
     RATE_ARRAYS,
     RESPA_ARRAYS,
+    body_arrays,
     cluster_arrays,
     empty_contact_arrays,
     empty_long_range_arrays,
@@ -58,6 +61,7 @@ from .driven import Driven, check_driven, driven_arrays
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .ramped import RampedForces
+from .rigid_engine import RigidEngine
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
 NEIGHBOURS_PER_GRAIN = 4
@@ -130,6 +134,9 @@ def build_engine(
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     if fresh:  # grains of another simulation may have other identities
         wrapped.arrays.id[...] = np.arange(len(grains))
+    if isinstance(stepping, RigidClusters):
+        check_rigid_clusters(stepping, forces, driven, walls)
+        neighbours = dataclasses.replace(neighbours, order="as given")
     held = driven_arrays(driven, grains)
     if held is not None:
         wrapped.arrays.velocity[:, held.grain], wrapped.arrays.spin[:, held.grain] = held.velocity, held.spin
@@ -173,7 +180,7 @@ def build_engine(
     )
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
-    state = _new_state(wrapped, box, parameters, components, capacity, over_all_pairs=over_all_pairs)
+    state = new_state(wrapped, box, parameters, components, capacity, over_all_pairs=over_all_pairs)
     place_walls(state, walls, components.law, state.contacts.lost.shape[0], damped=parameters.settings.damped)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
@@ -182,9 +189,12 @@ def build_engine(
     state.count[COMPARED] = -1 if follower is None else 0
     if follower is not None:
         state.cutoff[:] = follower.values
-    engine = Engine(
-        state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower
-    )
+    parts = (state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower)
+    engine = Engine(*parts)
+    if isinstance(stepping, RigidClusters):
+        state.bodies = body_arrays(len(grains))
+        inner = inner_engine(wrapped, forces, box, verlet, seed)
+        engine = RigidEngine(*parts, inner=inner)
     if any(map(ramps_of, forces)):
         changing = functools.partial(
             _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
@@ -195,6 +205,39 @@ def build_engine(
     if by_type.contact is not None:
         refuse_overlaps(wrapped, by_type.contact, start, given)
     return engine
+
+
+def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verlet, seed: int) -> Engine:
+    """The engine of the grains of awake clusters; pairs that interact beyond the nearest image are left to the bodies."""
+    near = [force.of_nearest_images() if isinstance(force, EwaldForce) else force for force in forces]
+    return build_engine(grains, near, box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False)
+
+
+def check_rigid_clusters(
+    stepping: RigidClusters, forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall]
+) -> None:
+    """Refuse what rigid clusters cannot do; all problems at once."""
+    contact = next((f for f in forces if isinstance(f, Contact)), None)
+    problems = []
+    if contact is None:
+        problems.append("rigid clusters need sand.Contact; without contacts use sand.Verlet")
+    elif contact.damping == "none":
+        problems.append(
+            "without damping no cluster comes to rest; use damping = 'critical' and a settling_time, such as 5 ns, in "
+            "[forces.contact] (sand.Contact)"
+        )
+    if contact is not None and contact.bath_temperature is not None:
+        problems.append("with a bath_temperature no cluster comes to rest; leave it out, or use sand.Verlet")
+    if any(isinstance(force, Gas) for force in forces):
+        problems.append("rigid clusters do not move in a gas yet; leave [forces.gas] out, or use sand.Verlet")
+    if any(map(ramps_of, forces)):
+        problems.append("rigid clusters cannot follow ramps yet; use numbers, or sand.Verlet")
+    if driven:
+        problems.append("rigid clusters cannot have driven grains; use sand.Verlet")
+    if walls:
+        problems.append("rigid clusters cannot have walls; use sand.Verlet")
+    if problems:
+        raise BadInput([f"stepping: {line}" for line in problems])
 
 
 def _changing_parameters(
@@ -250,7 +293,7 @@ def _respa_settings(
     return RespaSettings(most, verlet.far == "taylor-literal", scheme == "impulse", taylor)
 
 
-def _new_state(
+def new_state(
     grains: Grains,
     box: Box,
     parameters: StepParameters,

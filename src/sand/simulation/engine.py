@@ -430,6 +430,10 @@ class Engine:
 
     def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """One call of the driver."""
+        return self._run_program(advance, until, last, shorten)
+
+    def _run_program(self, driver: Stage, until: float, last: float, shorten: bool) -> Stop:
+        """Run a driver with the stages of the simulation."""
         state = self._state
         table, queue = self._call_table(until, last, shorten)
         try:
@@ -440,7 +444,7 @@ class Engine:
                 len(self._components.pair_forces), int(state.count[CONTACTS])
             ):
                 self._workers.start(table)
-            return Stop(self._program.run(advance, table))
+            return Stop(self._program.run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(queue)
             raise

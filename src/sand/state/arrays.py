@@ -117,6 +117,40 @@ class ClusterArrays(NamedTuple):
     offset: np.ndarray  # (3, N) vectors from the first grain, then from the centre of mass [m]
 
 
+class BodyArrays(NamedTuple):
+    """Clusters, and single grains, that move as rigid bodies or are awake: their grains take contact steps.
+
+    Columns of a body are those of its first grain.  Vectors "in the body" are in the frame of its principal axes.
+    """
+
+    first: np.ndarray  # (N,) uint32: first grain of the body of each grain
+    asleep: np.ndarray  # (N,) uint8: 1 for grains of bodies that move as rigid bodies
+    mass: np.ndarray  # (N,) of a body [kg]
+    inertia: np.ndarray  # (3, N) principal moments of inertia of a body [kg m²]
+    centre: np.ndarray  # (3, N) centre of mass of a body [m]
+    momentum: np.ndarray  # (3, N) of a body [kg m/s]
+    orientation: np.ndarray  # (4, N) of a body: rotation from its principal axes to the laboratory frame
+    angular_momentum: np.ndarray  # (3, N) of a body, in the body [J s]
+    strain: np.ndarray  # (N,) largest displacement of a contact of a body, in units of its limit
+    strength: np.ndarray  # (2, N) smallest force [N] and torque [N m] at which a contact of a body slips or breaks
+    event: np.ndarray  # (N,) time at which the contacts of a body last changed [s]
+    vibration: np.ndarray  # (N,) time at which the vibrational energy of a body was last above the limit [s]
+    offset: np.ndarray  # (3, N) of a grain from the centre of its body, in the body [m]
+    turn: np.ndarray  # (4, N) orientation of a grain, in the body
+    inner_force: np.ndarray  # (3, N) long-range force of the other grains of its body on a grain, in the body [N]
+    inner_torque: np.ndarray  # (3, N) likewise [N m]
+    inner_field: np.ndarray  # (3, N) flux density of the other grains of its body at a grain, in the body [T]
+    # not saved: they follow from the others, or are used within a step
+    member: np.ndarray  # (N,) uint32: grains, sorted by body
+    start: np.ndarray  # (N+1,) uint32: first entry of each body in `member`
+    force: np.ndarray  # (3, N) of all other grains and external forces on a body [N]
+    torque: np.ndarray  # (3, N) likewise, about its centre of mass [N m]
+    load: np.ndarray  # (N,) bound of the loads of the contacts of a body, in units of their limits
+    near: np.ndarray  # (N,) uint8: 1 for the first grain of bodies that a grain of another body may touch soon
+
+
+SAVED_BODIES = BodyArrays._fields[: BodyArrays._fields.index("member")]
+"""Arrays of the bodies in a checkpoint."""
 SAVED_LONG_RANGE = (
     "anchor",
     "force",
@@ -250,6 +284,17 @@ def wall_arrays(walls: int, grains: int) -> WallArrays:
 def cluster_arrays(grains: int) -> ClusterArrays:
     """Allocate the memory for the settling of clusters; `grains` is 0 without it."""
     return ClusterArrays(np.zeros(grains, np.uint32), np.zeros(grains, np.uint8), np.zeros((3, grains)))
+
+
+def body_arrays(grains: int) -> BodyArrays:
+    """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
+    vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
+    widths = {name: 3 for name in (*vectors, "inner_force", "inner_torque", "inner_field", "force", "torque")}
+    widths |= {"orientation": 4, "turn": 4, "strength": 2}
+    found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
+    for name, kind in (("first", np.uint32), ("member", np.uint32), ("asleep", np.uint8), ("near", np.uint8)):
+        found[name] = np.zeros(grains, kind)
+    return BodyArrays(**(found | {"start": np.zeros(grains + 1, np.uint32)}))
 
 
 def grown(arrays: Any, unchanged: Collection[str], minimum: int) -> Any:

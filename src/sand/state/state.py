@@ -16,15 +16,18 @@ from ..schema import OWN
 from .arrays import (
     GROWTH,
     NOT_SAVED,
+    SAVED_BODIES,
     SAVED_LONG_RANGE,
     SAVED_WALLS,
     UNIFORM_ARRAYS,
+    BodyArrays,
     ClusterArrays,
     ContactArrays,
     LongRangeArrays,
     PairList,
     RungeKuttaArrays,
     WallArrays,
+    body_arrays,
     cluster_arrays,
     empty_contact_arrays,
     grown,
@@ -46,9 +49,11 @@ FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
 SETTLED = 11  # time at which settling was last applied to clusters [s]
 WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
+SOME_AWAKE = 13  # time with any cluster awake [s], of rigid clusters
+GRAINS_AWAKE = 14  # time awake of all grains, summed [s]
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
-    *("corrected", "settled", "wall_step"),
+    *("corrected", "settled", "wall_step", "some_awake", "grains_awake"),
 )
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
@@ -71,9 +76,15 @@ NEEDED = 15  # step at which a time step as short as LEVEL, or FLIGHT of ForestR
 ORDERED = 16  # step of the last spatial sort
 COMPARED = 17  # contacts formed and broken when the cut-off was last compared with the clusters; −1: it is fixed
 WALL_CONTACTS = 18  # contacts with walls in use
+BODIES = 19  # bodies in use, single grains included; 0 without rigid clusters
+CONTACT_STEPS = 20  # steps of grains of clusters that are awake
+WOKEN = 21  # bodies woken
+RESTED = 22  # clusters that came to rest, and move as rigid bodies
+LATE = 23  # pairs that overlapped before their bodies were woken
 COUNT = (
     *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
     *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "wall_contacts"),
+    *("bodies", "contact_steps", "woken", "rested", "late"),
 )
 
 # --- indices of State.cutoff (float64): the cut-off of dipoles that follows the largest clusters -----------------
@@ -92,17 +103,18 @@ LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, SQUARED_SPEED, SQUARED_SPIN, SAFE_S
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING = range(5)
 DAMPING_NORMAL, DAMPING_SLIDING, DAMPING_ROLLING, DAMPING_TWISTING, STIFFNESS, SETTLING, GAS, OUTSIDE = range(5, 13)
 CUTOFF_CHANGED = 13
+QUIETING = 14
 DAMPING = ("damping_normal", "damping_sliding", "damping_rolling", "damping_twisting")
 LOST = (
     *("forming", "breaking", "sliding", "rolling", "twisting", *DAMPING, "stiffness", "settling", "gas", "outside"),
-    "cutoff_changed",
+    *("cutoff_changed", "quieting"),
 )
 RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
 """Losses recorded per contact, in this order: damping of all modes together, and nothing by breaking, after which a
 contact does not exist."""
 
 
-GROUPS = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts")
+GROUPS = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts", "bodies")
 """Groups of arrays of a state, besides its grains."""
 WALL_CONTACT_ARRAYS = (
     *("pair", "pointer1", "pointer2", "twist", "formed", "constants", "lost", "damping", "force", "torque1", "flag"),
@@ -127,6 +139,7 @@ class State:
     clusters: ClusterArrays = field(default_factory=lambda: cluster_arrays(0))
     walls: WallArrays = field(default_factory=lambda: wall_arrays(0, 0))
     wall_contacts: ContactArrays = field(default_factory=lambda: empty_contact_arrays(0, 0, 0))
+    bodies: BodyArrays = field(default_factory=lambda: body_arrays(0))
     # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
     order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
     # equal radii, masses and materials, so that one set of constants serves all contacts
@@ -193,6 +206,8 @@ class State:
             out |= {f"walls/{name}": getattr(self.walls, name) for name in SAVED_WALLS}
             for name in WALL_CONTACT_ARRAYS:
                 out[f"wall_contacts/{name}"] = getattr(self.wall_contacts, name)[..., : self.count[WALL_CONTACTS]]
+        if self.bodies.mass.size:
+            out |= {f"bodies/{name}": getattr(self.bodies, name) for name in SAVED_BODIES}
         return out | ({"order": self.order} if self.order.size else {})
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
@@ -227,6 +242,8 @@ class State:
             if name == "anchor" and saved.get("long_range/anchor", self.long_range.anchor).size == 0:
                 continue  # saved without a Verlet list: Engine.load_state builds one
             _copy_into(getattr(self.long_range, name), saved, f"long_range/{name}")
+        for name in SAVED_BODIES if self.bodies.mass.size else ():
+            _copy_into(getattr(self.bodies, name), saved, f"bodies/{name}")
         for name in SAVED_WALLS if self.walls.work.size else ():
             _copy_into(getattr(self.walls, name), saved, f"walls/{name}")
         used = int(self.count[WALL_CONTACTS])

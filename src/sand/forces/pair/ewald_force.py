@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from typing import Any, ClassVar
 
 from ...box import Box
@@ -91,6 +92,14 @@ class EwaldForce(CutoffForce):
     def _given(self, *names: str) -> list[str]:
         """Of these fields the ones that differ from their defaults."""
         return [name for name in names if getattr(self, name) != getattr(type(self), name)]
+
+    def of_nearest_images(self) -> EwaldForce:
+        """The same force between nearest images, summed directly."""
+        names = [name for name in ("accuracy", "boundary", "reciprocal") if hasattr(type(self), name)]
+        plain = {name: getattr(type(self), name) for name in names} | {"periodic": "nearest image"}
+        if "open" in {each.name for each in fields(self)}:  # type: ignore[arg-type]
+            plain["open"] = type(self).open
+        return replace(self, **plain)  # type: ignore[type-var]
 
     def carriers(self, grains: Grains) -> int:
         """Number of grains with a charge or moment."""

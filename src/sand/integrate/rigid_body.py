@@ -1,0 +1,222 @@
+"""Motion of rigid bodies: the symplectic rotor, and the loops over the bodies of a state.
+
+The rotor is that of Dullweber, Leimkuhler & McLachlan (1997) with quaternions (NO_SQUISH, Miller et al. 2002): a step t
+is the product of rotations about the principal axes of the body,
+
+    Φ₁(t/2) Φ₂(t/2) Φ₃(t) Φ₂(t/2) Φ₁(t/2),   Φ_k(t): q → q exp(a e_k/2), L → Rot(e_k, −a) L, a = t L_k/I_k
+
+with the angular momentum L in the body.  It is symplectic, of second order, keeps |L| and, in the laboratory frame, L
+to rounding, and is exact for a sphere.  One step of a body is kick, drift, kick:
+
+    P += ½h F, L += ½h RᵀT;   X += h P/M, rotor(h);   new F and T;   P += ½h F, L += ½h RᵀT
+"""
+
+import math
+
+from ..box import nearest_image
+from ..compiler.jit import formula, loop
+from ..numerics.quaternion import normalised, turned, turned_back
+from ..numerics.vec import accrue, add, axpy, cross, dot, load, load4, norm, put, put4, scale, sub
+from ..state.state import BODIES
+
+
+@formula
+def product(a, b):
+    """Quaternion of rotation b followed by rotation a."""
+    return (
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+        a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2],
+        a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0],
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    )
+
+
+@formula
+def _about_first(q, angular, angle):
+    """Rotation of the body about its first axis by an angle [rad]: new orientation and angular momentum."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    sine, cosine = 2.0 * s * c, c * c - s * s
+    x, y, z, w = q
+    turned_q = (c * x + s * w, c * y + s * z, c * z - s * y, c * w - s * x)
+    return turned_q, (angular[0], cosine * angular[1] + sine * angular[2], cosine * angular[2] - sine * angular[1])
+
+
+@formula
+def _about_second(q, angular, angle):
+    """As `_about_first`, about the second axis."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    sine, cosine = 2.0 * s * c, c * c - s * s
+    x, y, z, w = q
+    turned_q = (c * x - s * z, c * y + s * w, c * z + s * x, c * w - s * y)
+    return turned_q, (cosine * angular[0] - sine * angular[2], angular[1], cosine * angular[2] + sine * angular[0])
+
+
+@formula
+def _about_third(q, angular, angle):
+    """As `_about_first`, about the third axis."""
+    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    sine, cosine = 2.0 * s * c, c * c - s * s
+    x, y, z, w = q
+    turned_q = (c * x + s * y, c * y - s * x, c * z + s * w, c * w - s * z)
+    return turned_q, (cosine * angular[0] + sine * angular[1], cosine * angular[1] - sine * angular[0], angular[2])
+
+
+@formula
+def free_rotation(q, angular, inertia, t):
+    """One step of the free rotor.
+
+    Parameters
+    ----------
+    q : tuple
+        Orientation: rotation from the principal axes to the laboratory frame.
+    angular : tuple
+        Angular momentum in the body [J s].
+    inertia : tuple
+        Principal moments of inertia [kg m²].
+    t : float
+        Step [s].
+
+    Returns
+    -------
+    tuple
+        New orientation and angular momentum.
+    """
+    q, angular = _about_first(q, angular, 0.5 * t * angular[0] / inertia[0])
+    q, angular = _about_second(q, angular, 0.5 * t * angular[1] / inertia[1])
+    q, angular = _about_third(q, angular, t * angular[2] / inertia[2])
+    q, angular = _about_second(q, angular, 0.5 * t * angular[1] / inertia[1])
+    q, angular = _about_first(q, angular, 0.5 * t * angular[0] / inertia[0])
+    return normalised(q), angular
+
+
+@formula
+def free_sphere(q, angular, inertia, t):
+    """The rotation of a body with three equal moments of inertia, about its constant angular momentum; exact."""
+    size = norm(angular)
+    if size == 0.0:
+        return q
+    half = 0.5 * t * size / inertia
+    axis = scale(math.sin(half) / size, angular)
+    return normalised(product(q, (axis[0], axis[1], axis[2], math.cos(half))))
+
+
+@loop
+def sum_body_loads(grains, bodies, count):
+    """Sum force [N] and torque [N m] about the centre of mass of each body; awake ones included."""
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        q = load4(bodies.orientation, first)
+        force = torque = (0.0, 0.0, 0.0)
+        for k in range(bodies.start[b], bodies.start[b + 1]):
+            i = bodies.member[k]
+            own = load(grains.force, i)
+            force = add(force, own)
+            torque = add(torque, add(load(grains.torque, i), cross(turned(q, load(bodies.offset, i)), own)))
+        put(bodies.force, first, force)
+        put(bodies.torque, first, torque)
+
+
+@loop
+def kick_bodies(bodies, count, dt):
+    """P += F dt and L += Rᵀ T dt of all bodies asleep."""
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.asleep[first] == 1:
+            accrue(bodies.momentum, first, scale(dt, load(bodies.force, first)))
+            own = turned_back(load4(bodies.orientation, first), load(bodies.torque, first))
+            accrue(bodies.angular_momentum, first, scale(dt, own))
+
+
+@formula
+def spin_of(bodies, first):
+    """Angular velocity [rad/s] of a body, in the laboratory frame."""
+    own, inertia = load(bodies.angular_momentum, first), load(bodies.inertia, first)
+    in_body = (own[0] / inertia[0], own[1] / inertia[1], own[2] / inertia[2])
+    return turned(load4(bodies.orientation, first), in_body)
+
+
+@loop
+def place_velocities(grains, bodies, b):
+    """Velocities and spins of the grains of body b from those of the body."""
+    first = bodies.member[bodies.start[b]]
+    q, spin = load4(bodies.orientation, first), spin_of(bodies, first)
+    velocity = scale(1.0 / bodies.mass[first], load(bodies.momentum, first))
+    for k in range(bodies.start[b], bodies.start[b + 1]):
+        i = bodies.member[k]
+        put(grains.spin, i, spin)
+        put(grains.velocity, i, add(velocity, cross(spin, turned(q, load(bodies.offset, i)))))
+
+
+@loop
+def drift_bodies(grains, bodies, count, span, dt, is_wrapped):
+    """Move and turn all bodies asleep with their grains by a step of dt [s].
+
+    Positions of grains are wrapped into the box if `is_wrapped`, else continuous with those before.
+    """
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.asleep[first] == 0:
+            continue
+        momentum, mass = load(bodies.momentum, first), bodies.mass[first]
+        centre = nearest_image(axpy(dt / mass, momentum, load(bodies.centre, first)), span)
+        q, angular, inertia = (
+            load4(bodies.orientation, first),
+            load(bodies.angular_momentum, first),
+            load(bodies.inertia, first),
+        )
+        if bodies.start[b + 1] - bodies.start[b] == 1:
+            q = free_sphere(q, angular, inertia[0], dt)
+        else:
+            q, angular = free_rotation(q, angular, inertia, dt)
+        put(bodies.centre, first, centre)
+        put4(bodies.orientation, first, q)
+        put(bodies.angular_momentum, first, angular)
+        for k in range(bodies.start[b], bodies.start[b + 1]):
+            i = bodies.member[k]
+            position = add(centre, turned(q, load(bodies.offset, i)))
+            if is_wrapped:
+                put(grains.position, i, nearest_image(position, span))
+            else:
+                accrue(grains.position, i, nearest_image(sub(position, load(grains.position, i)), span))
+            own = product(q, load4(bodies.turn, i))
+            put4(grains.orientation, i, own)
+            put(grains.moment, i, turned(own, load(grains.body_moment, i)))
+
+
+@loop
+def move_velocities(grains, bodies, count):
+    """`place_velocities` of all bodies asleep."""
+    for b in range(count[BODIES]):
+        if bodies.asleep[bodies.member[bodies.start[b]]] == 1:
+            place_velocities(grains, bodies, b)
+
+
+@loop
+def contact_loads_bound(grains, bodies, b):
+    """Bound of the change of the loads of the contacts of a body since it came to rest, in units of their limits.
+
+    The loads on its grains in the frame of the body are those of other bodies and of external forces, f = F − R F_inner
+    and m = M − R M_inner, and inertia, −m a and −I α.  A contact divides the body into two parts, and its load is that
+    of one part.  Therefore Σ|f − m a| bounds its force, and Σ(|m − I α| + 2 s |f − m a|) its torque, where s is the
+    largest distance of a grain from the centre of mass.
+    """
+    first = bodies.member[bodies.start[b]]
+    q, spin = load4(bodies.orientation, first), spin_of(bodies, first)
+    mass, inertia = bodies.mass[first], load(bodies.inertia, first)
+    torque, angular = turned_back(q, load(bodies.torque, first)), load(bodies.angular_momentum, first)
+    in_body = turned_back(q, spin)
+    torque = sub(torque, cross(in_body, angular))
+    rate = turned(q, (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2]))
+    linear = scale(1.0 / mass, load(bodies.force, first))
+    forces = torques = extent = 0.0
+    for k in range(bodies.start[b], bodies.start[b + 1]):
+        i = bodies.member[k]
+        s = turned(q, load(bodies.offset, i))
+        acceleration = add(linear, add(cross(rate, s), cross(spin, cross(spin, s))))
+        own = sub(load(grains.force, i), turned(q, load(bodies.inner_force, i)))
+        forces += norm(axpy(-grains.mass[i], acceleration, own))
+        own = sub(load(grains.torque, i), turned(q, load(bodies.inner_torque, i)))
+        torques += norm(axpy(-grains.inertia[i], rate, own))
+        extent = max(extent, dot(s, s))
+    torques += 2.0 * math.sqrt(extent) * forces
+    return max(forces / bodies.strength[0, first], torques / bodies.strength[1, first])

@@ -1,0 +1,332 @@
+"""The compiled driver of rigid clusters: steps of all bodies, until a cluster has to wake or contact steps are needed.
+
+One step:  choose h → kick ½h, drift, rotor → long-range and external forces on all grains → kick ½h.  The driver
+returns before a step in which bodies may touch (`Stop.TOUCH_AHEAD`).  While a cluster is awake it returns twice in a
+step: after the drift, so that grains of awake clusters take their contact steps (`AWAKE_STEPS`), and at the end
+(`AWAKE_LOADS`).
+"""
+
+import math
+
+from ..box import nearest_image
+from ..compiler.jit import caller, formula, loop
+from ..compiler.program import call_stage
+from ..compiler.stage import stage
+from ..neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
+from ..numerics.quaternion import turned
+from ..numerics.vec import dot, load, load4, norm, put, sub
+from ..state.state import (
+    BODIES,
+    BROKEN,
+    COMPARED,
+    GRAINS_AWAKE,
+    LATE,
+    LONG_RANGE_SKIN,
+    MADE,
+    OUTSIDE,
+    PAIR_LIST_SKIN,
+    PAIRS,
+    SOME_AWAKE,
+    STAGE,
+    STEP,
+    STEPS,
+    TIME,
+)
+from .force_calls import add_external_loads, sum_external, sum_pair_forces
+from .force_stages import ENERGY, WRAPPING
+from .motion import wrap_all
+from .parts import Stop
+from .respa import add_long_range_loads
+from .rigid_body import contact_loads_bound, drift_bodies, kick_bodies, move_velocities, spin_of, sum_body_loads
+from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
+from .step_control import is_close, is_past
+from .task_queue import join_workers
+
+LARGEST_TURN = 0.3
+"""Largest rotation of a body in one step [rad]."""
+LARGEST_FLIGHT = 0.1
+"""Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
+TOUCH_SPEED = 1.2
+"""Closing speeds are taken this much larger to predict a touch."""
+AWAKE, NEAR, TOUCHING = range(3)
+"""Values of `BodyArrays.near`: nothing near; a touch within about two steps; within the next step."""
+WAKE_SHARE = 0.5
+"""Displacement of a contact, in units of its limit, above which its cluster wakes."""
+
+
+@formula
+def squared_rates(grains, bodies, criteria, b):
+    """Square of the largest rate [1/s²] at which the loads of a body change.
+
+    Rotation in the field of other bodies: Σ|μ B|/I; translation: 4 F/(M d), d two of the smallest radii, for forces
+    that fall with the distance like those of dipoles, r⁻⁴, or slower.
+    """
+    first = bodies.member[bodies.start[b]]
+    q, inertia = load4(bodies.orientation, first), load(bodies.inertia, first)
+    energy = 0.0
+    for k in range(bodies.start[b], bodies.start[b + 1]):
+        i = bodies.member[k]
+        outer = sub(load(grains.field, i), turned(q, load(bodies.inner_field, i)))
+        energy += norm(load(grains.moment, i)) * (norm(outer) + criteria.outer_field)
+    smallest = min(inertia[0], min(inertia[1], inertia[2]))
+    force = norm(load(bodies.force, first))
+    return max(energy / smallest, 2.0 * force / (bodies.mass[first] * criteria.pair_gap))
+
+
+@loop
+def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_awake):
+    """The next step [s], a power of two of the longest one; NaN if the state is not finite."""
+    square = fastest = turning = 0.0
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.asleep[first] == 1:
+            spin = spin_of(bodies, first)
+            turning = max(turning, dot(spin, spin))
+            square = max(square, squared_rates(grains, bodies, criteria, b))
+        for k in range(bodies.start[b], bodies.start[b + 1]):
+            v = load(grains.velocity, bodies.member[k])
+            speed = dot(v, v)
+            if not speed < math.inf:
+                return math.nan
+            if bodies.asleep[first] == 1:
+                fastest = max(fastest, speed)
+    for p in range(count[PAIRS]):
+        i, j = pair_list.pair[0, p], pair_list.pair[1, p]
+        if bodies.first[i] != bodies.first[j] and bodies.asleep[i] + bodies.asleep[j] > 0:
+            apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+            v = sub(load(grains.velocity, i), load(grains.velocity, j))
+            square = max(square, dot(v, v) / dot(apart, apart))
+    rate = max(math.sqrt(square) / limits.step_fraction, math.sqrt(turning) / LARGEST_TURN)
+    rate = max(rate, math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap))
+    h = min(limits.longest_step, criteria.longest)
+    if some_awake:
+        h = min(h, limits.longest_awake)
+    if h * rate > 1.0:
+        h *= 2.0 ** math.floor(-math.log2(h * rate))
+        h = 0.5 * h if h * rate > 1.0 else h
+    return h
+
+
+@loop
+def _approach(grains, bodies, i, h):
+    """Distance [m] that grain i may move in h seconds besides its velocity: twice the present accelerations."""
+    first = bodies.first[i]
+    mass, inertia = bodies.mass[first], load(bodies.inertia, first)
+    s = norm(load(bodies.offset, i))
+    w = load(grains.spin, i)
+    smallest = min(inertia[0], min(inertia[1], inertia[2]))
+    linear = norm(load(bodies.force, first)) / mass + s * norm(load(bodies.torque, first)) / smallest
+    return (linear + 0.5 * dot(w, w) * s) * h * h
+
+
+@loop
+def find_near_bodies(grains, bodies, pair_list, count, span, h):
+    """Mark bodies near others (`BodyArrays.near`) for a step of h [s]; returns whether any has to wake.
+
+    A gap closes at most by the closing speed, a fifth more of it, and the curvature of the paths.
+    """
+    bodies.near[:] = AWAKE
+    found = False
+    for p in range(count[PAIRS]):
+        i, j = pair_list.pair[0, p], pair_list.pair[1, p]
+        one, other = bodies.first[i], bodies.first[j]
+        if one == other:
+            continue
+        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+        distance = norm(apart)
+        gap = distance - grains.radius[i] - grains.radius[j]
+        v = sub(load(grains.velocity, i), load(grains.velocity, j))
+        closing = max(-dot(v, apart) / distance, 0.0)
+        across = max(dot(v, v) - closing * closing, 0.0)
+        reach = TOUCH_SPEED * closing * h + 0.5 * across / distance * h * h
+        reach += _approach(grains, bodies, i, h) + _approach(grains, bodies, j, h)
+        if gap > 2.0 * reach:
+            continue
+        both_awake = bodies.asleep[i] + bodies.asleep[j] == 0
+        if gap <= reach and not both_awake:
+            bodies.near[one] = bodies.near[other] = TOUCHING
+            found = True
+            count[LATE] += 1 if gap < 0.0 else 0
+        else:
+            bodies.near[one] = max(bodies.near[one], NEAR)
+            bodies.near[other] = max(bodies.near[other], NEAR)
+    return found
+
+
+@loop
+def find_loaded_bodies(grains, bodies, count):
+    """Mark bodies whose contacts may be near a limit; returns whether any has to wake."""
+    found = False
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.asleep[first] == 1 and bodies.start[b + 1] - bodies.start[b] > 1:
+            bodies.load[first] = contact_loads_bound(grains, bodies, b)
+            if bodies.load[first] + bodies.strain[first] > WAKE_SHARE:
+                bodies.near[first] = TOUCHING
+                found = True
+    return found
+
+
+@caller
+def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, bodies, count, program, table, h):
+    """Move all bodies asleep, and log the work of external forces that depend on time or position.
+
+    Grains of awake clusters stay where they are; the change of their energies with time is part of the work.
+    """
+    start, end, gained = clock[TIME], clock[TIME] + h, 0.0
+    if external_work.time_dependent:
+        gained += sum_external(scratch, forces, program, table, end, ENERGY)
+        gained -= sum_external(scratch, forces, program, table, start, ENERGY)
+    drift_bodies(grains, bodies, count, span, h, not external_work.position_dependent)
+    if external_work.time_dependent:
+        gained += sum_external(scratch, forces, program, table, end, ENERGY)
+        gained -= sum_external(scratch, forces, program, table, start, ENERGY)
+    gained *= 0.5
+    if external_work.position_dependent:
+        gained += sum_external(scratch, forces, program, table, end, WRAPPING)
+        wrap_all(grains, span)
+    lost[OUTSIDE] -= gained
+
+
+@caller
+def update_lists(grains, pair_list, long_range, span, search, criteria, program, table):
+    """Rebuild stale lists; returns the value of a `Stop`."""
+    invalidate_skins(pair_list)
+    if search.listed and list_is_stale(
+        grains, long_range.anchor, span, 0.5 * search.margin, pair_list.skin, LONG_RANGE_SKIN
+    ):
+        stop = call_stage(program, VERLET_LIST, table, 0)
+        if stop != Stop.NONE.value:
+            return stop
+    if list_is_stale(grains, pair_list.anchor, span, 0.25 * criteria.pair_gap, pair_list.skin, PAIR_LIST_SKIN):
+        return call_stage(program, PAIR_LIST, table, 0)
+    return Stop.NONE.value
+
+
+@caller
+def sum_outer_loads(grains, long_range, clock, count, scratch, forces, queue, program, table):
+    """Sum all loads but those of contacts, over all pairs of grains, at the time of the end of the step."""
+    for i in range(grains.mass.size):
+        put(grains.force, i, (0.0, 0.0, 0.0))
+        put(grains.torque, i, (0.0, 0.0, 0.0))
+    add_external_loads(scratch, forces, program, table, clock[TIME] + clock[STEP])
+    if forces.pair > 0:
+        sum_pair_forces(long_range, count, forces, queue, program, table)
+        add_long_range_loads(grains, long_range)
+
+
+@loop
+def awake_grains(bodies):
+    """Number of grains of clusters that are awake."""
+    number = 0
+    for i in range(bodies.asleep.size):
+        number += 1 if bodies.asleep[i] == 0 else 0
+    return number
+
+
+@caller
+def first_half(
+    grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, criteria, forces, flight_limits,
+    program, table, until, shorten, some_awake
+):  # fmt: skip
+    """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
+    sum_body_loads(grains, bodies, count)
+    h = longest_step(grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake)
+    if not h > 0.0:
+        call_stage(program, EXPLAIN, table, Stop.NOT_FINITE.value)
+        return Stop.NOT_FINITE.value
+    if clock[TIME] + h == clock[TIME]:
+        return Stop.NO_STEP.value
+    if is_past(clock[TIME] + h, until):
+        if not shorten:
+            return Stop.TIME_REACHED.value
+        h = until - clock[TIME]
+    touching = find_near_bodies(grains, bodies, pair_list, count, span, h)
+    loaded = find_loaded_bodies(grains, bodies, count)
+    clock[STEP] = h
+    if touching or loaded:
+        return Stop.TOUCH_AHEAD.value
+    kick_bodies(bodies, count, 0.5 * h)
+    drift_with_work(clock, lost, scratch, span, external_work, forces, grains, bodies, count, program, table, h)
+    count[STAGE] = 1
+    return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
+
+
+@caller
+def second_half(
+    grains, bodies, pair_list, long_range, clock, count, scratch, span, search, criteria, forces, queue, program, table,
+    awake
+):  # fmt: skip
+    """Update the lists, sum the loads, and kick; returns the value of a `Stop`."""
+    stop = update_lists(grains, pair_list, long_range, span, search, criteria, program, table)
+    if stop != Stop.NONE.value:
+        return stop
+    sum_outer_loads(grains, long_range, clock, count, scratch, forces, queue, program, table)
+    sum_body_loads(grains, bodies, count)
+    kick_bodies(bodies, count, 0.5 * clock[STEP])
+    move_velocities(grains, bodies, count)
+    clock[TIME] += clock[STEP]
+    clock[SOME_AWAKE] += clock[STEP] if awake > 0 else 0.0
+    clock[GRAINS_AWAKE] += awake * clock[STEP]
+    count[STEPS] += 1 if clock[STEP] > 0.0 else 0
+    count[STAGE] = 0
+    return Stop.AWAKE_LOADS.value if awake > 0 else Stop.NONE.value
+
+
+@caller
+def body_steps_until(
+    grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, criteria, forces,
+    flight_limits, queue, program, table, until, last, shorten
+):  # fmt: skip
+    """Take steps until the last end of a step not after `until` [s], or step `last`; returns the value of a `Stop`."""
+    awake = awake_grains(bodies)
+    invalidate_speeds(pair_list)
+    while True:
+        stop = Stop.NONE.value
+        if count[STAGE] == 0:
+            if count[COMPARED] >= 0 and count[COMPARED] != count[MADE] + count[BROKEN]:
+                return Stop.CLUSTERS_CHANGED.value
+            if clock[TIME] >= until or (shorten and is_close(clock[TIME], until)):
+                return Stop.TIME_REACHED.value
+            if count[STEPS] >= last:
+                return Stop.NONE.value
+            stop = first_half(
+                grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, criteria, forces,
+                flight_limits, program, table, until, shorten, awake > 0
+            )  # fmt: skip
+        if stop == Stop.NONE.value:
+            stop = second_half(
+                grains, bodies, pair_list, long_range, clock, count, scratch, span, search, criteria, forces, queue,
+                program, table, awake
+            )  # fmt: skip
+        if stop != Stop.NONE.value:
+            return stop
+
+
+@stage("the steps of rigid bodies")
+def advance_bodies(
+    table, program, grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work,
+    criteria, forces, flight_limits, queue, until, last, shorten
+):  # fmt: skip
+    """Take steps of all bodies, then end the work of the other threads; returns the value of a `Stop`."""
+    stop = body_steps_until(
+        grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, criteria,
+        forces, flight_limits, queue, program, table, until, last, shorten
+    )  # fmt: skip
+    join_workers(queue.words)
+    return stop
+
+
+@stage("the search for touches of bodies")
+def mark_near_bodies(grains, bodies, pair_list, clock, count, span):
+    """Mark bodies near others, for a step as long as the last one; returns 1 if any has to wake."""
+    sum_body_loads(grains, bodies, count)
+    return 1 if find_near_bodies(grains, bodies, pair_list, count, span, clock[STEP]) else 0
+
+
+@stage("the loads of the contacts of bodies")
+def bound_contact_loads(grains, bodies, count, block):
+    """Set the bound of the contact loads of body `block`."""
+    sum_body_loads(grains, bodies, count)
+    bodies.load[bodies.member[bodies.start[block]]] = contact_loads_bound(grains, bodies, block)
+    return 0

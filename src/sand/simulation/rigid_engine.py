@@ -1,0 +1,505 @@
+"""The engine of rigid clusters: bodies take long steps, grains of awake clusters contact steps by an inner engine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..compiler.table import Table
+from ..contact.gather import resort_contacts_by_grain
+from ..forces.external.loops import external_energies_for
+from ..integrate.awake_clusters import (
+    ClusterMeasures,
+    cluster_measures,
+    inner_loads_stage,
+    kick_clusters,
+    measure_clusters_stage,
+    set_inner_fields,
+)
+from ..integrate.parts import DT, Stop
+from ..integrate.rigid_body import product
+from ..integrate.rigid_clusters import SAMPLES, RigidLimits
+from ..integrate.rigid_driver import NEAR, TOUCHING, WAKE_SHARE, advance_bodies, bound_contact_loads, mark_near_bodies
+from ..integrate.step_control import INCREASE_INTERVAL
+from ..state.arrays import SAVED_LONG_RANGE, cluster_arrays
+from ..state.state import (
+    BODIES,
+    BROKEN,
+    CHECKED,
+    COMPARED,
+    CONTACT_STEP,
+    CONTACT_STEPS,
+    CONTACTS,
+    CORRECTED,
+    CYCLE,
+    GRAIN1,
+    GRAIN2,
+    LEFT,
+    LONG_RANGE_SUMS,
+    MADE,
+    PAIRS,
+    QUIETING,
+    RESTED,
+    SETTLED,
+    SLIPPED,
+    STAGE,
+    STEP,
+    STEP_INCREASES,
+    STEPS,
+    TIME,
+    WOKEN,
+    State,
+)
+from .changed_state import subset
+from .engine import Engine
+
+PERIODS = 10.0
+"""Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of more
+than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
+REST_STRAIN = 0.5
+"""Largest displacement of a contact of a cluster at rest, in units of its limit."""
+CONTACT_COLUMNS = (
+    *("pointer1", "pointer2", "twist", "formed", "lost", "damping", "force", "torque1", "torque2", "flag"),
+)
+"""Arrays of contacts, besides pairs and constants, that the inner engine needs and changes."""
+MOVING = ("position", "velocity", "orientation", "spin", "moment")
+
+
+@dataclass
+class RigidEngine(Engine):
+    """An engine whose clusters at rest move as rigid bodies.
+
+    The state is that of all grains.  While clusters are awake, their grains are copied to a smaller state, on which
+    the inner engine takes contact steps; it begins anew in each step of the bodies, so that the state of all grains
+    and the bodies determine all that follows.
+
+    Attributes
+    ----------
+    inner : Engine
+        The engine of awake grains; its state is replaced as clusters wake and come to rest.
+    """
+
+    inner: Engine | None = None
+    _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains of the inner state
+    _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
+    _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
+    _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+
+    def begin(self) -> None:
+        """As `Engine.begin`; clusters start awake, single grains as bodies."""
+        super().begin()
+        self._form_bodies()
+
+    def refresh_loads(self) -> None:
+        """As `Engine.refresh_loads`; all clusters wake."""
+        super().refresh_loads()
+        self._form_bodies()
+
+    def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
+        """As `Engine.load_state`."""
+        super().load_state(saved, output_time)
+        self._sort_members()
+
+    def _form_bodies(self) -> None:
+        """Make a body of each grain without contacts; clusters are awake."""
+        state = self._state
+        bodies, grains = state.bodies, state.grains.arrays
+        n = len(state.grains)
+        bodies.first[:], bodies.asleep[:] = np.arange(n), 0
+        bodies.event[:] = bodies.vibration[:] = state.time
+        self._sort_members()
+        self._regroup()
+        alone = np.bincount(bodies.first, minlength=n) == 1
+        alone &= bodies.first == np.arange(n)
+        for name in ("offset", "inner_force", "inner_torque", "inner_field"):
+            getattr(bodies, name)[...] = 0.0
+        bodies.turn[...] = np.array([[0.0], [0.0], [0.0], [1.0]])
+        bodies.strain[:] = bodies.load[:] = 0.0
+        bodies.strength[...] = math.inf
+        for i in np.flatnonzero(alone):
+            self._rest_single(i)
+        self._sum_outer_loads()
+
+    def _rest_single(self, i: int) -> None:
+        """Make a body of a single grain."""
+        bodies, grains = self._state.bodies, self._state.grains.arrays
+        bodies.asleep[i] = 1
+        bodies.mass[i], bodies.inertia[:, i] = grains.mass[i], grains.inertia[i]
+        bodies.centre[:, i], bodies.orientation[:, i] = grains.position[:, i], grains.orientation[:, i]
+        bodies.momentum[:, i] = grains.mass[i] * grains.velocity[:, i]
+        bodies.angular_momentum[:, i] = grains.inertia[i] * _turned_back(
+            grains.orientation[:, i], grains.spin[:, i : i + 1]
+        ).ravel()
+        for name in ("offset", "inner_force", "inner_torque", "inner_field"):
+            getattr(bodies, name)[:, i] = 0.0
+        bodies.turn[:, i] = 0.0, 0.0, 0.0, 1.0
+        bodies.strain[i] = bodies.load[i] = 0.0
+        bodies.strength[:, i] = math.inf
+
+    def _sort_members(self) -> None:
+        """Lists of the grains of each body."""
+        bodies, n = self._state.bodies, len(self._state.grains)
+        bodies.member[:] = np.argsort(bodies.first, kind="stable")
+        firsts = np.unique(bodies.first)
+        self._state.count[BODIES] = len(firsts)
+        bodies.start[: len(firsts)] = np.searchsorted(bodies.first[bodies.member], firsts)
+        bodies.start[len(firsts) :] = n
+        self._awake = np.flatnonzero(bodies.asleep == 0)
+        self._list_awake_contacts()
+
+    def _list_awake_contacts(self) -> None:
+        contacts, used = self._state.contacts, int(self._state.count[CONTACTS])
+        self._columns = np.flatnonzero(self._state.bodies.asleep[contacts.pair[0, :used]] == 0)
+
+    def _members(self, first: int) -> np.ndarray:
+        """Grains of a body."""
+        return np.flatnonzero(self._state.bodies.first == first)
+
+    def _sum_outer_loads(self) -> None:
+        """Sum the loads of all bodies on each other."""
+        state = self._state
+        sums = int(state.count[LONG_RANGE_SUMS])
+        state.count[STAGE], state.clock[STEP] = 1, 0.0
+        before = state.time
+        self._bodies_driver(-math.inf, state.steps + 1)
+        state.clock[TIME], state.count[LONG_RANGE_SUMS] = before, sums
+
+    def _bodies_driver(self, until: float, last: float, shorten: bool = False) -> Stop:
+        """Call the driver of bodies; enlarges arrays that overflow."""
+        while True:
+            stop = self._run_program(advance_bodies, until, last, shorten)
+            if stop is Stop.PAIRS_FULL:
+                found, self._state.count[PAIRS] = int(self._state.count[PAIRS]), 0
+                self._state.grow_pairs(int(1.1 * found))
+            elif stop is Stop.LIST_FULL:
+                self._state.grow_rows()
+            else:
+                return stop
+
+    def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
+        """One call of the driver: of all grains before the first step, else of bodies and awake clusters."""
+        state = self._state
+        if state.count[BODIES] == 0 or (state.count[STAGE] == 1 and state.clock[STEP] == 0.0):
+            return super()._call_driver(until, last, shorten)
+        while True:
+            stop = self._bodies_driver(until, last, shorten)
+            if stop is Stop.TOUCH_AHEAD:
+                self._wake()
+            elif stop is Stop.AWAKE_STEPS:
+                failed = self._take_contact_steps()
+                if failed is not Stop.NONE:
+                    return failed
+            elif stop is Stop.AWAKE_LOADS:
+                self._finish_step()
+            else:
+                return stop
+
+    def _wake(self) -> None:
+        """Wake all bodies that may touch, or whose contacts are loaded."""
+        bodies, state = self._state.bodies, self._state
+        for first in np.flatnonzero((bodies.near == TOUCHING) & (bodies.asleep == 1)):
+            own = self._members(first)
+            bodies.asleep[own] = 0
+            bodies.event[first] = bodies.vibration[first] = state.time
+            state.count[WOKEN] += 1
+        self._sort_members()
+
+    def _inner_state(self) -> State:
+        """The state of the awake grains, with contacts as they are and everything else as at a start."""
+        assert self.inner is not None
+        state, inner, index = self._state, self.inner, self._awake
+        present = inner._state
+        if not np.array_equal(present.grains.arrays.id, index):
+            inner.regular_state = present = self._new_inner_state(index)
+            self._measures = cluster_measures(len(index))
+            self._remainder = np.zeros((2, 3, len(index)))
+        for name, array in present.grains.arrays._asdict().items():
+            if name != "id":
+                array[...] = getattr(state.grains.arrays, name)[..., index]
+        used = len(self._columns)
+        if present.contacts.pair.shape[1] < used:
+            present.grow_contacts(used)
+        local = np.zeros(len(state.grains), np.uint32)
+        local[index] = np.arange(len(index))
+        contacts = present.contacts
+        contacts.pair[:, :used] = local[state.contacts.pair[:, self._columns]]
+        for name in CONTACT_COLUMNS:
+            if getattr(contacts, name).shape[-1]:
+                getattr(contacts, name)[..., :used] = getattr(state.contacts, name)[..., self._columns]
+        if state.uniform_contacts:
+            contacts.constants[...] = state.contacts.constants
+        else:
+            contacts.constants[:, :used] = state.contacts.constants[:, self._columns]
+        contacts.every_step[:] = 0
+        present.count[:] = 0
+        present.clock[:] = 0.0
+        present.lost[:] = 0.0
+        present.count[CONTACTS], present.count[COMPARED] = used, -1
+        present.count[CHECKED] = present.count[STEP_INCREASES] = -INCREASE_INTERVAL
+        present.clock[TIME], present.clock[SETTLED] = state.clock[TIME], state.clock[SETTLED]
+        present.clock[CONTACT_STEP] = math.inf
+        for name in SAVED_LONG_RANGE:
+            getattr(present.long_range, name)[...] = math.inf if name == "anchor" else 0.0
+        present.pair_list.anchor[...] = math.inf
+        resort_contacts_by_grain(present.grains.arrays, contacts, present.count)
+        return present
+
+    def _new_inner_state(self, index: np.ndarray) -> State:
+        """Memory for these grains."""
+        from .assemble import new_state
+
+        assert self.inner is not None
+        grains = subset(self._state.grains, index)
+        grains.arrays = grains.arrays._replace(id=index.astype(np.uint32))
+        parameters, components = self.inner.parameters, self.inner._components
+        made = new_state(
+            grains, self._state.box, parameters, components, len(self._columns), over_all_pairs=True
+        )
+        made.uniform_contacts = self._state.uniform_contacts
+        made.clusters = cluster_arrays(len(index))
+        return made
+
+    def _take_contact_steps(self) -> Stop:
+        """Contact steps of the awake grains for one step of the bodies."""
+        assert self.inner is not None
+        state, inner = self._state, self.inner
+        before, end = state.time, state.time + float(state.clock[STEP])
+        present = self._inner_state()
+        if self.parameters.external_work.time_dependent:
+            # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
+            for outer in self.external:
+                state.lost[12] += self._external_energy(outer, end) - self._external_energy(outer, before)
+        present.count[STAGE] = 1
+        present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
+        inner._drive(-math.inf, 1)
+        present.count[STEPS] = 0
+        self._kick_awake(present)
+        stop = inner._drive(end, math.inf, shorten=True)
+        if stop is not Stop.TIME_REACHED:
+            for grain in (GRAIN1, GRAIN2):
+                own = int(present.count[grain])
+                state.count[grain] = self._awake[own] if own >= 0 else -1
+            self._copy_back(present)
+            return stop
+        self._copy_back(present)
+        return Stop.NONE
+
+    def _external_energy(self, outer: Any, time: float) -> float:
+        """Energy [J] of an external force of the awake grains where they are."""
+        assert self.inner is not None
+        shares = np.zeros(len(self._awake))
+        external_energies_for(outer.formula).run(
+            self.inner._current_table(self.inner._state), (outer.numbers(), time, shares)
+        )
+        return math.fsum(shares)
+
+    def _kick_awake(self, present: State) -> None:
+        """Half a kick of the awake clusters by the loads of all grains that the inner engine does not sum."""
+        assert self.inner is not None
+        full = self._state.long_range
+        if not full.force.size:
+            return
+        self._remainder[0] = full.force[:, self._awake] - present.long_range.force
+        self._remainder[1] = full.torque[:, self._awake] - present.long_range.torque
+        table = self._inner_table(present)
+        table["scratch"][DT] = 0.5 * self._state.clock[STEP]
+        kick_clusters.run(table, (self._remainder,))
+
+    def _inner_table(self, present: State) -> Table:
+        """The table of the inner engine with the present arrays."""
+        assert self.inner is not None
+        return self.inner._current_table(present)
+
+    def _copy_back(self, present: State) -> None:
+        """Copy awake grains and their contacts to the state of all grains, with counts and losses."""
+        state, index = self._state, self._awake
+        for name in MOVING:
+            getattr(state.grains.arrays, name)[..., index] = getattr(present.grains.arrays, name)
+        made, broken = int(present.count[MADE]), int(present.count[BROKEN])
+        used = int(present.count[CONTACTS])
+        if made == 0 and broken == 0:
+            for name in CONTACT_COLUMNS:
+                if getattr(state.contacts, name).shape[-1]:
+                    getattr(state.contacts, name)[..., self._columns] = getattr(present.contacts, name)[..., :used]
+        else:
+            self._replace_contacts(present, used)
+        for number in (MADE, BROKEN, SLIPPED):
+            state.count[number] += present.count[number]
+        state.count[CONTACT_STEPS] += present.count[STEPS]
+        state.lost += present.lost
+        present.lost[:] = 0.0
+        state.clock[SETTLED] = present.clock[SETTLED]
+        state.clock[CORRECTED] += present.clock[CORRECTED]
+        present.count[MADE] = present.count[BROKEN] = present.count[SLIPPED] = 0
+
+    def _replace_contacts(self, present: State, used: int) -> None:
+        """Contacts of all grains after some formed or broke: those at rest, then those of awake grains."""
+        state, contacts = self._state, self._state.contacts
+        total = int(state.count[CONTACTS])
+        kept = np.setdiff1d(np.arange(total), self._columns)
+        if contacts.pair.shape[1] < len(kept) + used:
+            state.grow_contacts(len(kept) + used)
+            contacts = state.contacts
+        first, end = len(kept), len(kept) + used
+        pairs = self._awake[present.contacts.pair[:, :used]]
+        for name in ("pair", *CONTACT_COLUMNS, "constants"):
+            array = getattr(contacts, name)
+            if not array.shape[-1]:
+                continue
+            if name == "constants" and state.uniform_contacts:
+                array[...] = present.contacts.constants
+                continue
+            array[..., :first] = array[..., kept]
+            array[..., first:end] = pairs if name == "pair" else getattr(present.contacts, name)[..., :used]
+        state.count[CONTACTS] = end
+        resort_contacts_by_grain(state.grains.arrays, contacts, state.count)
+        self._columns = np.arange(first, end)
+
+    def _finish_step(self) -> None:
+        """The second half kick of awake clusters; clusters that are at rest become bodies."""
+        assert self.inner is not None
+        state, inner, bodies = self._state, self.inner, self._state.bodies
+        present = inner._state
+        self._kick_awake(present)
+        for name in ("velocity", "spin"):
+            getattr(state.grains.arrays, name)[..., self._awake] = getattr(present.grains.arrays, name)
+        measures = self._measures
+        measure_clusters_stage(self.law).run(self._inner_table(present), measures)
+        firsts = self._awake[measures.first.astype(np.int64)]
+        if not np.array_equal(firsts, bodies.first[self._awake]):
+            self._rename(firsts)
+        mark_near_bodies.run(self._current_table(state))
+        rested = False
+        for k in np.unique(measures.first).astype(np.int64):
+            first = int(self._awake[k])
+            own = np.flatnonzero(measures.first == k)
+            if len(own) == 1:
+                if bodies.near[first] == 0:
+                    self._rest_single(first)
+                    rested = True
+                continue
+            if measures.vibration[k] > self._limits.vibration * measures.limit[k]:
+                bodies.vibration[first] = state.time
+            wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
+            quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
+            self._describe(k, own, present)
+            if quiet and measures.strain[k] < REST_STRAIN and bodies.near[first] == 0:
+                self._rest(first, self._awake[own])
+                rested = True
+        if rested:
+            self._sort_members()
+
+    @property
+    def _limits(self) -> RigidLimits:
+        limits: RigidLimits = self.parameters.flight_limits
+        return limits
+
+    def _rename(self, firsts: np.ndarray) -> None:
+        """New first grains of the clusters of the awake grains, after contacts formed or broke."""
+        bodies = self._state.bodies
+        before = bodies.first[self._awake].copy()
+        for first in np.unique(firsts):
+            own = firsts == first
+            if not np.array_equal(own, before == first):
+                bodies.event[first] = bodies.vibration[first] = self._state.time
+        bodies.first[self._awake] = firsts
+        self._sort_members()
+
+    def _regroup(self) -> None:
+        """Clusters from the contacts of all grains."""
+        from ..analysis.clusters import cluster_labels
+
+        state = self._state
+        pair = state.contacts.pair[:, : state.count[CONTACTS]].T
+        labels = cluster_labels(len(state.grains), pair)
+        first = np.full(labels.max() + 1, len(labels))
+        np.minimum.at(first, labels, np.arange(len(labels)))
+        state.bodies.first[:] = first[labels]
+        self._sort_members()
+
+    def _describe(self, k: int, own: np.ndarray, present: State) -> None:
+        """Mass, centre, principal axes and offsets of an awake cluster, as of a body."""
+        bodies, first, index = self._state.bodies, int(self._awake[k]), self._awake[own]
+        grains, s = present.grains.arrays, present.clusters.offset[:, own]
+        m, inertia = grains.mass[own], grains.inertia[own]
+        tensor = ((m * s**2).sum() + inertia.sum()) * np.eye(3) - (m * s) @ s.T
+        principal, axes = np.linalg.eigh(tensor)
+        if np.linalg.det(axes) < 0.0:
+            axes[:, 0] *= -1.0
+        bodies.mass[first], bodies.inertia[:, first] = m.sum(), principal
+        bodies.centre[:, first] = self._state.box.wrap((grains.position[:, own[0]] - s[:, 0])[None])[0]
+        bodies.orientation[:, first] = _quaternion(axes)
+        bodies.offset[:, index] = axes.T @ s
+
+    def _rest(self, first: int, index: np.ndarray) -> None:
+        """Project the velocities of a cluster on the rigid motion with its P and L; from now on it is a body."""
+        state, bodies, grains = self._state, self._state.bodies, self._state.grains.arrays
+        q = bodies.orientation[:, first]
+        m, inertia = grains.mass[index], grains.inertia[index]
+        v, w = grains.velocity[:, index], grains.spin[:, index]
+        s = _turned(q, bodies.offset[:, index])
+        momentum = (m * v).sum(axis=1)
+        u = v - (momentum / m.sum())[:, None]
+        angular = (m * np.cross(s, u, axis=0) + inertia * w).sum(axis=1)
+        bodies.momentum[:, first] = momentum
+        bodies.angular_momentum[:, first] = _turned_back(q, angular[:, None]).ravel()
+        inverse = np.array([-1.0, -1.0, -1.0, 1.0]) * q
+        for i in index:
+            bodies.turn[:, i] = product(tuple(inverse), tuple(grains.orientation[:, i]))
+        spin = _turned(q, (bodies.angular_momentum[:, first] / bodies.inertia[:, first])[:, None])
+        new_v = (momentum / m.sum())[:, None] + np.cross(spin, s, axis=0)
+        state.lost[QUIETING] += 0.5 * float((m * (v - new_v) * (v + new_v)).sum())
+        state.lost[QUIETING] += 0.5 * float((inertia * (w - spin) * (w + spin)).sum())
+        grains.velocity[:, index], grains.spin[:, index] = new_v, spin
+        bodies.asleep[index] = 1
+        bodies.strain[first] = self._measures.strain[np.searchsorted(self._awake, first)]
+        bodies.strength[:, first] = self._measures.strength[:, np.searchsorted(self._awake, first)]
+        self._measure_inner_loads(first, index)
+        state.count[RESTED] += 1
+
+    def _measure_inner_loads(self, first: int, index: np.ndarray) -> None:
+        """Loads and fields of the grains of a body on each other, in the body."""
+        state, bodies = self._state, self._state.bodies
+        number = int(np.searchsorted(np.unique(bodies.first), first))
+        table = self._current_table(state)
+        for name in ("inner_force", "inner_torque", "inner_field"):
+            getattr(bodies, name)[:, index] = 0.0
+        for _, sums, numbers in self.long_range:
+            inner_loads_stage(sums.pair).run(table, numbers, number)
+        if state.grains.arrays.body_moment.any():
+            set_inner_fields.run(table, (), number)
+        for name in ("inner_force", "inner_torque", "inner_field"):
+            array = getattr(bodies, name)
+            array[:, index] = _turned_back(bodies.orientation[:, first], array[:, index])
+
+
+def _matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a unit quaternion."""
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _turned(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (3, n) from the body to the laboratory frame."""
+    return _matrix(q) @ vectors
+
+
+def _turned_back(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (3, n) from the laboratory frame to the body."""
+    return _matrix(q).T @ vectors
+
+
+def _quaternion(matrix: np.ndarray) -> np.ndarray:
+    """Unit quaternion of a rotation matrix."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(matrix).as_quat()
