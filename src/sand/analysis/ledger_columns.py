@@ -13,7 +13,10 @@ from ..state.state import DAMPING, LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 DAMPED = tuple(f"lost_{name}" for name in DAMPING)
-ALWAYS_LOST = ("lost_forming", "lost_breaking", "lost_sliding", "lost_rolling", "lost_twisting", "lost_settling")
+ALWAYS_LOST = (
+    *("lost_forming", "lost_breaking", "lost_sliding", "lost_rolling", "lost_twisting"),
+    *("lost_settling", "lost_quieting"),
+)
 ROUNDING = 4.0 * np.finfo(float).eps
 """Relative change of the total energy that is attributed to rounding. Bodies at rest of up to 64,000 grains change by
 one unit in the last place."""

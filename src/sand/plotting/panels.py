@@ -30,10 +30,12 @@ from .style import (
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
-LOSS_CHANNELS = {name: (f"lost_{name}",) for name in LOST if name not in DAMPING} | {
-    "damping": tuple(f"lost_{name}" for name in DAMPING)
+LOSS_CHANNELS = {name: (f"lost_{name}",) for name in LOST if name not in (*DAMPING, "quieting")} | {
+    "settling": ("lost_settling", "lost_quieting"),
+    "damping": tuple(f"lost_{name}" for name in DAMPING),
 }
-"""Ledger columns of each loss channel of the figures; damping of the four modes of a contact is drawn together."""
+"""Ledger columns of each loss channel of the figures; damping of the four modes of a contact is drawn together, and so
+is motion within clusters that is removed."""
 LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, YELLOW, BROWN, TEXT_COLOUR, MUTED, INDIGO, ORANGE)
 EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}

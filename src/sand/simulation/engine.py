@@ -132,7 +132,7 @@ class Engine:
     def __deepcopy__(self, memo: dict[int, Any]) -> Engine:
         """A copy with a table of its own."""
         names = [each.name for each in fields(self) if each.init]
-        other = Engine(*(copy.deepcopy(getattr(self, name), memo) for name in names))
+        other = type(self)(*(copy.deepcopy(getattr(self, name), memo) for name in names))
         other._is_sorted, other._output_time = self._is_sorted, self._output_time
         return other
 
@@ -419,7 +419,7 @@ class Engine:
         (table, _), shares = self._call_table(math.inf, 1, False), np.zeros(len(self._state.grains))
         program = build_program(self._components, self.parameters, table)
         table.set("program", program)
-        stages: list[tuple[Any, Any]] = [(advance, ()), *program.stages.values()]
+        stages: list[tuple[Any, Any]] = [*self._drivers(), *program.stages.values()]
         stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
         stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in self.long_range]
         stages += [
@@ -427,6 +427,10 @@ class Engine:
         ]
         missing = [each.purpose for each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)]
         return list(dict.fromkeys(missing))
+
+    def _drivers(self) -> list[tuple[Stage, Any]]:
+        """Stages that the engine itself calls during a run, with their parameters."""
+        return [(advance, ())]
 
     def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """One call of the driver."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
 from ..forces.external.loops import external_energies_for
@@ -40,6 +41,7 @@ from ..state.state import (
     LEFT,
     LONG_RANGE_SUMS,
     MADE,
+    OUTSIDE,
     PAIRS,
     QUIETING,
     RESTED,
@@ -87,6 +89,10 @@ class RigidEngine(Engine):
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+
+    def _drivers(self) -> list[tuple[Stage, Any]]:
+        """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
+        return [*super()._drivers(), (advance_bodies, ()), (mark_near_bodies, ())]
 
     def begin(self) -> None:
         """As `Engine.begin`; clusters start awake, single grains as bodies."""
@@ -147,11 +153,12 @@ class RigidEngine(Engine):
         self._state.count[BODIES] = len(firsts)
         bodies.start[: len(firsts)] = np.searchsorted(bodies.first[bodies.member], firsts)
         bodies.start[len(firsts) :] = n
-        self._awake = np.flatnonzero(bodies.asleep == 0)
-        self._list_awake_contacts()
+        self._list_awake()
 
-    def _list_awake_contacts(self) -> None:
+    def _list_awake(self) -> None:
+        """Lists of the grains of awake clusters, and of their contacts."""
         contacts, used = self._state.contacts, int(self._state.count[CONTACTS])
+        self._awake = np.flatnonzero(self._state.bodies.asleep == 0)
         self._columns = np.flatnonzero(self._state.bodies.asleep[contacts.pair[0, :used]] == 0)
 
     def _members(self, first: int) -> np.ndarray:
@@ -184,6 +191,7 @@ class RigidEngine(Engine):
         state = self._state
         if state.count[BODIES] == 0 or (state.count[STAGE] == 1 and state.clock[STEP] == 0.0):
             return super()._call_driver(until, last, shorten)
+        self._list_awake()  # of a copy of the state, or a loaded one
         while True:
             stop = self._bodies_driver(until, last, shorten)
             if stop is Stop.TOUCH_AHEAD:
@@ -271,7 +279,7 @@ class RigidEngine(Engine):
         if self.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in self.external:
-                state.lost[12] += self._external_energy(outer, end) - self._external_energy(outer, before)
+                state.lost[OUTSIDE] += self._external_energy(outer, end) - self._external_energy(outer, before)
         present.count[STAGE] = 1
         present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
         inner._drive(-math.inf, 1)
@@ -283,6 +291,7 @@ class RigidEngine(Engine):
                 own = int(present.count[grain])
                 state.count[grain] = self._awake[own] if own >= 0 else -1
             self._copy_back(present)
+            state.clock[TIME], state.count[STAGE] = present.time, 0
             return stop
         self._copy_back(present)
         return Stop.NONE
