@@ -12,6 +12,7 @@ from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
 from ..errors import did_you_mean
 from ..grains import moment_size
 from ..integrate.registry import INTEGRATORS
+from ..integrate.rigid_clusters import RigidClusters
 from ..integrate.verlet import Verlet
 from ..io.run_folder import checked_name
 from ..setup.grain_classes import material_as_given, radius_as_given
@@ -73,13 +74,30 @@ Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
 """Seed of random numbers."""
 
 
+CLUSTERS = {"grains": Verlet.name, "rigid": RigidClusters.name}
+"""`clusters` of the [stepping] table, and the `method` that it stands for."""
+
+
+def method_of(table: dict[str, Any]) -> str:
+    """The integrator that a [stepping] table selects by `method`, or by `clusters`."""
+    return str(table.get("method", CLUSTERS.get(str(table.get("clusters", "grains")), "")))
+
+
 def _without_method(value: Any) -> Any:
-    """The [stepping] table without `method`, evaluated by `with_integrator`.  Raises ValueError if unknown."""
-    if isinstance(value, dict) and "method" in value:
-        value = dict(value)
-        method = value.pop("method")
-        if str(method) not in INTEGRATORS:
-            raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
+    """The [stepping] table without `method` and `clusters`, evaluated by `with_integrator`.
+
+    Raises ValueError if they are unknown or contradict each other.
+    """
+    if not isinstance(value, dict) or not {"method", "clusters"} & set(value):
+        return value
+    value = dict(value)
+    method, clusters = value.pop("method", None), value.pop("clusters", None)
+    if method is not None and str(method) not in INTEGRATORS:
+        raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
+    if clusters is not None and str(clusters) not in CLUSTERS:
+        raise ValueError(f"clusters = {clusters!r}; {did_you_mean(str(clusters), list(CLUSTERS))}")
+    if None not in (method, clusters) and (clusters == "rigid") != (method == CLUSTERS["rigid"]):
+        raise ValueError(f"clusters = {clusters!r} contradicts method = {method!r}; leave one of them out")
     return value
 
 
@@ -90,7 +108,7 @@ Stepping = Annotated[Verlet, BeforeValidator(_without_method)]
 def with_integrator(model: type[Any], content: dict[str, Any]) -> type[Any]:
     """The model of a case file whose [stepping] table has the keys of the integrator that `content` selects."""
     given = content.get("stepping")
-    integrator = INTEGRATORS.get(str(given.get("method", "verlet"))) if isinstance(given, dict) else None
+    integrator = INTEGRATORS.get(method_of(given)) if isinstance(given, dict) else None
     if integrator is None or integrator is model.model_fields["stepping"].annotation:
         return model
     section: Any = Annotated[integrator, BeforeValidator(_without_method)]

@@ -35,7 +35,9 @@ class ClusterMeasures(NamedTuple):
 
 def cluster_measures(grains: int) -> ClusterMeasures:
     """Allocate the results for a number of grains."""
-    return ClusterMeasures(*(np.zeros((2, grains) if name == "strength" else grains) for name in ClusterMeasures._fields))
+    return ClusterMeasures(
+        *(np.zeros((2, grains) if name == "strength" else grains) for name in ClusterMeasures._fields)
+    )
 
 
 @stage("the kicks of awake clusters")
@@ -103,7 +105,7 @@ def measure_clusters_stage(law: ContactLaw) -> Stage:
             parameters.strength[0, first] = parameters.strength[1, first] = math.inf
         for c in range(count[CONTACTS]):
             i, j = contacts.pair[0, c], contacts.pair[1, c]
-            first = np.int64(parameters.first[i])
+            own_cluster = np.int64(parameters.first[i])
             r1, r2 = grains.radius[i], grains.radius[j]
             pose, own = pose_at(grains, contacts, span, c, contacts.twist[c]), constants_at(contacts, c)
             moved = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, own)
@@ -127,11 +129,11 @@ def measure_clusters_stage(law: ContactLaw) -> Stage:
             force = min(abs(at_break(own)[1]), own.slide_stiffness * own.slide_limit)
             torque = own.reduced_radius * own.roll_stiffness * own.roll_limit
             torque = min(torque, own.twist_stiffness * own.twist_limit)
-            parameters.period[first] = max(parameters.period[first], period)
-            parameters.limit[first] = min(parameters.limit[first], 0.5 * energy)
-            parameters.strain[first] = max(parameters.strain[first], share)
-            parameters.strength[0, first] = min(parameters.strength[0, first], force)
-            parameters.strength[1, first] = min(parameters.strength[1, first], torque)
+            parameters.period[own_cluster] = max(parameters.period[own_cluster], period)
+            parameters.limit[own_cluster] = min(parameters.limit[own_cluster], 0.5 * energy)
+            parameters.strain[own_cluster] = max(parameters.strain[own_cluster], share)
+            parameters.strength[0, own_cluster] = min(parameters.strength[0, own_cluster], force)
+            parameters.strength[1, own_cluster] = min(parameters.strength[1, own_cluster], torque)
         return 0
 
     return measure_clusters

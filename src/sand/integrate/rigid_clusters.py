@@ -17,7 +17,7 @@ from .verlet import Verlet
 
 MOST_VIBRATION, MOST_STEP_FRACTION = 0.1, 0.2
 """Largest values accepted: above, clusters would come to rest while they swing, and steps would not be accurate."""
-SAMPLES = 10.0
+SAMPLES = 4.0
 """Longest step while a cluster is awake, in these parts of the shortest time after which a cluster may be at rest."""
 
 
@@ -28,6 +28,7 @@ class RigidLimits(NamedTuple):
     step_fraction: float  # longest step times the rate of change of a body's loads
     longest_step: float  # [s]
     longest_awake: float  # [s], while a cluster is awake
+    smallest_radius: float  # [m]
 
 
 @register
@@ -105,6 +106,6 @@ class RigidClusters:
         return self
 
     def flight_limits(self, longest_displacement: float) -> RigidLimits:
-        """Run-time numbers; `longest_awake` is set by the engine, which knows the contacts."""
+        """Run-time numbers; the engine, which knows contacts and grains, sets the last two."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
-        return RigidLimits(self.vibration, self.step_fraction, longest, longest)
+        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0)

@@ -42,8 +42,8 @@ from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
 from .step_control import is_close, is_past
 from .task_queue import join_workers
 
-LARGEST_TURN = 0.3
-"""Largest rotation of a body in one step [rad]."""
+LARGEST_TURN, LARGEST_TURN_OF_SPHERE = 0.3, 0.5
+"""Largest rotation of a body in one step [rad]; the rotor is exact for single grains."""
 LARGEST_FLIGHT = 0.1
 """Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
 TOUCH_SPEED = 1.2
@@ -55,7 +55,7 @@ WAKE_SHARE = 0.5
 
 
 @formula
-def squared_rates(grains, bodies, criteria, b):
+def squared_rates(grains, bodies, criteria, limits, b):
     """Square of the largest rate [1/s²] at which the loads of a body change.
 
     Rotation in the field of other bodies: Σ|μ B|/I; translation: 4 F/(M d), d two of the smallest radii, for forces
@@ -70,7 +70,7 @@ def squared_rates(grains, bodies, criteria, b):
         energy += norm(load(grains.moment, i)) * (norm(outer) + criteria.outer_field)
     smallest = min(inertia[0], min(inertia[1], inertia[2]))
     force = norm(load(bodies.force, first))
-    return max(energy / smallest, 2.0 * force / (bodies.mass[first] * criteria.pair_gap))
+    return max(energy / smallest, 2.0 * force / (bodies.mass[first] * limits.smallest_radius))
 
 
 @loop
@@ -81,8 +81,9 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1:
             spin = spin_of(bodies, first)
-            turning = max(turning, dot(spin, spin))
-            square = max(square, squared_rates(grains, bodies, criteria, b))
+            allowed = LARGEST_TURN if bodies.start[b + 1] - bodies.start[b] > 1 else LARGEST_TURN_OF_SPHERE
+            turning = max(turning, dot(spin, spin) / (allowed * allowed))
+            square = max(square, squared_rates(grains, bodies, criteria, limits, b))
         for k in range(bodies.start[b], bodies.start[b + 1]):
             v = load(grains.velocity, bodies.member[k])
             speed = dot(v, v)
@@ -96,7 +97,7 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
             apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             v = sub(load(grains.velocity, i), load(grains.velocity, j))
             square = max(square, dot(v, v) / dot(apart, apart))
-    rate = max(math.sqrt(square) / limits.step_fraction, math.sqrt(turning) / LARGEST_TURN)
+    rate = max(math.sqrt(square) / limits.step_fraction, math.sqrt(turning))
     rate = max(rate, math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap))
     h = min(limits.longest_step, criteria.longest)
     if some_awake:

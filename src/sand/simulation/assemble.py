@@ -6,20 +6,19 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ..box import Box
 from ..constants import BOLTZMANN
-from ..contact.columns import constant_names
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
 from ..forces.pair.ewald_force import EwaldForce
-from ..forces.pair.loops import LongRangeSums, all_blocks
+from ..forces.pair.loops import LongRangeSums
 from ..grains import Grains
 from ..integrate.base import Integrator
 from ..integrate.parts import (
@@ -38,36 +37,18 @@ from ..material import SILICA
 from ..neighbours.settings import ChosenSearch, Neighbours
 from ..ramps import ramps_of
 from ..setup.from_frame import StrainedContacts
-from ..state.arrays import (
-    ALWAYS_RECORDED,
-    CELL_ARRAYS,
-    FORCE_ARRAYS,
-    LIST_ARRAYS,
-    OVER_ALLOCATION,
-    PACKED_ARRAYS,
-    RATE_ARRAYS,
-    RESPA_ARRAYS,
-    body_arrays,
-    cluster_arrays,
-    empty_contact_arrays,
-    empty_long_range_arrays,
-    empty_pair_list,
-    runge_kutta_arrays,
-)
-from ..state.state import COMPARED, CUT_RADIUS, RECORDED, State
+from ..state.arrays import OVER_ALLOCATION, body_arrays
+from ..state.state import COMPARED, CUT_RADIUS
 from .checks import check_system
 from .cluster_cutoff import follow_clusters
 from .driven import Driven, check_driven, driven_arrays
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
+from .new_state import new_state
 from .ramped import RampedForces
-from .rigid_engine import RigidEngine
+from .rigid_engine import LIST_GAP, RigidEngine, longest_step_awake
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
-NEIGHBOURS_PER_GRAIN = 4
-"""Initial capacity of the Verlet list per grain; it grows on overflow."""
-CELL_NEIGHBOURS = 1000
-"""Capacity for the neighbours of one grain where pairs come straight from the cells and no list is stored."""
 WIDE_FROM = 64
 """Fewest grains for the widest SIMD vectors; with fewer, most lanes of the last vector would be idle."""
 IDLE = 1e5
@@ -167,6 +148,12 @@ def build_engine(
         stepping.flight_limits(_longest_displacement(grains, box, found)),
         ForceNumbers(len(long_range), len(by_type.external)),
     )
+    if isinstance(stepping, RigidClusters):
+        law = (by_type.contact or Contact()).contact_law
+        awake = min(parameters.flight_limits.longest_step, longest_step_awake(law, parameters.settings, grains))
+        limits = parameters.flight_limits._replace(longest_awake=awake, smallest_radius=pair_gap)
+        wider = control._replace(pair_gap=LIST_GAP * pair_gap)
+        parameters = parameters._replace(flight_limits=limits, criteria=wider)
     components = Components(
         (by_type.contact or Contact()).contact_law,
         [(sums, numbers) for _, sums, numbers in long_range],
@@ -193,8 +180,7 @@ def build_engine(
     engine = Engine(*parts)
     if isinstance(stepping, RigidClusters):
         state.bodies = body_arrays(len(grains))
-        inner = inner_engine(wrapped, forces, box, verlet, seed)
-        engine = RigidEngine(*parts, inner=inner)
+        engine = RigidEngine(*parts, inner=inner_engine(wrapped, forces, box, verlet, seed))
     if any(map(ramps_of, forces)):
         changing = functools.partial(
             _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
@@ -208,9 +194,11 @@ def build_engine(
 
 
 def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verlet, seed: int) -> Engine:
-    """The engine of the grains of awake clusters; pairs that interact beyond the nearest image are left to the bodies."""
+    """The engine of the grains of awake clusters; what images other than the nearest one add is left to the bodies."""
     near = [force.of_nearest_images() if isinstance(force, EwaldForce) else force for force in forces]
-    return build_engine(grains, near, box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False)
+    return build_engine(
+        grains, cast("list[Force]", near), box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False
+    )
 
 
 def check_rigid_clusters(
@@ -291,52 +279,6 @@ def _respa_settings(
                 "lacks; use far = 'impulse' or 'every step'"
             )
     return RespaSettings(most, verlet.far == "taylor-literal", scheme == "impulse", taylor)
-
-
-def new_state(
-    grains: Grains,
-    box: Box,
-    parameters: StepParameters,
-    components: Components,
-    capacity: int,
-    *,
-    over_all_pairs: bool,
-) -> State:
-    """State with the arrays that the stages need.
-
-    `capacity` is that of contacts and pairs, `over_all_pairs` whether any long-range force is summed over all pairs.
-    """
-    count, search, settings = len(grains), parameters.search, parameters.settings
-    uniform_contacts = settings.uniform_contacts
-    channels = len(RECORDED) if settings.damped or settings.follow else ALWAYS_RECORDED
-    pair_forces = [sums for sums, _ in components.pair_forces]
-    needed = set(LIST_ARRAYS if search.listed else CELL_ARRAYS if search.celled else ())
-    needed |= set(RESPA_ARRAYS if parameters.respa.impulse else ())
-    needed |= set(RATE_ARRAYS if parameters.respa.taylor else ())
-    needed |= {name for sums in pair_forces for name in sums.arrays}
-    needed |= set(FORCE_ARRAYS if pair_forces or components.flight else ())
-    return State(
-        grains,
-        box,
-        empty_contact_arrays(
-            count,
-            capacity,
-            len(constant_names(components.law)),
-            uniform_contacts=uniform_contacts,
-            channels=channels,
-            damped=settings.damped,
-        ),
-        empty_pair_list(count, capacity, uniform_contacts=uniform_contacts),
-        empty_long_range_arrays(
-            count,
-            NEIGHBOURS_PER_GRAIN * count if search.listed else CELL_NEIGHBOURS if search.celled else 0,
-            all_blocks(grains) if pair_forces and over_all_pairs else 0,
-            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
-        ),
-        runge_kutta=runge_kutta_arrays(count if components.flight else 0),
-        clusters=cluster_arrays(count if settings.settling_time < math.inf else 0),
-        uniform_contacts=uniform_contacts,
-    )
 
 
 def _longest_displacement(grains: Grains, box: Box, found: ChosenSearch) -> float:

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.clusters import cluster_labels
 from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
+from ..contact.law import ContactLaw, Pairing, contact_constants
 from ..forces.external.loops import external_energies_for
+from ..grains import Grains
 from ..integrate.awake_clusters import (
     ClusterMeasures,
     cluster_measures,
@@ -20,10 +23,10 @@ from ..integrate.awake_clusters import (
     measure_clusters_stage,
     set_inner_fields,
 )
-from ..integrate.parts import DT, Stop
+from ..integrate.parts import DT, ContactParameters, Stop
 from ..integrate.rigid_body import product
 from ..integrate.rigid_clusters import SAMPLES, RigidLimits
-from ..integrate.rigid_driver import NEAR, TOUCHING, WAKE_SHARE, advance_bodies, bound_contact_loads, mark_near_bodies
+from ..integrate.rigid_driver import TOUCHING, advance_bodies, mark_near_bodies
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..state.arrays import SAVED_LONG_RANGE, cluster_arrays
 from ..state.state import (
@@ -57,10 +60,13 @@ from ..state.state import (
 )
 from .changed_state import subset
 from .engine import Engine
+from .new_state import new_state
 
 PERIODS = 10.0
-"""Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of more
-than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
+"""Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
+more than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
+LIST_GAP = 3.0
+"""Largest gap of pairs that the driver of bodies looks at, in smallest radii: steps of bodies are long."""
 REST_STRAIN = 0.5
 """Largest displacement of a contact of a cluster at rest, in units of its limit."""
 CONTACT_COLUMNS = (
@@ -112,8 +118,7 @@ class RigidEngine(Engine):
     def _form_bodies(self) -> None:
         """Make a body of each grain without contacts; clusters are awake."""
         state = self._state
-        bodies, grains = state.bodies, state.grains.arrays
-        n = len(state.grains)
+        bodies, n = state.bodies, len(state.grains)
         bodies.first[:], bodies.asleep[:] = np.arange(n), 0
         bodies.event[:] = bodies.vibration[:] = state.time
         self._sort_members()
@@ -125,7 +130,7 @@ class RigidEngine(Engine):
         bodies.turn[...] = np.array([[0.0], [0.0], [0.0], [1.0]])
         bodies.strain[:] = bodies.load[:] = 0.0
         bodies.strength[...] = math.inf
-        for i in np.flatnonzero(alone):
+        for i in np.flatnonzero(alone).tolist():
             self._rest_single(i)
         self._sum_outer_loads()
 
@@ -136,9 +141,9 @@ class RigidEngine(Engine):
         bodies.mass[i], bodies.inertia[:, i] = grains.mass[i], grains.inertia[i]
         bodies.centre[:, i], bodies.orientation[:, i] = grains.position[:, i], grains.orientation[:, i]
         bodies.momentum[:, i] = grains.mass[i] * grains.velocity[:, i]
-        bodies.angular_momentum[:, i] = grains.inertia[i] * _turned_back(
-            grains.orientation[:, i], grains.spin[:, i : i + 1]
-        ).ravel()
+        bodies.angular_momentum[:, i] = (
+            grains.inertia[i] * _turned_back(grains.orientation[:, i], grains.spin[:, i : i + 1]).ravel()
+        )
         for name in ("offset", "inner_force", "inner_torque", "inner_field"):
             getattr(bodies, name)[:, i] = 0.0
         bodies.turn[:, i] = 0.0, 0.0, 0.0, 1.0
@@ -208,7 +213,7 @@ class RigidEngine(Engine):
     def _wake(self) -> None:
         """Wake all bodies that may touch, or whose contacts are loaded."""
         bodies, state = self._state.bodies, self._state
-        for first in np.flatnonzero((bodies.near == TOUCHING) & (bodies.asleep == 1)):
+        for first in np.flatnonzero((bodies.near == TOUCHING) & (bodies.asleep == 1)).tolist():
             own = self._members(first)
             bodies.asleep[own] = 0
             bodies.event[first] = bodies.vibration[first] = state.time
@@ -257,15 +262,12 @@ class RigidEngine(Engine):
 
     def _new_inner_state(self, index: np.ndarray) -> State:
         """Memory for these grains."""
-        from .assemble import new_state
-
         assert self.inner is not None
         grains = subset(self._state.grains, index)
         grains.arrays = grains.arrays._replace(id=index.astype(np.uint32))
         parameters, components = self.inner.parameters, self.inner._components
-        made = new_state(
-            grains, self._state.box, parameters, components, len(self._columns), over_all_pairs=True
-        )
+        capacity = len(self._columns)
+        made = new_state(grains, self._state.box, parameters, components, capacity, over_all_pairs=True)
         made.uniform_contacts = self._state.uniform_contacts
         made.clusters = cluster_arrays(len(index))
         return made
@@ -380,6 +382,8 @@ class RigidEngine(Engine):
         firsts = self._awake[measures.first.astype(np.int64)]
         if not np.array_equal(firsts, bodies.first[self._awake]):
             self._rename(firsts)
+            for k in np.unique(measures.first).astype(np.int64):
+                self._describe(k, np.flatnonzero(measures.first == k), present)
         mark_near_bodies.run(self._current_table(state))
         rested = False
         for k in np.unique(measures.first).astype(np.int64):
@@ -394,12 +398,22 @@ class RigidEngine(Engine):
                 bodies.vibration[first] = state.time
             wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
             quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
-            self._describe(k, own, present)
-            if quiet and measures.strain[k] < REST_STRAIN and bodies.near[first] == 0:
+            if quiet and measures.strain[k] < REST_STRAIN and bodies.near[first] == 0 and self._fits(own, present):
+                self._describe(k, own, present)
                 self._rest(first, self._awake[own])
                 rested = True
         if rested:
             self._sort_members()
+
+    def _fits(self, own: np.ndarray, present: State) -> bool:
+        """Whether a cluster extends over less than half of the box along each periodic axis.
+
+        Larger ones stay awake: their grains may act on each other through the images of the box.
+        """
+        s = present.clusters.offset[:, own]
+        extent = s.max(axis=1) - s.min(axis=1)
+        lengths = self._state.box.lengths
+        return all(side is None or size < 0.5 * side for size, side in zip(extent, lengths, strict=True))
 
     @property
     def _limits(self) -> RigidLimits:
@@ -419,8 +433,6 @@ class RigidEngine(Engine):
 
     def _regroup(self) -> None:
         """Clusters from the contacts of all grains."""
-        from ..analysis.clusters import cluster_labels
-
         state = self._state
         pair = state.contacts.pair[:, : state.count[CONTACTS]].T
         labels = cluster_labels(len(state.grains), pair)
@@ -464,6 +476,7 @@ class RigidEngine(Engine):
         state.lost[QUIETING] += 0.5 * float((inertia * (w - spin) * (w + spin)).sum())
         grains.velocity[:, index], grains.spin[:, index] = new_v, spin
         bodies.asleep[index] = 1
+        bodies.load[first] = 0.0
         bodies.strain[first] = self._measures.strain[np.searchsorted(self._awake, first)]
         bodies.strength[:, first] = self._measures.strength[:, np.searchsorted(self._awake, first)]
         self._measure_inner_loads(first, index)
@@ -483,6 +496,30 @@ class RigidEngine(Engine):
         for name in ("inner_force", "inner_torque", "inner_field"):
             array = getattr(bodies, name)
             array[:, index] = _turned_back(bodies.orientation[:, first], array[:, index])
+
+
+def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Grains) -> float:
+    """Longest step [s] of bodies while clusters are awake, so that their vibrations are seen often enough.
+
+    A quarter of the shortest time for which they must be low: PERIODS of the slowest mode of the contact of two of the
+    smallest grains of each material.
+    """
+    found, of_pair = math.inf, contact_constants(law)
+    members = [np.flatnonzero(grains.arrays.material == k) for k in range(len(grains.materials))]
+    smallest = [int(own[np.argmin(grains.radius[own])]) for own in members]
+    for i in smallest:
+        for j in smallest:
+            pairing = Pairing(*settings.pairings[:, grains.arrays.material[i], grains.arrays.material[j]])
+            c = of_pair(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
+            inertia = 1.0 / grains.inertia[i] + 1.0 / grains.inertia[j]
+            slowest = min(
+                3.5 * c.slide_stiffness * (1.0 / grains.mass[i] + 1.0 / grains.mass[j]),
+                c.roll_stiffness * c.reduced_radius**2 * inertia,
+                c.twist_stiffness * inertia,
+            )
+            if slowest > 0.0:
+                found = min(found, 2.0 * math.pi / math.sqrt(slowest))
+    return PERIODS * found / SAMPLES
 
 
 def _matrix(q: np.ndarray) -> np.ndarray:

@@ -289,7 +289,7 @@ def cluster_arrays(grains: int) -> ClusterArrays:
 def body_arrays(grains: int) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
     vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
-    widths = {name: 3 for name in (*vectors, "inner_force", "inner_torque", "inner_field", "force", "torque")}
+    widths = dict.fromkeys((*vectors, "inner_force", "inner_torque", "inner_field", "force", "torque"), 3)
     widths |= {"orientation": 4, "turn": 4, "strength": 2}
     found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
     for name, kind in (("first", np.uint32), ("member", np.uint32), ("asleep", np.uint8), ("near", np.uint8)):
