@@ -2,7 +2,6 @@
 
 import functools
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +15,11 @@ from ..contact.mechanics import displacements_of
 from ..contact.settling import list_cluster, rigid_motion, solve_symmetric
 from ..contact.update import pose_at
 from ..forces.pair.dipole_formulas import pair_load
-from ..numerics.vec import accrue, across, add, cross, dot, load, norm, put, scale, sub
+from ..numerics.quaternion import turned_back
+from ..numerics.vec import accrue, across, add, cross, dot, load, load4, norm, put, scale, sub
 from ..state.state import CONTACTS
 from .parts import DT
+from .rigid_body import store_rest_loads
 
 
 class ClusterMeasures(NamedTuple):
@@ -139,40 +140,21 @@ def measure_clusters_stage(law: ContactLaw) -> Stage:
     return measure_clusters
 
 
-@functools.cache
-def inner_loads_stage(pair: Callable) -> Stage:
-    """The stage that adds the loads of pairs of grains of body `block` to its inner loads, in the laboratory frame.
-
-    `pair` is `LongRangeSums.pair` of a long-range force, whose numbers are the parameters of the stage.
-    """
-
-    @stage("the forces between grains of a body")
-    def add_inner_loads(grains, bodies, span, parameters, block):
-        for k in range(bodies.start[block], bodies.start[block + 1]):
-            i = bodies.member[k]
-            for m in range(bodies.start[block], k):
-                j = bodies.member[m]
-                force, torque1, torque2 = pair(grains, span, parameters, i, j)
-                accrue(bodies.inner_force, i, force)
-                accrue(bodies.inner_force, j, scale(-1.0, force))
-                accrue(bodies.inner_torque, i, torque1)
-                accrue(bodies.inner_torque, j, torque2)
-        return 0
-
-    return add_inner_loads
-
-
 @stage("the fields between grains of a body")
-def set_inner_fields(grains, bodies, span, block):
-    """Flux density of the other grains of body `block` at each of its grains, in the laboratory frame."""
+def store_rest(grains, bodies, span, block):
+    """Store loads and fields of body `block` as it comes to rest: what its contacts carry, and what its grains feel.
+
+    `inner_field` becomes the flux density of the other grains of the body, in the frame of the body.
+    """
+    first = bodies.member[bodies.start[block]]
+    q = load4(bodies.orientation, first)
+    store_rest_loads(grains, bodies, block)
     for k in range(bodies.start[block], bodies.start[block + 1]):
-        put(bodies.inner_field, bodies.member[k], (0.0, 0.0, 0.0))
-    for k in range(bodies.start[block], bodies.start[block + 1]):
-        i = bodies.member[k]
-        for m in range(bodies.start[block], k):
+        i, field = bodies.member[k], (0.0, 0.0, 0.0)
+        for m in range(bodies.start[block], bodies.start[block + 1]):
             j = bodies.member[m]
-            apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-            _, b1, b2, _ = pair_load(apart, load(grains.moment, i), load(grains.moment, j), MAGNETIC)
-            accrue(bodies.inner_field, i, b1)
-            accrue(bodies.inner_field, j, b2)
+            if i != j:
+                apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+                field = add(field, pair_load(apart, load(grains.moment, i), load(grains.moment, j), MAGNETIC)[1])
+        put(bodies.inner_field, i, turned_back(q, field))
     return 0

@@ -191,32 +191,55 @@ def move_velocities(grains, bodies, count):
             place_velocities(grains, bodies, b)
 
 
+@formula
+def accelerations(bodies, first):
+    """Acceleration of the centre of mass [m/s²], angular acceleration [rad/s²] and spin [rad/s] of a body."""
+    q, spin, inertia = load4(bodies.orientation, first), spin_of(bodies, first), load(bodies.inertia, first)
+    torque = turned_back(q, load(bodies.torque, first))
+    torque = sub(torque, cross(turned_back(q, spin), load(bodies.angular_momentum, first)))
+    rate = turned(q, (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2]))
+    return scale(1.0 / bodies.mass[first], load(bodies.force, first)), rate, spin
+
+
+@formula
+def load_with_inertia(grains, bodies, i, q, linear, rate, spin):
+    """Force and torque on grain i less its inertia, F − m a and M − I α, and its vector from the centre of mass."""
+    s = turned(q, load(bodies.offset, i))
+    acceleration = add(linear, add(cross(rate, s), cross(spin, cross(spin, s))))
+    force = axpy(-grains.mass[i], acceleration, load(grains.force, i))
+    return force, axpy(-grains.inertia[i], rate, load(grains.torque, i)), s
+
+
+@loop
+def store_rest_loads(grains, bodies, b):
+    """Store the loads on the grains of body b, less their inertia, which its contacts carry as it comes to rest."""
+    first = bodies.member[bodies.start[b]]
+    q = load4(bodies.orientation, first)
+    linear, rate, spin = accelerations(bodies, first)
+    for k in range(bodies.start[b], bodies.start[b + 1]):
+        i = bodies.member[k]
+        force, torque, _ = load_with_inertia(grains, bodies, i, q, linear, rate, spin)
+        put(bodies.rest_force, i, turned_back(q, force))
+        put(bodies.rest_torque, i, turned_back(q, torque))
+
+
 @loop
 def contact_loads_bound(grains, bodies, b):
     """Bound of the change of the loads of the contacts of a body since it came to rest, in units of their limits.
 
-    The loads on its grains in the frame of the body are those of other bodies and of external forces, f = F − R F_inner
-    and m = M − R M_inner, and inertia, −m a and −I α.  A contact divides the body into two parts, and its load is that
-    of one part.  Therefore Σ|f − m a| bounds its force, and Σ(|m − I α| + 2 s |f − m a|) its torque, where s is the
-    largest distance of a grain from the centre of mass.
+    A contact divides the body into two parts, and carries the sum of the loads f = F − m a and t = M − I α on the
+    grains of one part.  With their changes in the frame of the body, Σ|Δf| bounds the change of its force, and
+    Σ(|Δt| + 2 s |Δf|) that of its torque, where s is the largest distance of a grain from the centre of mass.
     """
     first = bodies.member[bodies.start[b]]
-    q, spin = load4(bodies.orientation, first), spin_of(bodies, first)
-    mass, inertia = bodies.mass[first], load(bodies.inertia, first)
-    torque, angular = turned_back(q, load(bodies.torque, first)), load(bodies.angular_momentum, first)
-    in_body = turned_back(q, spin)
-    torque = sub(torque, cross(in_body, angular))
-    rate = turned(q, (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2]))
-    linear = scale(1.0 / mass, load(bodies.force, first))
+    q = load4(bodies.orientation, first)
+    linear, rate, spin = accelerations(bodies, first)
     forces = torques = extent = 0.0
     for k in range(bodies.start[b], bodies.start[b + 1]):
         i = bodies.member[k]
-        s = turned(q, load(bodies.offset, i))
-        acceleration = add(linear, add(cross(rate, s), cross(spin, cross(spin, s))))
-        own = sub(load(grains.force, i), turned(q, load(bodies.inner_force, i)))
-        forces += norm(axpy(-grains.mass[i], acceleration, own))
-        own = sub(load(grains.torque, i), turned(q, load(bodies.inner_torque, i)))
-        torques += norm(axpy(-grains.inertia[i], rate, own))
+        force, torque, s = load_with_inertia(grains, bodies, i, q, linear, rate, spin)
+        forces += norm(sub(force, turned(q, load(bodies.rest_force, i))))
+        torques += norm(sub(torque, turned(q, load(bodies.rest_torque, i))))
         extent = max(extent, dot(s, s))
     torques += 2.0 * math.sqrt(extent) * forces
     return max(forces / bodies.strength[0, first], torques / bodies.strength[1, first])

@@ -50,7 +50,7 @@ TOUCH_SPEED = 1.2
 """Closing speeds are taken this much larger to predict a touch."""
 AWAKE, NEAR, TOUCHING = range(3)
 """Values of `BodyArrays.near`: nothing near; a touch within about two steps; within the next step."""
-WAKE_SHARE = 0.5
+WAKE_SHARE = 0.75
 """Displacement of a contact, in units of its limit, above which its cluster wakes."""
 
 
@@ -323,11 +323,3 @@ def mark_near_bodies(grains, bodies, pair_list, clock, count, span):
     """Mark bodies near others, for a step as long as the last one; returns 1 if any has to wake."""
     sum_body_loads(grains, bodies, count)
     return 1 if find_near_bodies(grains, bodies, pair_list, count, span, clock[STEP]) else 0
-
-
-@stage("the loads of the contacts of bodies")
-def bound_contact_loads(grains, bodies, count, block):
-    """Set the bound of the contact loads of body `block`."""
-    sum_body_loads(grains, bodies, count)
-    bodies.load[bodies.member[bodies.start[block]]] = contact_loads_bound(grains, bodies, block)
-    return 0

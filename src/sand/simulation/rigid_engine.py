@@ -18,10 +18,9 @@ from ..grains import Grains
 from ..integrate.awake_clusters import (
     ClusterMeasures,
     cluster_measures,
-    inner_loads_stage,
     kick_clusters,
     measure_clusters_stage,
-    set_inner_fields,
+    store_rest,
 )
 from ..integrate.parts import DT, ContactParameters, Stop
 from ..integrate.rigid_body import product
@@ -125,7 +124,7 @@ class RigidEngine(Engine):
         self._regroup()
         alone = np.bincount(bodies.first, minlength=n) == 1
         alone &= bodies.first == np.arange(n)
-        for name in ("offset", "inner_force", "inner_torque", "inner_field"):
+        for name in ("offset", "rest_force", "rest_torque", "inner_field"):
             getattr(bodies, name)[...] = 0.0
         bodies.turn[...] = np.array([[0.0], [0.0], [0.0], [1.0]])
         bodies.strain[:] = bodies.load[:] = 0.0
@@ -144,7 +143,7 @@ class RigidEngine(Engine):
         bodies.angular_momentum[:, i] = (
             grains.inertia[i] * _turned_back(grains.orientation[:, i], grains.spin[:, i : i + 1]).ravel()
         )
-        for name in ("offset", "inner_force", "inner_torque", "inner_field"):
+        for name in ("offset", "rest_force", "rest_torque", "inner_field"):
             getattr(bodies, name)[:, i] = 0.0
         bodies.turn[:, i] = 0.0, 0.0, 0.0, 1.0
         bodies.strain[i] = bodies.load[i] = 0.0
@@ -479,23 +478,9 @@ class RigidEngine(Engine):
         bodies.load[first] = 0.0
         bodies.strain[first] = self._measures.strain[np.searchsorted(self._awake, first)]
         bodies.strength[:, first] = self._measures.strength[:, np.searchsorted(self._awake, first)]
-        self._measure_inner_loads(first, index)
-        state.count[RESTED] += 1
-
-    def _measure_inner_loads(self, first: int, index: np.ndarray) -> None:
-        """Loads and fields of the grains of a body on each other, in the body."""
-        state, bodies = self._state, self._state.bodies
         number = int(np.searchsorted(np.unique(bodies.first), first))
-        table = self._current_table(state)
-        for name in ("inner_force", "inner_torque", "inner_field"):
-            getattr(bodies, name)[:, index] = 0.0
-        for _, sums, numbers in self.long_range:
-            inner_loads_stage(sums.pair).run(table, numbers, number)
-        if state.grains.arrays.body_moment.any():
-            set_inner_fields.run(table, (), number)
-        for name in ("inner_force", "inner_torque", "inner_field"):
-            array = getattr(bodies, name)
-            array[:, index] = _turned_back(bodies.orientation[:, first], array[:, index])
+        store_rest.run(self._current_table(state), (), number)
+        state.count[RESTED] += 1
 
 
 def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Grains) -> float:

@@ -137,8 +137,8 @@ class BodyArrays(NamedTuple):
     vibration: np.ndarray  # (N,) time at which the vibrational energy of a body was last above the limit [s]
     offset: np.ndarray  # (3, N) of a grain from the centre of its body, in the body [m]
     turn: np.ndarray  # (4, N) orientation of a grain, in the body
-    inner_force: np.ndarray  # (3, N) long-range force of the other grains of its body on a grain, in the body [N]
-    inner_torque: np.ndarray  # (3, N) likewise [N m]
+    rest_force: np.ndarray  # (3, N) force on a grain, less its inertia, when its body came to rest, in the body [N]
+    rest_torque: np.ndarray  # (3, N) likewise [N m]
     inner_field: np.ndarray  # (3, N) flux density of the other grains of its body at a grain, in the body [T]
     # not saved: they follow from the others, or are used within a step
     member: np.ndarray  # (N,) uint32: grains, sorted by body
@@ -289,7 +289,7 @@ def cluster_arrays(grains: int) -> ClusterArrays:
 def body_arrays(grains: int) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
     vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
-    widths = dict.fromkeys((*vectors, "inner_force", "inner_torque", "inner_field", "force", "torque"), 3)
+    widths = dict.fromkeys((*vectors, "rest_force", "rest_torque", "inner_field", "force", "torque"), 3)
     widths |= {"orientation": 4, "turn": 4, "strength": 2}
     found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
     for name, kind in (("first", np.uint32), ("member", np.uint32), ("asleep", np.uint8), ("near", np.uint8)):
