@@ -21,7 +21,8 @@ def gas_simulation(**options):
     grains = sand.setup.gas(
         20, box, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="100 K", seed=11
     )
-    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box=box, **options)
+    damping = "critical" if isinstance(options.get("stepping"), sand.RigidClusters) else "none"
+    return sand.Simulation(grains, [sand.Contact(damping=damping), sand.Dipoles()], box=box, **options)
 
 
 def state(sim):

@@ -107,16 +107,18 @@ def build_engine(
         If something does not fit; all problems at once.
     """
     warnings = check_system(grains, forces, box, fresh=fresh)
+    if isinstance(stepping, RigidClusters):
+        check_rigid_clusters(forces, driven, walls)
     check_driven(driven, grains, forces, stepping, neighbours)
     by_type = _forces_by_type(forces, grains)
     check_walls(walls, grains, by_type.contact, box, stepping, fresh=fresh)
-    pair_gap = float(grains.radius.min())
+    rigid = isinstance(stepping, RigidClusters)
+    pair_gap = float(grains.radius.min()) * (LIST_GAP if rigid else 1.0)
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     if fresh:  # grains of another simulation may have other identities
         wrapped.arrays.id[...] = np.arange(len(grains))
-    if isinstance(stepping, RigidClusters):
-        check_rigid_clusters(stepping, forces, driven, walls)
+    if rigid:
         neighbours = dataclasses.replace(neighbours, order="as given")
     held = driven_arrays(driven, grains)
     if held is not None:
@@ -148,12 +150,11 @@ def build_engine(
         stepping.flight_limits(_longest_displacement(grains, box, found)),
         ForceNumbers(len(long_range), len(by_type.external)),
     )
-    if isinstance(stepping, RigidClusters):
+    if rigid:
         law = (by_type.contact or Contact()).contact_law
         awake = min(parameters.flight_limits.longest_step, longest_step_awake(law, parameters.settings, grains))
-        limits = parameters.flight_limits._replace(longest_awake=awake, smallest_radius=pair_gap)
-        wider = control._replace(pair_gap=LIST_GAP * pair_gap)
-        parameters = parameters._replace(flight_limits=limits, criteria=wider)
+        limits = parameters.flight_limits._replace(longest_awake=awake, smallest_radius=float(grains.radius.min()))
+        parameters = parameters._replace(flight_limits=limits)
     components = Components(
         (by_type.contact or Contact()).contact_law,
         [(sums, numbers) for _, sums, numbers in long_range],
@@ -178,7 +179,7 @@ def build_engine(
         state.cutoff[:] = follower.values
     parts = (state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower)
     engine = Engine(*parts)
-    if isinstance(stepping, RigidClusters):
+    if rigid:
         state.bodies = body_arrays(len(grains))
         engine = RigidEngine(*parts, inner=inner_engine(wrapped, forces, box, verlet, seed))
     if any(map(ramps_of, forces)):
@@ -201,9 +202,7 @@ def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verl
     )
 
 
-def check_rigid_clusters(
-    stepping: RigidClusters, forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall]
-) -> None:
+def check_rigid_clusters(forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall]) -> None:
     """Refuse what rigid clusters cannot do; all problems at once."""
     contact = next((f for f in forces if isinstance(f, Contact)), None)
     problems = []

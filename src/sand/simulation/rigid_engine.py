@@ -27,7 +27,7 @@ from ..integrate.rigid_body import product
 from ..integrate.rigid_clusters import SAMPLES, RigidLimits
 from ..integrate.rigid_driver import TOUCHING, advance_bodies, mark_near_bodies
 from ..integrate.step_control import INCREASE_INTERVAL
-from ..state.arrays import SAVED_LONG_RANGE, cluster_arrays
+from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
 from ..state.state import (
     BODIES,
     BROKEN,
@@ -110,7 +110,8 @@ class RigidEngine(Engine):
         self._form_bodies()
 
     def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
-        """As `Engine.load_state`."""
+        """As `Engine.load_state`; a state without bodies, after a change, gets them with its loads."""
+        saved = {f"bodies/{name}": getattr(self._state.bodies, name) for name in SAVED_BODIES} | saved
         super().load_state(saved, output_time)
         self._sort_members()
 
@@ -224,7 +225,7 @@ class RigidEngine(Engine):
         assert self.inner is not None
         state, inner, index = self._state, self.inner, self._awake
         present = inner._state
-        if not np.array_equal(present.grains.arrays.id, index):
+        if self._measures.size.size != len(index) or not np.array_equal(present.grains.arrays.id, index):
             inner.regular_state = present = self._new_inner_state(index)
             self._measures = cluster_measures(len(index))
             self._remainder = np.zeros((2, 3, len(index)))

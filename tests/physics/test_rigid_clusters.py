@@ -1,0 +1,417 @@
+"""Runs with rigid clusters: motion of bodies, conservation, rest and waking, restart, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import sand
+from sand.constants import BOLTZMANN, MAGNETIC
+from sand.state.state import BODIES, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
+
+from .setups import rest_distance
+
+KT = BOLTZMANN * 100.0
+PITCH = rest_distance(sand.IRON, 1e-8, 1e-8)
+
+
+OSCILLATING = sand.Field([0, 0, 0], shape="oscillating", amplitude="5 mT", frequency="20 MHz")
+
+
+def contact(**options):
+    return sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns", **options)
+
+
+def gas(stepping=None, number=30, box="0.5 um", forces=None, seed=2, **options):
+    """A magnetic gas in which several contacts form within 100 ns."""
+    extent = "0.5 um" if box is None else None
+    grains = sand.setup.gas(
+        number, box, extent=extent, radius="10 nm", material="iron", moment="200 A m^2/kg", temperature="100 K",
+        seed=seed,
+    )  # fmt: skip
+    forces = [contact(), sand.Dipoles()] if forces is None else forces
+    options = {"frame_every": 1.0, "box": box} | options
+    return sand.Simulation(grains, forces, stepping=stepping or sand.RigidClusters(), **options)
+
+
+def different(first, second):
+    """Names of arrays of two regular states that differ in a bit."""
+    one, other = first.regular_state.to_arrays(), second.regular_state.to_arrays()
+    return [name for name in one if one[name].tobytes() != other[name].tobytes()]
+
+
+def two_chains(**options):
+    """Two crooked chains of three magnetic grains, at rest in themselves, in open space."""
+    corner = np.array([[0.0, 0.0, 0.0], [PITCH, 0.0, 0.0], [PITCH, PITCH, 0.0]])
+    position = np.vstack([corner, corner[:, [2, 0, 1]] + [0.2e-7, 1.2e-7, 0.1e-7]])
+    mass = sand.Grains(position, 1e-8, "iron").mass[0]
+    spin = np.repeat([[2e7, -1e7, 3e7], [-1e7, 2e7, 1e7]], 3, axis=0)
+    centre = np.repeat([position[:3].mean(axis=0), position[3:].mean(axis=0)], 3, axis=0)
+    velocity = np.cross(spin, position - centre) + np.repeat([[0.0, 0.4, 0.0], [0.1, -0.4, 0.0]], 3, axis=0)
+    moment = 2e2 * mass * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1], [1, 0, -1], [0, 1, 0]])
+    grains = sand.Grains(position, 1e-8, "iron", velocity=velocity, spin=spin, moment=moment)
+    forces = [contact(), sand.Dipoles(), *options.pop("forces", [])]
+    return sand.Simulation(grains, forces, stepping=sand.RigidClusters(**options), frame_every=1.0)
+
+
+def rigid_motion(grains, bodies, time, field):
+    """Two rigid bodies by DOP853 from Newton's and Euler's equations, without SAND: positions (N, 3) after `time`.
+
+    Ẋ = P/M, q̇ = ½ q∘(Ω, 0), Ṗ = ΣF, L̇ = Σ(s×F + μ×B) in the laboratory frame, Ω = R I⁻¹ Rᵀ L, with all dipole pairs of
+    different bodies and an external flux density B(t).
+    """
+    mass, inertia = grains.mass, grains.inertia
+    data, start = [], []
+    for own in bodies:
+        m = mass[own][:, None]
+        centre = (m * grains.position[own]).sum(axis=0) / m.sum()
+        s = grains.position[own] - centre
+        momentum = (m * grains.velocity[own]).sum(axis=0)
+        u = grains.velocity[own] - momentum / m.sum()
+        angular = (m * np.cross(s, u) + inertia[own][:, None] * grains.spin[own]).sum(axis=0)
+        tensor = ((m * s**2).sum() + inertia[own].sum()) * np.eye(3) - (m * s).T @ s
+        data.append((own, m.sum(), s, tensor, grains.moment[own].copy()))
+        start += [centre / 1e-8, momentum / (m.sum() * 1.0), [0.0, 0.0, 0.0, 1.0], angular / 1e-25]
+    k = MAGNETIC
+
+    def placed(y):
+        x, mu, parts = np.zeros((len(mass), 3)), np.zeros((len(mass), 3)), []
+        for b, (own, _, s, _, moment) in enumerate(data):
+            part = y[13 * b : 13 * b + 13]
+            turn = Rotation.from_quat(part[6:10])
+            x[own], mu[own] = part[:3] * 1e-8 + turn.apply(s), turn.apply(moment)
+            parts.append((turn, part))
+        return x, mu, parts
+
+    def rates(t, y):
+        x, mu, parts = placed(y)
+        force, torque = np.zeros_like(x), np.cross(mu, field(t))
+        for i in data[0][0]:
+            for j in data[1][0]:
+                r = x[i] - x[j]
+                d = np.linalg.norm(r)
+                n = r / d
+                a, b = mu[i], mu[j]
+                f = 3 * k / d**4 * ((a @ n) * b + (b @ n) * a + (a @ b) * n - 5 * (a @ n) * (b @ n) * n)
+                force[i] += f
+                force[j] -= f
+                torque[i] += np.cross(a, k / d**3 * (3 * n * (b @ n) - b))
+                torque[j] += np.cross(b, k / d**3 * (3 * n * (a @ n) - a))
+        out = []
+        for (own, total, s, tensor, _), (turn, part) in zip(data, parts, strict=True):
+            arm = turn.apply(s)
+            matrix = turn.as_matrix() @ tensor @ turn.as_matrix().T
+            spin = np.linalg.solve(matrix, part[10:] * 1e-25)
+            q = part[6:10]
+            dq = 0.5 * np.array([*(spin * q[3] + np.cross(spin, q[:3])), -spin @ q[:3]])
+            rate = (torque[own] + np.cross(arm, force[own])).sum(axis=0)
+            out += [part[3:6] / 1e-8, force[own].sum(axis=0) / total, dq, rate / 1e-25]
+        return np.concatenate(out)
+
+    done = solve_ivp(rates, (0.0, time), np.concatenate(start), method="DOP853", rtol=1e-11, atol=1e-12)
+    return placed(done.y[:, -1])[0]
+
+
+def at_rest(sim, most=200):
+    """Run until every cluster is at rest; returns the simulation."""
+    for _ in range(most):
+        sim.run(steps=1)
+        if sim.regular_state.bodies.asleep.all():
+            return sim
+    raise AssertionError("no rest")
+
+
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize(
+    "forces", [[], [sand.Field([0, 0, 0], shape="oscillating", amplitude="5 mT", frequency="20 MHz")]]
+)
+def test_two_bodies_follow_the_equations_of_motion(forces):
+    """Two chains at rest, from the same state: positions after 20 ns against DOP853, without and with B(t).
+
+    Errors fall by 4 ± 5 % per halved step (order 2), and to 1e-6 of the distance flown, about 10 nm.
+    """
+    begun = at_rest(two_chains(forces=forces))
+    time = begun.time
+    bodies = [np.arange(3), np.arange(3, 6)]
+    start = begun.regular_state.grains
+
+    def field(t):
+        return np.array([0.0, 0.0, 5e-3 * math.cos(2 * math.pi * 20e6 * (time + t))]) if forces else np.zeros(3)
+
+    exact = rigid_motion(start, bodies, 2e-8, field)
+    errors = []
+    for step in (2e-10, 1e-10, 5e-11, 5e-12):
+        sim = begun.copy()
+        limits = sim._engine.parameters.flight_limits._replace(step_fraction=0.2, longest_step=step)
+        sim._engine.parameters = sim._engine.parameters._replace(flight_limits=limits)
+        sim._engine._table.set("flight_limits", limits)
+        sim.run(until=time + 2e-8)
+        assert sim.regular_state.count[MADE] == 0 and sim.regular_state.bodies.asleep.all()
+        errors.append(np.linalg.norm(sim.grains.position - exact, axis=1).max())
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05, abs=0.0)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.05, abs=0.0)
+    assert errors[3] < 1e-6 * 1e-8
+
+
+@pytest.mark.compiled("dipoles")
+def test_momentum_and_angular_momentum_are_those_of_the_start():
+    """A gas in open space with touches: P to 1e-12 of Σ m v, L to 1e-12 of Σ |L| of the grains, over all steps.
+
+    Bodies and awake clusters are kicked as rigid bodies by forces whose sum and total torque vanish.
+    """
+    sim = gas(box=None, number=30)
+    start = sim.grains.copy()
+    sim.run(until="150 ns")
+    grains, count = sim.regular_state.grains, sim.regular_state.count
+    assert count[MADE] >= 3 and count[WOKEN] >= 6 and count[RESTED] >= 3
+    m, inertia = start.mass[:, None], start.inertia[:, None]
+    momentum, before = m * grains.velocity, m * start.velocity
+    assert np.abs((momentum - before).sum(axis=0)).max() < 1e-12 * np.abs(before).sum()
+    angular = np.cross(grains.position, momentum) + inertia * grains.spin
+    old = np.cross(start.position, before) + inertia * start.spin
+    assert np.abs((angular - old).sum(axis=0)).max() < 1e-12 * np.abs(old).sum()
+
+
+@pytest.mark.compiled("dipoles")
+def test_flights_and_touches_are_those_of_grain_by_grain():
+    """Positions with rigid clusters tend to those of `sand.Verlet`: errors fall by 4 (± 30 %) per halved step.
+
+    At 60 ns a first contact has formed, in both; η = 0.025 is within 0.01 nm of the grains, with the same energy lost
+    by damping to 1e-3: the two contact integrations begin at different phases of a step.
+    """
+    exact = gas(sand.Verlet(), number=100, box="1.2 um", seed=1)
+    exact.run(until="60 ns")
+    lost = [exact.ledger["lost_damping_normal"][-1]]
+    errors = []
+    for fraction in (0.1, 0.05, 0.025):
+        sim = gas(sand.RigidClusters(step_fraction=fraction), number=100, box="1.2 um", seed=1)
+        sim.run(until="60 ns")
+        apart = sim.box.nearest(sim.grains.position - exact.grains.position)
+        errors.append(np.linalg.norm(apart, axis=1).max())
+        lost.append(sim.ledger["lost_damping_normal"][-1])
+        assert sim.state.count[MADE] == exact.state.count[MADE] == 1
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3, abs=0.0)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.3, abs=0.0)
+    assert errors[2] < 1e-11
+    assert lost[1:] == pytest.approx(lost[:1] * 3, rel=1e-3, abs=0.0)
+
+
+@pytest.mark.compiled("dipoles")
+def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
+    """Coming to rest changes velocities and spins only, keeps P and L, and the energy removed is `lost_quieting`.
+
+    Waking changes nothing at all.
+    """
+    sim = two_chains()
+    sim.run(steps=2)
+    engine, state = sim._engine, sim.regular_state
+    engine._list_awake()
+    assert not state.bodies.asleep.any()
+    before, arrays = state.copy(), state.grains.arrays
+    engine._inner_state()
+    engine._finish_step = None  # no step is taken below
+    from sand.integrate.awake_clusters import cluster_measures, measure_clusters_stage
+
+    engine._measures = cluster_measures(6)
+    present = engine.inner._state
+    measure_clusters_stage(engine.law).run(engine._inner_table(present), engine._measures)
+    engine._describe(0, np.arange(3), present)
+    engine._rest(0, np.arange(3))
+    assert state.bodies.asleep.tolist() == [1, 1, 1, 0, 0, 0]
+    old = before.grains.arrays
+    for name in ("position", "orientation", "moment"):
+        assert getattr(arrays, name).tobytes() == getattr(old, name).tobytes()
+    own = slice(0, 3)
+    m, inertia = old.mass[own], old.inertia[own]
+
+    def momenta(given):
+        v, w, x = given.velocity[:, own], given.spin[:, own], given.position[:, own]
+        return (m * v).sum(axis=1), (m * np.cross(x, v, axis=0) + inertia * w).sum(axis=1)
+
+    for one, other in zip(momenta(old), momenta(arrays), strict=True):
+        assert np.allclose(one, other, rtol=1e-13, atol=0.0)
+
+    def kinetic(given):
+        return 0.5 * (m * given.velocity[:, own] ** 2).sum() + 0.5 * (inertia * given.spin[:, own] ** 2).sum()
+
+    removed = state.lost[QUIETING] - before.lost[QUIETING]
+    assert removed == pytest.approx(kinetic(old) - kinetic(arrays), rel=1e-9, abs=1e-14 * kinetic(old))
+    assert removed == pytest.approx(engine._measures.vibration[0], rel=1e-6, abs=1e-14 * kinetic(old))
+    at_rest_state = state.copy()
+    state.bodies.near[0] = 2
+    engine._wake()
+    for name, array in at_rest_state.grains.arrays._asdict().items():
+        assert array.tobytes() == getattr(state.grains.arrays, name).tobytes()
+    assert not state.bodies.asleep.any()
+
+
+@pytest.mark.compiled("dipoles")
+def test_output_and_restarts_change_no_bit(tmp_path):
+    """Frames at any interval, copies, and resumed runs, stopped at times with and without awake clusters."""
+    whole = gas()
+    whole.run(until="120 ns")
+    often = gas(frame_every="0.7 ns")
+    often.run(until="120 ns")
+    assert different(whole, often) == []
+    assert whole.regular_state.count[MADE] >= 2
+    stopped, awake = gas(out=tmp_path / "run"), set()
+    for part in range(1, 14):
+        stopped.run(until=120e-9 * part / 13.3)
+        awake.add(bool(stopped.regular_state.bodies.asleep.all()))
+        stopped = sand.resume(tmp_path / "run")
+    stopped.run(until="120 ns")
+    assert different(whole, stopped) == []
+    assert len(awake) == 2
+
+
+@pytest.mark.compiled("dipoles")
+def test_the_ledger_closes():
+    """The total changes by less than 1e-3 of the energy dissipated, as grain by grain; quieting takes 1e-5 of it."""
+    sim = gas()
+    sim.run(until="120 ns")
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert abs(last["total"] - first["total"]) < 1e-3 * sim.ledger.dissipated
+    assert 0.0 <= last["lost_quieting"] < 1e-5 * sim.ledger.dissipated
+    assert sim.regular_state.count[LATE] == 0
+    assert 0.0 < sim.regular_state.clock[SOME_AWAKE] < sim.time
+
+
+@pytest.mark.compiled("dipoles")
+def test_no_touch_is_missed():
+    """A fast gas without long-range forces: bodies wake before all of some hundred touches, none in vain.
+
+    Each touch wakes at most two bodies; a pair that overlapped before its bodies woke would be counted as late.
+    """
+    grains = sand.setup.gas(120, "0.35 um", radius="10 nm", material="silica", temperature="2000 K", seed=4)
+    sim = sand.Simulation(grains, [contact()], box="0.35 um", stepping=sand.RigidClusters(), frame_every=1.0)
+    sim.run(until="150 ns")
+    count = sim.regular_state.count
+    assert count[MADE] > 60 and count[LATE] == 0
+    assert count[WOKEN] <= 3 * count[MADE]
+
+
+def twisted_pair(flux, **options):
+    """Two grains along z with opposite moments along ±x in a field along y: it twists their contact by μB along n."""
+    position = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, PITCH]])
+    moment = [[1e-18, 0.0, 0.0], [-1e-18, 0.0, 0.0]]
+    grains = sand.Grains(position, 1e-8, "iron", moment=moment)
+    forces = [contact(), sand.Field(flux, **options)]
+    return sand.Simulation(grains, forces, stepping=sand.RigidClusters(), frame_every=1.0)
+
+
+def twist_limit(sim):
+    """Torque k_t φ_c at which the contact twists [N m]."""
+    sim.run(steps=1)
+    table = sim.contacts
+    return abs(table["twist_torque"][0]) / table["twist_share"][0] if table["twist_share"][0] > 0.0 else None
+
+
+@pytest.mark.compiled("contacts")
+def test_a_contact_near_its_limit_never_rests():
+    """Twisted to 0.9 of its limit by a field, a pair stays awake; twisted to 0.3, it rests, with this strain."""
+    limit = twist_limit(twisted_pair([0.0, 0.01, 0.0]))
+    for share, rests in ((0.9, False), (0.3, True)):
+        sim = twisted_pair(
+            [0.0, 0.0, 0.0], shape="ramp", final=[0.0, share * limit / 1e-18, 0.0], start=0.0, end="0.6 ns"
+        )
+        sim.run(until="40 ns")
+        assert sim.contacts["twist_share"][0] == pytest.approx(share, rel=0.02, abs=0.0)
+        assert bool(sim.regular_state.bodies.asleep.all()) == rests
+        assert sim.regular_state.count[SLIPPED] == 0
+
+
+@pytest.mark.compiled("contacts")
+def test_a_pair_in_a_growing_field_wakes_before_it_twists_at_the_limit():
+    """At rest in 0.2 of the field that twists its contact, which then grows: it wakes below, and slips at, the limit.
+
+    The torque at the first slip is that of the limit within 1 %, the growth of the field within the time of a step of
+    bodies (0.3 %) and the vibration left.
+    """
+    limit = twist_limit(twisted_pair([0.0, 0.01, 0.0])) / 1e-18
+    ramp = {"shape": "ramp", "final": [0.0, 1.5 * limit, 0.0], "start": "30 ns", "end": "330 ns"}
+    sim = twisted_pair([0.0, 0.2 * limit, 0.0], **ramp)
+    sim.run(until="30 ns")
+    assert sim.regular_state.bodies.asleep.all()
+    woken = None
+    while sim.regular_state.count[SLIPPED] == 0 and sim.time < 3e-7:
+        sim.run(until=sim.time + 5e-10)
+        if woken is None and not sim.regular_state.bodies.asleep.all():
+            woken = 0.2 + 1.3 * (sim.time - 3e-8) / 3e-7
+    slipped = 0.2 + 1.3 * (sim.time - 3e-8) / 3e-7
+    assert 0.2 < woken < 0.9
+    assert slipped == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.compiled("dipoles")
+def test_grains_are_added_and_removed():
+    """A change wakes all clusters; the run goes on and its ledger closes."""
+    sim = gas()
+    sim.run(until="60 ns")
+    with sim.change() as change:
+        change.remove([0])
+    sim.run(until="90 ns")
+    assert len(sim.grains) == 29 and sim.regular_state.count[BODIES] <= 29
+    rows = sim.ledger.rows
+    assert abs(rows[-1]["total"] - rows[0]["total"]) < 1e-3 * sim.ledger.dissipated
+
+
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize(
+    "forces",
+    [
+        [sand.Dipoles(periodic="ewald")],
+        [sand.Charges(), sand.Dipoles()],
+        [sand.Dipoles(), sand.Gravity(1e5)],
+    ],
+    ids=["ewald", "charges", "gravity"],
+)
+def test_other_forces(forces):
+    """Positions as grain by grain, to 1 nm after 40 ns, and an energy error below 1e-3 of what is dissipated."""
+    grains = sand.setup.gas(
+        20, "0.4 um", radius=["10 nm", "13 nm"] * 10, material=["iron", "silica"] * 10, moment="2e-18 A m^2",
+        temperature="100 K", charge=[1.6e-19, -1.6e-19] * 10, seed=5,
+    )  # fmt: skip
+    ends = []
+    for stepping in (sand.RigidClusters(), sand.Verlet()):
+        sim = sand.Simulation(grains, [contact(), *forces], box="0.4 um", stepping=stepping, frame_every=1.0)
+        sim.run(until="40 ns")
+        first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+        scale = sim.ledger.dissipated + max(row["translation"] + row["rotation"] for row in sim.ledger.rows)
+        assert abs(last["total"] - first["total"]) < 1e-3 * scale
+        ends.append(sim)
+    apart = ends[0].box.nearest(ends[0].grains.position - ends[1].grains.position)
+    assert np.linalg.norm(apart, axis=1).max() < 1e-9
+    assert ends[0].steps < 0.1 * ends[1].steps
+
+
+def refused(match, forces, **options):
+    with pytest.raises(sand.BadInput, match=match):
+        gas(forces=forces, number=4, **options)
+
+
+def test_what_rigid_clusters_cannot_do_is_refused():
+    """One line for each, with what to do."""
+    refused("without damping no cluster comes to rest; use damping = 'critical'", [sand.Contact()])
+    refused("rigid clusters need sand.Contact", [sand.Dipoles()])
+    refused("do not move in a gas yet", [contact(), sand.Gas("100 K", pressure="1 mbar")])
+    refused("with a bath_temperature no cluster", [contact(bath_temperature="100 K")])
+    refused("cannot have driven grains", [contact()], driven=sand.Driven([0]))
+    refused("cannot follow ramps yet", [contact(), sand.Field(sand.Ramp([0.0, 1e-9], [0.0, 1e-3]))])
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"vibration": 0.2}, "stepping: vibration = 0.2 must be at most 0.1"),
+        ({"vibration": 0.0}, "stepping: vibration"),
+        ({"step_fraction": 1.0}, "stepping: step_fraction = 1 must be at most 0.2"),
+        ({"longest_step": "1 m"}, "stepping: longest_step"),
+        ({"contact_stepping": sand.Verlet(far="taylor")}, "far = 'taylor' is not possible with rigid clusters"),
+    ],
+)
+def test_settings_out_of_range_are_refused(given, match):
+    """One line with the key and what is allowed."""
+    with pytest.raises(sand.BadInput, match=match):
+        sand.RigidClusters(**given)
