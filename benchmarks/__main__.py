@@ -9,7 +9,7 @@ import warnings
 import sand
 from sand.simulation.run_writer import versions
 
-from . import compare, files, main_job, regimes, scaling, settling, vibrations
+from . import compare, files, main_job, regimes, rigid_clusters, scaling, settling, vibrations
 from .long_range import growth, savings, tell
 from .rows import all_rows
 from .table import HEAD, about, line, tell_about
@@ -29,6 +29,9 @@ def main() -> None:
     )
     parser.add_argument("--settling", action="store_true", help="write docs/physics/settling.csv, instead (a minute)")
     parser.add_argument("--vibrations", action="store_true", help="write docs/physics/vibrations.csv, instead (hours)")
+    parser.add_argument(
+        "--rigid-clusters", action="store_true", help="write docs/physics/rigid-clusters.csv, instead (an hour)"
+    )
     parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
     parser.add_argument("--compare", metavar="REV", help="this working tree beside another revision, in turns, instead")
     parser.add_argument("--rounds", type=int, default=compare.ROUNDS, help="of --compare, at least 6 (default 7)")
@@ -45,6 +48,9 @@ def main() -> None:
         return
     if options.vibrations:
         print(vibrations.write())
+        return
+    if options.rigid_clusters:
+        print(rigid_clusters.write())
         return
     if options.compare:
         compared = compare.compare(options.compare, options.rounds)

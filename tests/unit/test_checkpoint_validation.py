@@ -11,7 +11,7 @@ import sand
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
-from sand.state.arrays import SAVED_WALLS
+from sand.state.arrays import SAVED_BODIES, SAVED_WALLS, body_arrays
 from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS, WALL_CONTACTS
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -29,7 +29,9 @@ ONE_WALL = {
     "wall_contacts/flag": np.zeros(1, np.uint8),
 }
 """A wall with one contact."""
-WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL}
+BODIES = {f"bodies/{name}": array for name, array in body_arrays(4)._asdict().items() if name in SAVED_BODIES}
+BODIES["bodies/first"][:] = np.arange(4)
+WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES}
 WITH_ORDER["count"] = ARRAYS["count"].copy()
 WITH_ORDER["count"][WALL_CONTACTS] = 1
 FAR = 2**31 - 1
@@ -71,12 +73,12 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
         changed["shape"] = np.concatenate([good, good], axis=-1) if good.size else np.zeros((3, 1))
     if good.size and good.dtype.kind == "f":
         changed["not a number"] = np.full_like(good, np.nan)
-    if good.size and name.split("/")[-1] in ("pair", "side", "start", "order", "id"):
+    if good.size and name.split("/")[-1] in ("pair", "side", "start", "order", "id", "first"):
         changed["beyond"] = good.copy()
         changed["beyond"].flat[-1] = FAR
     if name in ("grains/radius", "grains/mass", "grains/inertia"):
         changed["zero"], changed["below 0"] = 0.0 * good, -good
-    if name in ("contacts/every_step", "pair_list/in_contact"):
+    if name in ("contacts/every_step", "pair_list/in_contact", "bodies/asleep"):
         changed["neither"] = np.full_like(good, 2)
     for what, array in changed.items():
         message = error_of(tmp_path, {**WITH_ORDER, name: array})

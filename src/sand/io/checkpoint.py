@@ -16,6 +16,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
 | walls/… | position, velocity, force, impulse and work of each wall; only with walls, as the next |
 | wall_contacts/… | contacts with walls: grain and wall, pointer and anchor, twist, constants, losses, loads |
+| bodies/… | bodies, their momenta, and what is at rest; only with rigid clusters |
 | long_range/… | loads of the last long-range summation, state of the cycle, positions at the last rebuild of the list |
 
 `io.state_arrays` checks each array.

@@ -123,7 +123,11 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
     for name, spec in STORED.items():
         if name in arrays:
             _check_array(name, arrays[name], spec, sizes)
-        elif spec.required or ("walls/work" in arrays and name.startswith(("walls/", "wall_contacts/"))):
+        elif (
+            spec.required
+            or ("walls/work" in arrays and name.startswith(("walls/", "wall_contacts/")))
+            or ("bodies/first" in arrays and name.startswith("bodies/"))
+        ):
             raise BadInput(f"there is no array {name!r}")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
@@ -216,7 +220,7 @@ def _ascending(array: np.ndarray, sizes: Mapping[str, int]) -> str:
 
 
 def _bodies(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    good = (array <= np.arange(array.size)).all() and (array[array] == array).all()
+    good = (array <= np.arange(array.size)).all() and (array[np.minimum(array, array.size - 1)] == array).all()
     return "" if good else "does not name the first grain of each body"
 
 

@@ -1,0 +1,123 @@
+"""Growth with rigid clusters beside growth grain by grain: the main job with damping, paired seeds, and tests."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import mannwhitneyu, wilcoxon
+
+import sand
+from sand.analysis.clusters import aggregate_moments, cluster_labels, unwrapped
+from sand.analysis.shape import gyration_radius
+from sand.io.table import write_table
+from sand.state.state import BROKEN, CONTACT_STEPS, GRAINS_AWAKE, LATE, MADE, RESTED, SLIPPED, SOME_AWAKE, WOKEN
+
+TABLE = Path(__file__).parents[1] / "docs" / "physics" / "rigid-clusters.csv"
+BOX, TEMPERATURE = 1.2e-6, 100.0
+TIMES = (1e-6, 2e-6, 3e-6, 4e-6, 5e-6)
+SMALLEST = 3
+"""Grains of the smallest clusters in the fit of the fractal dimension."""
+VARIANTS: dict[str, Any] = {
+    "grains": None,
+    "rigid": {},
+    "rigid, η/2, ε/2": {"vibration": 0.005, "step_fraction": 0.05},
+}
+"""Settings of `sand.RigidClusters`; None for `sand.Verlet`."""
+
+
+def main_job(variant: str, seed: int, **dipoles: Any) -> sand.Simulation:
+    """The main job of a seed: 100 iron grains with damped contacts."""
+    iron = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg"}
+    grains = sand.setup.gas(100, BOX, temperature=TEMPERATURE, seed=seed, **iron)
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns")
+    given = VARIANTS[variant]
+    stepping = None if given is None else sand.RigidClusters(**given)
+    return sand.Simulation(grains, [contact, sand.Dipoles(**dipoles)], box=BOX, stepping=stepping, frame_every=1.0)
+
+
+def growth(given: tuple[str, int]) -> dict[str, Any]:
+    """One run: mean sizes, numbers of contacts, alignment of moments and fractal dimension, and what it cost."""
+    warnings.simplefilter("ignore")
+    sand.set_threads(1)
+    variant, seed = given
+    sim = main_job(variant, seed)
+    sim.run(until=1e-9)  # loads or compiles the code
+    found: dict[str, Any] = {"variant": variant, "seed": seed, "size": [], "clusters": []}
+    begun = time.process_time()
+    for end in TIMES:
+        sim.run(until=end)
+        row = sim.ledger.rows[-1]
+        found["size"].append(row["mean_cluster_size"])
+        found["clusters"].append(row["clusters"])
+    found["seconds"] = time.process_time() - begun
+    count, clock = sim.regular_state.count, sim.regular_state.clock
+    names = {"made": MADE, "broken": BROKEN, "slipped": SLIPPED, "late": LATE, "woken": WOKEN, "rested": RESTED}
+    found |= {name: int(count[k]) for name, k in (names | {"contact_steps": CONTACT_STEPS}).items()}
+    found |= {"steps": sim.steps, "awake": clock[SOME_AWAKE] / sim.time, "drift": sim.ledger.drift}
+    found |= {"grains_awake": clock[GRAINS_AWAKE] / sim.time / len(sim.grains)}
+    found |= {"quieting": row["lost_quieting"], "settling": row["lost_settling"], "dissipated": sim.ledger.dissipated}
+    pairs = sim.contacts["pair"]
+    labels, position = cluster_labels(100, pairs), unwrapped(sim.grains.position, pairs, sim.box)
+    found["alignment"] = float(aggregate_moments(sim.grains.moment, labels)[1][labels].mean())
+    members = [np.flatnonzero(labels == k) for k in range(labels.max() + 1)]
+    large = [own for own in members if len(own) >= SMALLEST]
+    radii = [gyration_radius(position[own], sim.grains.mass[own], sim.grains.radius[own]) for own in large]
+    found["dimension"] = float(np.polyfit(np.log(radii), np.log([len(own) for own in large]), 1)[0])
+    return found
+
+
+def runs(variants: list[str], seeds: int, out: Path, workers: int = 2) -> list[dict[str, Any]]:
+    """Runs of all variants and seeds, each written to the file `out` when it is finished, and not repeated."""
+    lines = [json.loads(line) for line in out.read_text("utf-8").splitlines()] if out.exists() else []
+    there = {(line["variant"], line["seed"]) for line in lines}
+    jobs = [(variant, seed) for seed in range(1, seeds + 1) for variant in variants if (variant, seed) not in there]
+    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+        for found in pool.imap_unordered(growth, jobs):
+            lines.append(found)
+            with out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(found) + "\n")
+    return lines
+
+
+def compared(lines: list[dict[str, Any]], reference: str = "grains") -> list[dict[str, str]]:
+    """Rows of the table: means with standard errors, and p of two tests against the reference (unpaired, paired)."""
+    rows = []
+    quantities = [(f"S at {1e6 * t:g} µs", lambda line, k=k: line["size"][k]) for k, t in enumerate(TIMES)]
+    quantities += [(f"clusters at {1e6 * TIMES[-1]:g} µs", lambda line: line["clusters"][-1])]
+    labels = {"made": "contacts formed", "broken": "contacts broken", "slipped": "slips", "alignment": "alignment"}
+    labels |= {"dimension": "D_f"}
+    quantities += [(label, lambda line, name=name: line[name]) for name, label in labels.items()]
+    by_variant = {
+        name: {line["seed"]: line for line in lines if line["variant"] == name}
+        for name in VARIANTS
+        if any(line["variant"] == name for line in lines)
+    }
+    for label, value in quantities:
+        row = {"quantity": label}
+        base = by_variant[reference]
+        for name, own in by_variant.items():
+            values = np.array([value(line) for line in own.values()], float)
+            row[name] = f"{values.mean():.3g} ± {values.std(ddof=1) / np.sqrt(len(values)):.2g}"
+            if name == reference:
+                continue
+            both = sorted(set(own) & set(base))
+            one, other = (np.array([value(side[seed]) for seed in both], float) for side in (base, own))
+            if (one == other).all():
+                row[f"p, {name}"] = "equal"
+            else:
+                paired = wilcoxon(one, other, zero_method="zsplit").pvalue
+                row[f"p, {name}"] = f"{mannwhitneyu(one, other).pvalue:.2f}; {paired:.2f}"
+        rows.append(row)
+    return rows
+
+
+def write(seeds: int = 32, out: Path = Path("rigid-clusters.jsonl"), table: Path = TABLE) -> Path:
+    """Write the table of all variants."""
+    write_table(table, compared(runs(list(VARIANTS), seeds, out)))
+    return table
