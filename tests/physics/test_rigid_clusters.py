@@ -1,5 +1,6 @@
 """Runs with rigid clusters: motion of bodies, conservation, rest and waking, restart, and what is refused."""
 
+import json
 import math
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import sand
+from sand.cli.main import main
 from sand.constants import BOLTZMANN, MAGNETIC
 from sand.state.state import BODIES, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 
@@ -415,3 +417,42 @@ def test_settings_out_of_range_are_refused(given, match):
     """One line with the key and what is allowed."""
     with pytest.raises(sand.BadInput, match=match):
         sand.RigidClusters(**given)
+
+
+@pytest.mark.compiled("dipoles")
+def test_a_case_file_and_the_summary(tmp_path, capsys):
+    """`clusters = "rigid"` is `sand.RigidClusters`; summary.json says how long clusters were awake; it is resumed."""
+    case = tmp_path / "case.toml"
+    case.write_text(
+        """
+        run = { until = "80 ns", seed = 2 }
+        box = { periodic = "0.5 um" }
+        grains = { number = 30, radius = "10 nm", material = "iron", moment = "200 A m^2/kg", temperature = "100 K" }
+        stepping = { clusters = "rigid", step_fraction = 0.05 }
+        [forces]
+        contact = { damping = "critical", settling_time = "5 ns" }
+        dipoles = {}
+        """,
+        "utf-8",
+    )
+    assert main(["run", str(case), "--out", str(tmp_path / "run")]) == 0
+    capsys.readouterr()
+    found = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))["rigid_clusters"]
+    assert 0.0 < found["time_awake"] < 1.0 and 0.0 < found["grains_awake"] < found["time_awake"]
+    assert found["contact_steps"] > found["steps_of_bodies"] > 0
+    assert found["woken"] >= found["came_to_rest"] > 0 and found["touches_seen_late"] == 0
+    assert 0.0 <= found["quieting_per_dissipated"] < 1e-4 and 0.0 < found["largest_load_at_rest"] < 0.75
+    again = sand.resume(tmp_path / "run")
+    assert again.stepping == sand.RigidClusters(step_fraction=0.05)
+
+
+def test_contradictory_words_in_a_case_file_are_refused(tmp_path, capsys):
+    """`clusters` and `method` that contradict each other, and an unknown word: one line each."""
+    case = tmp_path / "case.toml"
+    for text, words in (
+        ('clusters = "rigid", method = "adaptive"', "clusters = 'rigid' contradicts method = 'adaptive'"),
+        ('clusters = "soft"', "clusters = 'soft'"),
+    ):
+        case.write_text(f'run = {{ until = "1 ns" }}\ngrains = {{ number = 2 }}\nstepping = {{ {text} }}\n', "utf-8")
+        assert main(["info", str(case)]) == 2
+        assert words in capsys.readouterr().err

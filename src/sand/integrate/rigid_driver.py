@@ -20,6 +20,7 @@ from ..state.state import (
     BROKEN,
     COMPARED,
     GRAINS_AWAKE,
+    LARGEST_LOAD,
     LATE,
     LONG_RANGE_SKIN,
     MADE,
@@ -155,14 +156,16 @@ def find_near_bodies(grains, bodies, pair_list, count, span, h):
 
 
 @loop
-def find_loaded_bodies(grains, bodies, count):
+def find_loaded_bodies(grains, bodies, clock, count):
     """Mark bodies whose contacts may be near a limit; returns whether any has to wake."""
     found = False
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1 and bodies.start[b + 1] - bodies.start[b] > 1:
             bodies.load[first] = contact_loads_bound(grains, bodies, b)
-            if bodies.load[first] + bodies.strain[first] > WAKE_SHARE:
+            share = bodies.load[first] + bodies.strain[first]
+            clock[LARGEST_LOAD] = max(clock[LARGEST_LOAD], share)
+            if share > WAKE_SHARE:
                 bodies.near[first] = TOUCHING
                 found = True
     return found
@@ -243,7 +246,7 @@ def first_half(
             return Stop.TIME_REACHED.value
         h = until - clock[TIME]
     touching = find_near_bodies(grains, bodies, pair_list, count, span, h)
-    loaded = find_loaded_bodies(grains, bodies, count)
+    loaded = find_loaded_bodies(grains, bodies, clock, count)
     clock[STEP] = h
     if touching or loaded:
         return Stop.TOUCH_AHEAD.value

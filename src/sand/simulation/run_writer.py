@@ -21,7 +21,21 @@ from ..io.ledger_table import LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
-from ..state.state import CLOCK, COUNT, CUTOFF, LOST, STAGE
+from ..state.state import (
+    BODIES,
+    CLOCK,
+    CONTACT_STEPS,
+    COUNT,
+    CUTOFF,
+    GRAINS_AWAKE,
+    LARGEST_LOAD,
+    LATE,
+    LOST,
+    RESTED,
+    SOME_AWAKE,
+    STAGE,
+    WOKEN,
+)
 from ..version import __version__
 from .cadence import read_cadence
 from .displays import DISPLAYS
@@ -266,6 +280,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "contacts": last["contacts"],
         **{f"contacts_{name}": last[name] for name in ("made", "moved", "broken")},
         **{name: last[name] for name in ("clusters", "mean_cluster_size", "largest_cluster")},
+        **rigid_clusters(simulation, ledger),
         "dissipated": ledger.dissipated,
         "drift": result.drift,
         "drift_per_kT": ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
@@ -280,6 +295,27 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "source_digest": cache_folder().name,
         "sand": __version__,
     }
+
+
+def rigid_clusters(simulation: Simulation, ledger: Ledger) -> dict[str, Any]:
+    """What rigid clusters did: time awake, steps of each level, energy removed at rest, largest load; or nothing."""
+    state = simulation.regular_state
+    if not state.count[BODIES]:
+        return {}
+    count, clock, time = state.count, state.clock, max(state.time, np.finfo(float).tiny)
+    dissipated = ledger.dissipated
+    found = {
+        "time_awake": float(clock[SOME_AWAKE]) / time,
+        "grains_awake": float(clock[GRAINS_AWAKE]) / time / len(simulation.grains),
+        "steps_of_bodies": state.steps,
+        "contact_steps": int(count[CONTACT_STEPS]),
+        "woken": int(count[WOKEN]),
+        "came_to_rest": int(count[RESTED]),
+        "touches_seen_late": int(count[LATE]),
+        "quieting_per_dissipated": ledger.rows[-1]["lost_quieting"] / dissipated if dissipated else 0.0,
+        "largest_load_at_rest": float(clock[LARGEST_LOAD]),
+    }
+    return {"rigid_clusters": found}
 
 
 def versions() -> dict[str, str]:

@@ -51,9 +51,10 @@ SETTLED = 11  # time at which settling was last applied to clusters [s]
 WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
 SOME_AWAKE = 13  # time with any cluster awake [s], of rigid clusters
 GRAINS_AWAKE = 14  # time awake of all grains, summed [s]
+LARGEST_LOAD = 15  # largest bound of a contact's displacement in a cluster at rest, in units of its limit
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
-    *("corrected", "settled", "wall_step", "some_awake", "grains_awake"),
+    *("corrected", "settled", "wall_step", "some_awake", "grains_awake", "largest_load"),
 )
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
