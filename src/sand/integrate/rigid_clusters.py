@@ -29,6 +29,7 @@ class RigidLimits(NamedTuple):
     longest_step: float  # [s]
     longest_awake: float  # [s], while a cluster is awake
     smallest_radius: float  # [m]
+    shortest_step: float  # bodies that need a shorter step wake [s]; 0: the step of all bodies becomes as short
 
 
 @register
@@ -106,6 +107,6 @@ class RigidClusters:
         return self
 
     def flight_limits(self, longest_displacement: float) -> RigidLimits:
-        """Run-time numbers; the engine, which knows contacts and grains, sets the last two."""
+        """Run-time numbers; the engine, which knows contacts and grains, sets the last three."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
-        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0)
+        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0)

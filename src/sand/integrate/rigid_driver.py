@@ -76,15 +76,24 @@ def squared_rates(grains, bodies, criteria, limits, b):
 
 @loop
 def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_awake):
-    """The next step [s], a power of two of the longest one; NaN if the state is not finite."""
+    """The next step [s], a power of two of the longest one; NaN if the state is not finite.
+
+    Bodies that alone require steps below `shortest_step` are marked, and not considered.
+    """
     square = fastest = turning = 0.0
+    bodies.near[:] = AWAKE
+    quick = (limits.step_fraction / limits.shortest_step) ** 2 if limits.shortest_step > 0.0 else math.inf
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1:
             spin = spin_of(bodies, first)
             allowed = LARGEST_TURN if bodies.start[b + 1] - bodies.start[b] > 1 else LARGEST_TURN_OF_SPHERE
             turning = max(turning, dot(spin, spin) / (allowed * allowed))
-            square = max(square, squared_rates(grains, bodies, criteria, limits, b))
+            rate = squared_rates(grains, bodies, criteria, limits, b)
+            if rate > quick:
+                bodies.near[first] = TOUCHING
+            else:
+                square = max(square, rate)
         for k in range(bodies.start[b], bodies.start[b + 1]):
             v = load(grains.velocity, bodies.member[k])
             speed = dot(v, v)
@@ -97,7 +106,11 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
         if bodies.first[i] != bodies.first[j] and bodies.asleep[i] + bodies.asleep[j] > 0:
             apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             v = sub(load(grains.velocity, i), load(grains.velocity, j))
-            square = max(square, dot(v, v) / dot(apart, apart))
+            rate = dot(v, v) / dot(apart, apart)
+            if rate > quick:
+                bodies.near[bodies.first[i]] = bodies.near[bodies.first[j]] = TOUCHING
+            else:
+                square = max(square, rate)
     rate = max(math.sqrt(square) / limits.step_fraction, math.sqrt(turning))
     rate = max(rate, math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap))
     h = min(limits.longest_step, criteria.longest)
@@ -123,12 +136,10 @@ def _approach(grains, bodies, i, h):
 
 @loop
 def find_near_bodies(grains, bodies, pair_list, count, span, h):
-    """Mark bodies near others (`BodyArrays.near`) for a step of h [s]; returns whether any has to wake.
+    """Mark bodies near others (`BodyArrays.near`) for a step of h [s].
 
     A gap closes at most by the closing speed, a fifth more of it, and the curvature of the paths.
     """
-    bodies.near[:] = AWAKE
-    found = False
     for p in range(count[PAIRS]):
         i, j = pair_list.pair[0, p], pair_list.pair[1, p]
         one, other = bodies.first[i], bodies.first[j]
@@ -147,18 +158,15 @@ def find_near_bodies(grains, bodies, pair_list, count, span, h):
         both_awake = bodies.asleep[i] + bodies.asleep[j] == 0
         if gap <= reach and not both_awake:
             bodies.near[one] = bodies.near[other] = TOUCHING
-            found = True
             count[LATE] += 1 if gap < 0.0 else 0
         else:
             bodies.near[one] = max(bodies.near[one], NEAR)
             bodies.near[other] = max(bodies.near[other], NEAR)
-    return found
 
 
 @loop
 def find_loaded_bodies(grains, bodies, clock, count):
-    """Mark bodies whose contacts may be near a limit; returns whether any has to wake."""
-    found = False
+    """Mark bodies whose contacts may be near a limit."""
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1 and bodies.start[b + 1] - bodies.start[b] > 1:
@@ -167,8 +175,16 @@ def find_loaded_bodies(grains, bodies, clock, count):
             clock[LARGEST_LOAD] = max(clock[LARGEST_LOAD], share)
             if share > WAKE_SHARE:
                 bodies.near[first] = TOUCHING
-                found = True
-    return found
+
+
+@loop
+def any_has_to_wake(bodies, count):
+    """Whether any body asleep is marked."""
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.near[first] == TOUCHING and bodies.asleep[first] == 1:
+            return True
+    return False
 
 
 @caller
@@ -245,10 +261,10 @@ def first_half(
         if not shorten:
             return Stop.TIME_REACHED.value
         h = until - clock[TIME]
-    touching = find_near_bodies(grains, bodies, pair_list, count, span, h)
-    loaded = find_loaded_bodies(grains, bodies, clock, count)
+    find_near_bodies(grains, bodies, pair_list, count, span, h)
+    find_loaded_bodies(grains, bodies, clock, count)
     clock[STEP] = h
-    if touching or loaded:
+    if any_has_to_wake(bodies, count):
         return Stop.TOUCH_AHEAD.value
     kick_bodies(bodies, count, 0.5 * h)
     drift_with_work(clock, lost, scratch, span, external_work, forces, grains, bodies, count, program, table, h)
@@ -322,7 +338,16 @@ def advance_bodies(
 
 
 @stage("the search for touches of bodies")
-def mark_near_bodies(grains, bodies, pair_list, clock, count, span):
-    """Mark bodies near others, for a step as long as the last one; returns 1 if any has to wake."""
+def mark_near_bodies(grains, bodies, pair_list, clock, count, span, criteria, flight_limits):
+    """Mark bodies near others, for a step as long as the last one, and single grains that need short steps."""
     sum_body_loads(grains, bodies, count)
-    return 1 if find_near_bodies(grains, bodies, pair_list, count, span, clock[STEP]) else 0
+    bodies.near[:] = AWAKE
+    find_near_bodies(grains, bodies, pair_list, count, span, clock[STEP])
+    longest = 0.5 * flight_limits.step_fraction
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.asleep[first] == 0 and bodies.start[b + 1] - bodies.start[b] == 1:
+            rate = squared_rates(grains, bodies, criteria, flight_limits, b)
+            if math.sqrt(rate) * flight_limits.shortest_step > longest:
+                bodies.near[first] = NEAR
+    return 0

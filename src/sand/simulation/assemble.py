@@ -46,7 +46,7 @@ from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .new_state import new_state
 from .ramped import RampedForces
-from .rigid_engine import LIST_GAP, RigidEngine, longest_step_awake
+from .rigid_engine import LIST_GAP, WAKE_QUICK_FROM, RigidEngine, longest_step_awake
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
 WIDE_FROM = 64
@@ -154,6 +154,8 @@ def build_engine(
         law = (by_type.contact or Contact()).contact_law
         awake = min(parameters.flight_limits.longest_step, longest_step_awake(law, parameters.settings, grains))
         limits = parameters.flight_limits._replace(longest_awake=awake, smallest_radius=float(grains.radius.min()))
+        if len(grains) >= WAKE_QUICK_FROM:
+            limits = limits._replace(shortest_step=awake)
         parameters = parameters._replace(flight_limits=limits)
     components = Components(
         (by_type.contact or Contact()).contact_law,

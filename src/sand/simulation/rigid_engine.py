@@ -68,6 +68,9 @@ LIST_GAP = 3.0
 """Largest gap of pairs that the driver of bodies looks at, in smallest radii: steps of bodies are long."""
 REST_STRAIN = 0.5
 """Largest displacement of a contact of a cluster at rest, in units of its limit."""
+WAKE_QUICK_FROM = 2000
+"""Fewest grains with which bodies that need short steps wake, instead of shortening the steps of all bodies: a sum over
+all pairs then costs more than the contact steps of a few grains."""
 CONTACT_COLUMNS = (
     *("pointer1", "pointer2", "twist", "formed", "lost", "damping", "force", "torque1", "torque2", "flag"),
 )
@@ -379,16 +382,19 @@ class RigidEngine(Engine):
             getattr(state.grains.arrays, name)[..., self._awake] = getattr(present.grains.arrays, name)
         measures = self._measures
         measure_clusters_stage(self.law).run(self._inner_table(present), measures)
-        firsts = self._awake[measures.first.astype(np.int64)]
+        numbers = measures.first.astype(np.int64)
+        order = np.argsort(numbers, kind="stable")
+        starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+        clusters = list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
+        firsts = self._awake[numbers]
         if not np.array_equal(firsts, bodies.first[self._awake]):
             self._rename(firsts)
-            for k in np.unique(measures.first).astype(np.int64):
-                self._describe(k, np.flatnonzero(measures.first == k), present)
+            for k, own in clusters:
+                self._describe(k, own, present)
         mark_near_bodies.run(self._current_table(state))
         rested = False
-        for k in np.unique(measures.first).astype(np.int64):
+        for k, own in clusters:
             first = int(self._awake[k])
-            own = np.flatnonzero(measures.first == k)
             if len(own) == 1:
                 if bodies.near[first] == 0:
                     self._rest_single(first)
