@@ -27,6 +27,8 @@ from ..integrate.rigid_body import product
 from ..integrate.rigid_clusters import SAMPLES, RigidLimits
 from ..integrate.rigid_driver import TOUCHING, advance_bodies, mark_near_bodies
 from ..integrate.step_control import INCREASE_INTERVAL
+from ..integrate.task_queue import uses_task_queue
+from ..integrate.worker_threads import WorkerThreads
 from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
 from ..state.state import (
     BODIES,
@@ -93,10 +95,16 @@ class RigidEngine(Engine):
     """
 
     inner: Engine | None = None
+    _inner_workers: WorkerThreads | None = field(init=False, default=None)
     _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains of the inner state
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.inner is not None:
+            self._inner_workers = self.inner._workers
 
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
@@ -260,7 +268,7 @@ class RigidEngine(Engine):
         for name in SAVED_LONG_RANGE:
             getattr(present.long_range, name)[...] = math.inf if name == "anchor" else 0.0
         present.pair_list.anchor[...] = math.inf
-        resort_contacts_by_grain(present.grains.arrays, contacts, present.count)
+        resort_contacts_by_grain.run(self._inner_table(present))
         return present
 
     def _new_inner_state(self, index: np.ndarray) -> State:
@@ -272,6 +280,8 @@ class RigidEngine(Engine):
         capacity = len(self._columns)
         made = new_state(grains, self._state.box, parameters, components, capacity, over_all_pairs=True)
         made.uniform_contacts = self._state.uniform_contacts
+        # few grains share no work between threads
+        self.inner._workers = self._inner_workers if uses_task_queue(len(index)) else None
         made.clusters = cluster_arrays(len(index))
         return made
 
