@@ -51,8 +51,10 @@ TOUCH_SPEED = 1.2
 """Closing speeds are taken this much larger to predict a touch."""
 AWAKE, NEAR, TOUCHING = range(3)
 """Values of `BodyArrays.near`: nothing near; a touch within about two steps; within the next step."""
-WAKE_SHARE = 0.75
-"""Displacement of a contact, in units of its limit, above which its cluster wakes."""
+WAKE_SHARE, LEAST_CHANGE = 0.75, 0.05
+"""Displacement of a contact, in units of its limit, above which its cluster wakes; and the change of its loads that
+wakes a cluster with a contact near, or at, its limit.  Such contacts are common in rings, which carry loads of their own.
+"""
 
 
 @formula
@@ -171,9 +173,8 @@ def find_loaded_bodies(grains, bodies, clock, count):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1 and bodies.start[b + 1] - bodies.start[b] > 1:
             bodies.load[first] = contact_loads_bound(grains, bodies, b)
-            share = bodies.load[first] + bodies.strain[first]
-            clock[LARGEST_LOAD] = max(clock[LARGEST_LOAD], share)
-            if share > WAKE_SHARE:
+            clock[LARGEST_LOAD] = max(clock[LARGEST_LOAD], bodies.load[first])
+            if bodies.load[first] > max(WAKE_SHARE - bodies.strain[first], LEAST_CHANGE):
                 bodies.near[first] = TOUCHING
 
 

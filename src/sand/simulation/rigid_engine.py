@@ -68,8 +68,8 @@ PERIODS = 10.0
 more than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
 LIST_GAP = 3.0
 """Largest gap of pairs that the driver of bodies looks at, in smallest radii: steps of bodies are long."""
-REST_STRAIN = 0.5
-"""Largest displacement of a contact of a cluster at rest, in units of its limit."""
+MOVING_STRAIN = 0.9
+"""Displacement of a contact, in units of its limit, from which on it may be the one that slid, rolled or twisted."""
 WAKE_QUICK_FROM = 2000
 """Fewest grains with which bodies that need short steps wake, instead of shortening the steps of all bodies: a sum over
 all pairs then costs more than the contact steps of a few grains."""
@@ -98,6 +98,7 @@ class RigidEngine(Engine):
     _inner_workers: WorkerThreads | None = field(init=False, default=None)
     _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains of the inner state
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
+    _slips: int = field(init=False, default=0)  # in the contact steps of the present step of bodies
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
 
@@ -352,6 +353,7 @@ class RigidEngine(Engine):
             self._replace_contacts(present, used)
         for number in (MADE, BROKEN, SLIPPED):
             state.count[number] += present.count[number]
+        self._slips = int(present.count[SLIPPED])
         state.count[CONTACT_STEPS] += present.count[STEPS]
         state.lost += present.lost
         present.lost[:] = 0.0
@@ -410,11 +412,13 @@ class RigidEngine(Engine):
                     self._rest_single(first)
                     rested = True
                 continue
+            if self._slips and measures.strain[k] > MOVING_STRAIN:
+                bodies.event[first] = state.time
             if measures.vibration[k] > self._limits.vibration * measures.limit[k]:
                 bodies.vibration[first] = state.time
             wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
             quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
-            if quiet and measures.strain[k] < REST_STRAIN and bodies.near[first] == 0 and self._fits(own, present):
+            if quiet and bodies.near[first] == 0 and self._fits(own, present):
                 self._describe(k, own, present)
                 self._rest(first, self._awake[own])
                 rested = True
