@@ -53,8 +53,7 @@ AWAKE, NEAR, TOUCHING = range(3)
 """Values of `BodyArrays.near`: nothing near; a touch within about two steps; within the next step."""
 WAKE_SHARE, LEAST_CHANGE = 0.75, 0.05
 """Displacement of a contact, in units of its limit, above which its cluster wakes; and the change of its loads that
-wakes a cluster with a contact near, or at, its limit.  Such contacts are common in rings, which carry loads of their own.
-"""
+wakes a cluster with a contact near, or at, its limit, which is common in rings, whose contacts load each other."""
 
 
 @formula
