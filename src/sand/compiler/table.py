@@ -182,8 +182,11 @@ class Table:
         self._addresses = np.zeros(len(names), np.int64)
 
     def set(self, name: str, value: Any) -> None:
-        """Set a part; nothing is done if it is the same object as before."""
-        if name in self._parts and self._parts[name] is value:
+        """Set a part; nothing is done if it is the same object, or the same number, as before."""
+        before = self._parts.get(name)
+        if before is value and name in self._parts:
+            return
+        if type(value) in NUMBERS and type(before) is type(value) and value == before != 0:
             return
         self._parts[name] = value
         if COMPILED and value is not None:

@@ -19,6 +19,9 @@ from ..numerics.quaternion import normalised, turned, turned_back
 from ..numerics.vec import accrue, add, axpy, cross, dot, load, load4, norm, put, put4, scale, sub
 from ..state.state import BODIES
 
+LARGEST_PIECE = 0.3
+"""Free rotation is computed in pieces of at most this angle [rad]."""
+
 
 @formula
 def product(a, b):
@@ -167,7 +170,10 @@ def drift_bodies(grains, bodies, count, span, dt, is_wrapped):
         if bodies.start[b + 1] - bodies.start[b] == 1:
             q = free_sphere(q, angular, inertia[0], dt)
         else:
-            q, angular = free_rotation(q, angular, inertia, dt)
+            spin = spin_of(bodies, first)
+            pieces = int(dt * norm(spin) / LARGEST_PIECE) + 1
+            for _ in range(pieces):
+                q, angular = free_rotation(q, angular, inertia, dt / pieces)
         put(bodies.centre, first, centre)
         put4(bodies.orientation, first, q)
         put(bodies.angular_momentum, first, angular)

@@ -43,8 +43,8 @@ from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
 from .step_control import is_close, is_past
 from .task_queue import join_workers
 
-LARGEST_TURN, LARGEST_TURN_OF_SPHERE = 0.3, 0.5
-"""Largest rotation of a body in one step [rad]; the rotor is exact for single grains."""
+LARGEST_TURN = 1.0
+"""Largest rotation of a body in one step [rad], so that loads that turn with it are averaged over six directions."""
 LARGEST_FLIGHT = 0.1
 """Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
 TOUCH_SPEED = 1.2
@@ -86,8 +86,7 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1:
             spin = spin_of(bodies, first)
-            allowed = LARGEST_TURN if bodies.start[b + 1] - bodies.start[b] > 1 else LARGEST_TURN_OF_SPHERE
-            turning = max(turning, dot(spin, spin) / (allowed * allowed))
+            turning = max(turning, dot(spin, spin) / (LARGEST_TURN * LARGEST_TURN))
             rate = squared_rates(grains, bodies, criteria, limits, b)
             if rate > quick:
                 bodies.near[first] = TOUCHING

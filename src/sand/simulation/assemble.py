@@ -46,7 +46,7 @@ from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .new_state import new_state
 from .ramped import RampedForces
-from .rigid_engine import LIST_GAP, WAKE_QUICK_FROM, RigidEngine, longest_step_awake
+from .rigid_engine import WAKE_QUICK_FROM, RigidEngine, list_gap, longest_step_awake
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
 WIDE_FROM = 64
@@ -113,7 +113,7 @@ def build_engine(
     by_type = _forces_by_type(forces, grains)
     check_walls(walls, grains, by_type.contact, box, stepping, fresh=fresh)
     rigid = isinstance(stepping, RigidClusters)
-    pair_gap = float(grains.radius.min()) * (LIST_GAP if rigid else 1.0)
+    pair_gap = list_gap(grains, box) if rigid else float(grains.radius.min())
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     if fresh:  # grains of another simulation may have other identities

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
+from ..box import Box
 from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
@@ -68,13 +69,18 @@ from .rigid_loads import may_stay_at_rest, rest_with_loads
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
 more than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
-LIST_GAP = 3.0
-"""Largest gap of pairs that the driver of bodies looks at, in smallest radii: steps of bodies are long."""
+LIST_GAP, SHARE_OF_SPACING = 3.0, 0.15
+"""Largest gap of pairs that the driver of bodies looks at, in smallest radii, and, in thin gases, in mean distances of
+neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
 MOVING_STRAIN = 0.9
 """Displacement of a contact, in units of its limit, from which on it may be the one that slid, rolled or twisted."""
 WAKE_QUICK_FROM = 2000
 """Fewest grains with which bodies that need short steps wake, instead of shortening the steps of all bodies: a sum over
 all pairs then costs more than the contact steps of a few grains."""
+SPANS = (
+    "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
+    "rigid body, and takes contact steps all the time; use a larger box"
+)
 CONTACT_COLUMNS = (
     *("pointer1", "pointer2", "twist", "formed", "lost", "damping", "force", "torque1", "torque2", "flag"),
 )
@@ -436,12 +442,15 @@ class RigidEngine(Engine):
     def _fits(self, own: np.ndarray, present: State) -> bool:
         """Whether a cluster extends over less than half of the box along each periodic axis.
 
-        Larger ones stay awake: their grains may act on each other through the images of the box.
+        Larger ones stay awake, with a warning: their grains may act on each other through the images of the box.
         """
         s = present.clusters.offset[:, own]
         extent = s.max(axis=1) - s.min(axis=1)
         lengths = self._state.box.lengths
-        return all(side is None or size < 0.5 * side for size, side in zip(extent, lengths, strict=True))
+        fits = all(side is None or size < 0.5 * side for size, side in zip(extent, lengths, strict=True))
+        if not fits and SPANS not in self.warnings:
+            self.warnings.append(SPANS)
+        return fits
 
     @property
     def _limits(self) -> RigidLimits:
@@ -509,6 +518,14 @@ class RigidEngine(Engine):
         number = int(np.searchsorted(np.unique(bodies.first), first))
         store_rest.run(self._current_table(state), (), number)
         state.count[RESTED] += 1
+
+
+def list_gap(grains: Grains, box: Box) -> float:
+    """Largest gap [m] of pairs that the driver of bodies looks at."""
+    gap = LIST_GAP * float(grains.radius.min())
+    if None in box.lengths:
+        return gap
+    return max(gap, SHARE_OF_SPACING * (math.prod(box.lengths) / len(grains)) ** (1.0 / 3.0))
 
 
 def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Grains) -> float:

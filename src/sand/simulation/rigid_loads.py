@@ -11,12 +11,12 @@ from ..integrate.awake_clusters import store_known_loads
 from ..numerics.quaternion import matrix_of
 from ..state.state import CONTACTS, State
 
-LARGEST_SWING, LEAST_CHANGE = 0.9, 0.05
+LARGEST_SWING, LEAST_CHANGE = 0.9, 0.02
 """A cluster that wakes swings about the displacements that balance its loads, at first by as much as they have changed.
 It wakes before a contact would swing to LARGEST_SWING of its limit.  A contact that is near, or at, its limit at rest,
 which is common in rings, whose contacts load each other, wakes its cluster when its load has changed by LEAST_CHANGE of
 the limit."""
-SMALLEST_RESERVE = 0.02
+SMALLEST_RESERVE = 0.01
 """A cluster wakes if the loads of its contacts may grow by less than this, in units of their limits."""
 
 
