@@ -147,7 +147,7 @@ GRAINS = (
         "no grain has a moment, or there is no external field",
     ),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
-    Quantity(REST, "1", "clusters", "categorical", _at_rest, "only runs with rigid clusters have it"),
+    Quantity(REST, "1", "awake or at rest", "categorical", _at_rest, "only runs with rigid clusters have it"),
     *(
         Quantity(name, BY_NAME[name].unit, name.replace("_", " "), "sequential", _own(name), "no grain has a value")
         for name in OWN
