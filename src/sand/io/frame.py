@@ -140,8 +140,8 @@ def read_stored(file: Any, number: int) -> Any:
     for name in SOMETIMES:
         if file.file.chunk_exists(number, LATE + name):
             stored.log[name] = file.file.read_chunk(number, LATE + name)
-        elif name in stored.log and len(stored.log[name]) != stored.particles.N:
-            del stored.log[name]  # of the first frame, with another number of grains
+        elif name in stored.log and not file.file.chunk_exists(number, f"log/{name}"):
+            del stored.log[name]  # of the first frame
     return stored
 
 
