@@ -133,7 +133,7 @@ def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
     areas = []
     if awake.size:
         low = np.full(len(t), axes.get_ylim()[0])
-        looks = {"color": ORANGE, "alpha": 0.5, "linewidth": 0.0, "zorder": 0}
+        looks: dict[str, Any] = {"color": ORANGE, "alpha": 0.5, "linewidth": 0.0, "zorder": 0}
         areas = [axes.fill_between(t, low, np.maximum(awake, low), step="mid", label="awake", **looks)]
     axes.set_ylabel("grains" if areas else "size (grains)")
     right.tick_params(axis="y", pad=1.0, labelcolor=MUTED, labelsize=7)
