@@ -326,6 +326,7 @@ def test_frames_say_which_clusters_are_at_rest(tmp_path):
     assert len(parts) == count
     assert [code_of(run.frames.stored(k)) for k in range(count)] == [code_of(parts.stored(k)) for k in range(count)]
     assert (np.asarray(parts.at_rest) == np.asarray(run.frames.at_rest)).all()
+    assert (run.to_xarray()["at_rest"].to_numpy() == np.asarray(run.frames.at_rest)).all()
 
 
 @pytest.mark.compiled("dipoles")
