@@ -4,7 +4,7 @@ import { actionsOf } from "./actions";
 import { AddressBar } from "./address";
 import { CameraController } from "./camera";
 import { Frames } from "./data/frames";
-import { type Dataset, fieldDirection } from "./data/quantities";
+import { awakeGrains, type Dataset, fieldDirection } from "./data/quantities";
 import type { Frame, Manifest, Series, Source } from "./data/types";
 import { Exporter } from "./exporter";
 import { headerButtons, type Layout } from "./layout";
@@ -240,7 +240,7 @@ export class App implements FrameDisplay, LiveRun {
     this.refresh();
     this.selection.follow();
     this.stage.draw();
-    this.timeline.show(k, frame.step);
+    this.timeline.show(k, frame.step, awakeGrains(frame));
     this.plot.moveTo(frame.time);
     this.notify("");
   }
@@ -278,7 +278,7 @@ export class App implements FrameDisplay, LiveRun {
     this.showStatus();
     const advance = atEnd && state.get<boolean>("live") && !player.playing && !this.exporter.busy;
     if (advance) void this.navigation.go(Infinity);
-    else if (picture.frame) this.timeline.show(picture.frame.frame, picture.frame.step);
+    else if (picture.frame) this.timeline.show(picture.frame.frame, picture.frame.step, awakeGrains(picture.frame));
     if (!advance && !player.playing) this.refresh(); // the ranges of the colour scales may have changed
   }
 

@@ -205,6 +205,8 @@ class Run:
             for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s"), strict=True)
         }
         labels = np.array([cluster_labels(len(one), one.pair) for one in whole])
+        rest = [one.at_rest for one in whole if one.at_rest is not None]
+        of_grains = {"cluster": labels} | ({"at_rest": np.array(rest)} if rest and len(rest) == len(whole) else {})
         coordinates = {
             "time": ("frame", np.array([one.time for one in whole]), {"units": "s"}),
             "step": ("frame", np.array([one.step for one in whole])),
@@ -213,7 +215,8 @@ class Run:
             "axis": ("axis", list("xyz")),
             **{name: ("grain", v, {"units": BY_NAME[name].unit}) for name, v in own_values(whole[0]).items()},
         }
-        return xarray.Dataset(data | {"cluster": (("frame", "grain"), labels)}, coords=coordinates)
+        columns = {name: (("frame", "grain"), values) for name, values in of_grains.items()}
+        return xarray.Dataset(data | columns, coords=coordinates)
 
     def to_pandas(self) -> Any:
         """Convert the ledger to a pandas DataFrame; needs pandas."""

@@ -117,19 +117,21 @@ def contacts_of(body: Body, box: Box) -> dict[str, np.ndarray]:
     }
 
 
-def write(folder: Path, moments: list[Body], box: Box) -> Path:
-    """A folder with a frame per state, a ledger and a summary."""
+def write(folder: Path, moments: list[Body], box: Box, rests: list[np.ndarray] | None = None) -> Path:
+    """A folder with a frame per state, a ledger and a summary; `rests` (N,) of each: which grains are at rest."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / files.CASE).write_text(CASE)
     writer, rows, before = TrajectoryWriter(folder / files.TRAJECTORY), [], set()
     made = broken = 0
     for k, body in enumerate(moments):
         table = contacts_of(body, box)
-        writer.write(1000 * k, STEP * k, body, box, table)  # type: ignore[arg-type]
+        rest = None if rests is None else rests[k]
+        writer.write(1000 * k, STEP * k, body, box, table, at_rest=rest)  # type: ignore[arg-type]
         now = set(map(tuple, table["pair"].tolist()))
         made, broken, before = made + len(now - before) * (k > 0), broken + len(before - now), now
         energy = 1e-18 / (k + 1)
         rows.append({"step": 1000 * k, "time": STEP * k, "kinetic": energy, "total": energy})
+        rows[-1] |= {} if rest is None else {"awake": int((~rest).sum())}
         rows[-1] |= {"contacts": len(now), "made": made, "broken": broken, **_sizes(len(body), table["pair"])}
     writer.close()
     LedgerFile(folder / files.LEDGER, list(rows[0]), rows)
@@ -165,7 +167,7 @@ MEETING, FIRST_PART = 3, 26
 FRAMES = 6
 
 
-def hundred(folder: Path) -> Path:
+def hundred(folder: Path, rests: list[np.ndarray] | None = None) -> Path:
     """100 grains of two sizes and materials in a periodic box: clusters cross faces, two merge.
 
     Clusters have the first indices, in the order of SIZES; the last nine grains are single.
@@ -197,7 +199,18 @@ def hundred(folder: Path) -> Path:
         body = Body(at(k), radius)
         body.moment, body.velocity = rotated(body.moment, 0.35 * k), body.velocity * (1.0 + 0.2 * k)
         moments.append(body)
-    return write(folder, moments, box)
+    return write(folder, moments, box, rests)
+
+
+def resting(folder: Path) -> Path:
+    """As `hundred`, but all grains are at rest except, from frame MEETING on, the two clusters that merge.
+
+    From frame MEETING + 2 on they are at rest again, and the smallest cluster is awake.
+    """
+    number = np.arange(sum(SIZES) + SINGLES)
+    small = (number >= sum(SIZES[:-1])) & (number < sum(SIZES))
+    awake = [number < 0, number < SIZES[0], small]
+    return hundred(folder, [~awake[(k >= MEETING) + (k >= MEETING + 2)] for k in range(FRAMES)])
 
 
 def _joined(radius: np.ndarray) -> np.ndarray:
@@ -230,4 +243,4 @@ def many(folder: Path, bodies: int = 5, each: int = 2000, frames: int = 3) -> Pa
     return write(folder, moments, Box.open())
 
 
-KINDS = {"two": two, "hundred": hundred, "ten-thousand": many}
+KINDS = {"two": two, "hundred": hundred, "resting": resting, "ten-thousand": many}

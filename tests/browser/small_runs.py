@@ -108,6 +108,11 @@ def contacts(pair: np.ndarray, k: int = 0) -> dict[str, np.ndarray]:
     }
 
 
+def at_rest(k: float) -> np.ndarray:
+    """Grains at rest (12,): all, but for the two chains from when they have made contact until the pair separates."""
+    return ~((np.arange(GRAINS) < 8) & (MERGED - 0.5 <= k < PARTED - 0.5))
+
+
 def row(at: float) -> dict[str, float]:
     """A row of the ledger at a time in frames; an event has happened half a frame before the frame that shows it."""
     merged, parted = at >= MERGED - 0.5, at >= PARTED - 0.5
@@ -129,13 +134,22 @@ class SmallRun:
         frames: number of frames, of eight, written at first.
         ended: whether the summary is there.
         box: periodic by default.
+        rigid: whether frames and ledger say which grains are at rest.
     """
 
-    def __init__(self, folder: Path, frames: int = FRAMES, *, ended: bool = True, box: Box | None = None):
-        self.folder, self.count = folder, 0
+    def __init__(
+        self,
+        folder: Path,
+        frames: int = FRAMES,
+        *,
+        ended: bool = True,
+        box: Box | None = None,
+        rigid: bool = False,
+    ):
+        self.folder, self.count, self.rigid = folder, 0, rigid
         self.box = box or Box.periodic(SIDE * R)
         folder.mkdir(parents=True, exist_ok=True)
-        self.ledger = LedgerFile(folder / LEDGER, COLUMNS)
+        self.ledger = LedgerFile(folder / LEDGER, (*COLUMNS, "awake") if rigid else COLUMNS)
         self.writer = TrajectoryWriter(folder / TRAJECTORY)
         self.append(frames)
         if ended:
@@ -145,8 +159,9 @@ class SmallRun:
         """Write this many more frames, and two ledger rows per frame."""
         for k in range(self.count, self.count + frames):
             for at in (k - 0.5, k) if k else (0,):
-                self.ledger.append(row(at))
-            self.writer.write(100 * k, k * STEP, grains(positions(k), k), self.box, contacts(pairs(k), k))
+                self.ledger.append(row(at) | {"awake": int((~at_rest(at)).sum())})
+            parts = 100 * k, k * STEP, grains(positions(k), k), self.box, contacts(pairs(k), k)
+            self.writer.write(*parts, at_rest=at_rest(k) if self.rigid else None)
         self.count += frames
         self.writer.flush()
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from .driving import Driven, served
-from .small_runs import MERGED, PARTED, SmallRun
+from .small_runs import GRAINS, MERGED, PARTED, SmallRun, at_rest
 
 
 @pytest.fixture
@@ -58,6 +59,24 @@ def test_new_frames_are_shown(view, run):
     view.tab.on("request", lambda request: asked.append(request.url))
     view.tab.wait_for_timeout(1300)
     assert not asked
+
+
+def test_awake_grains_of_a_running_simulation(page, tmp_path, bundle):
+    """Each new frame has its colours, legend and number of awake grains; the plot of them grows."""
+    run = SmallRun(tmp_path / "rigid", 3, ended=False, rigid=True)
+    page.set_viewport_size({"width": 800, "height": 560})
+    with served(run.folder) as server:
+        view = Driven(page, f"{server.url}#frame=2&colour=at_rest&plot=awake", bare=True)
+        for frames, awake in ((3, 0), (5, 8), (6, 8), (7, 0)):
+            run.append(frames - run.count)
+            until(view, f"{frames} frames")
+            assert f"frame {frames - 1} of {frames - 1} · {awake} awake" in " ".join(view.text(".gv-time").split())
+            assert view.text(".gv-legend").split("\n")[1:] == [f"{awake} awake", f"{GRAINS - awake} at rest"]
+            colours = np.array(view.run("[...app.picture.painted.colour]")).reshape(-1, 4)
+            assert len(np.unique(colours, axis=0)) == (2 if awake else 1)
+        told = view.run("app.plot.chart.data[1]")
+        assert told == [int((~at_rest(at)).sum()) for at in np.arange(0.0, 6.1, 0.5)]
+        assert "grains of awake clusters" in view.text(".gv-plot")
 
 
 def test_playing_goes_on_into_new_frames(view, run):

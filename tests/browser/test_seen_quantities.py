@@ -6,6 +6,7 @@ import pytest
 from sand.analysis.clusters import cluster_labels
 from sand.analysis.quantities import GRAIN_NAMES, measured
 from sand.errors import BadInput
+from sand.io.frame import REST
 from sand.schema import OWN, own_values
 
 from .looking import SOURCES, View
@@ -23,12 +24,14 @@ def shown(view: View, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("source", SOURCES)
-@pytest.mark.parametrize("kind", ["two", "hundred"])
+@pytest.mark.parametrize("kind", ["two", "hundred", "resting"])
 def test_every_quantity_is_that_of_the_file(page, shows, kind, source):
     """All names of the table, at three frames, grain by grain, also where there is none (NaN in both)."""
     view = View(page, shows(kind), source, shade=0)
     offered = {name for name, _ in page.evaluate("() => sandView.state.setting('colour').options")}
-    assert offered == {*GRAIN_NAMES} - {*OWN} | {*own_values(view.shown.frames[0])}
+    first = view.shown.frames[0]
+    known = {*own_values(first)} | ({REST} if first.at_rest is not None else set())
+    assert offered == {*GRAIN_NAMES} - {*OWN, REST} | known
     for k in (0, len(view.shown.frames) // 2, len(view.shown.frames) - 1):
         frame = view.go(k)
         for name in offered:

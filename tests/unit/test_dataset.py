@@ -36,6 +36,7 @@ KEYS = [
     "unit",
     "materials",
     "own",
+    "at_rest",
     "periodic",
     "field",
     "ranges",

@@ -46,6 +46,6 @@ def test_the_page_has_the_pictures_colours():
         ends = np.rint(255 * way(np.array([0.0, 1.0]))[:, :3])
         assert [colour_maps[name][0], colour_maps[name][-1]] == ends.tolist()
     named = colours()
-    assert list(named) == ["big", "small", "single", "modes", "within", "materials"]
+    assert list(named) == ["big", "small", "single", "modes", "within", "materials", "rest"]
     assert named["modes"] == list(MODE_COLOURS) and len(MODE_COLOURS) == len(MODES) - 1
     assert (named["within"], named["materials"]) == (WITHIN_LIMITS_COLOUR, list(MATERIAL_COLOURS))

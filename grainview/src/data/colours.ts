@@ -34,6 +34,16 @@ export function colourOfMaterial(index: number, manifest: Manifest): Colour3 {
   return rgb(materials[index % materials.length]);
 }
 
+/** The colour of a value of `at_rest`. */
+export function colourOfRest(value: number, manifest: Manifest): Colour3 {
+  return rgb(manifest.colours.rest[value] ?? manifest.colours.single);
+}
+
+/** Colours of names of clusters, and of the other quantities that are no numbers. */
+const NAMED: Record<string, (value: number, manifest: Manifest) => Colour3> = {
+  cluster: colourOfCluster, material: colourOfMaterial, at_rest: colourOfRest,
+};
+
 export interface Scale {
   low: number;
   high: number;
@@ -88,7 +98,7 @@ export interface Painted {
 export function paint(quantity: Quantity, frame: Frame, dataset: Dataset, settings: ScaleSettings): Painted {
   const values = quantity.values(frame, dataset);
   const scale = quantity.kind === "names" ? null : scaleOf(quantity, values, settings, dataset.manifest);
-  const colourOfName = quantity.id === "material" ? colourOfMaterial : colourOfCluster;
+  const colourOfName = NAMED[quantity.id] ?? colourOfCluster;
   const cache = new Map<number, Colour3>();
   const colour = new Uint8Array(values.length * 4);
   for (let i = 0; i < values.length; i++) {

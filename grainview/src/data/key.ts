@@ -1,7 +1,7 @@
 // Content of the legend, on the page and on saved pictures.
 
 import { MODES } from "./bonds";
-import { colourOfMaterial, colourOfCluster, css, type Painted, type Scale } from "./colours";
+import { colourOfMaterial, colourOfCluster, colourOfRest, css, type Painted, type Scale } from "./colours";
 import type { Dataset, Quantity } from "./quantities";
 import { digits, prefixed } from "./units";
 
@@ -53,6 +53,17 @@ function materials({ manifest }: Dataset): KeyPart {
   return { title: "material", rows };
 }
 
+function rest({ values }: Painted, position: Float32Array, { manifest }: Dataset): KeyPart {
+  const present = values.filter((_, i) => !Number.isNaN(position[3 * i])); // without absent grains
+  const rows: Swatch[] = ["awake", "at rest"].map((name, value) => {
+    const count = present.filter((v) => v === value).length;
+    return { colour: css(colourOfRest(value, manifest)), text: `${count} ${name}` };
+  });
+  const unknown = present.filter((v) => Number.isNaN(v)).length;
+  if (unknown) rows.push({ colour: manifest.colours.single, text: `${unknown} not known` });
+  return { title: "grains of clusters that are", rows };
+}
+
 /** The legend of a frame as it is drawn. */
 export function keyOf(
   quantity: Quantity,
@@ -63,7 +74,8 @@ export function keyOf(
 ): KeyPart[] {
   const parts: KeyPart[] = [];
   if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit));
-  else parts.push(quantity.id === "material" ? materials(dataset) : clusters(painted, position, dataset));
+  else if (quantity.id === "material") parts.push(materials(dataset));
+  else parts.push((quantity.id === "at_rest" ? rest : clusters)(painted, position, dataset));
   if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + repulsive", "N"));
   if (bonds.kind === "mode") {
     const { modes, within } = dataset.manifest.colours;

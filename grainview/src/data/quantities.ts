@@ -114,6 +114,13 @@ export const QUANTITIES: Quantity[] = [
     id: "material", label: "material", unit: "", kind: "names",
     values: (_, { grains }) => Float32Array.from(grains.material),
   },
+  {
+    id: "at_rest", label: "awake / rest", unit: "", kind: "names",
+    available: ({ manifest }) => manifest.at_rest,
+    values: (frame, { manifest }) => (
+      frame.at_rest ? Float32Array.from(frame.at_rest) : new Float32Array(manifest.grains).fill(NaN)
+    ),
+  },
 ];
 
 /** All quantities of a run: the table and the own quantities of the user. */
@@ -122,6 +129,14 @@ export function quantitiesOf(manifest: Manifest): Quantity[] {
     id, label, unit, kind: "sequential", values: (_, { grains }) => Float32Array.from(grains[id]),
   }));
   return [...QUANTITIES, ...own];
+}
+
+/** Number of grains of awake clusters in a frame; null if the frame does not say it. */
+export function awakeGrains({ at_rest: rest, position }: Frame): number | null {
+  if (!rest) return null;
+  let count = 0;
+  for (let i = 0; i < rest.length; i++) count += Number(rest[i] === 0 && !Number.isNaN(position[3 * i]));
+  return count;
 }
 
 /** The smallest and largest finite number, or null. */

@@ -24,6 +24,8 @@ export interface Manifest {
   materials: string[];
   /** Own quantities of the user that the grains have. */
   own: { id: string; label: string; unit: string }[];
+  /** Whether frames have `at_rest`. */
+  at_rest: boolean;
   periodic: boolean[];
   field: Field | null;
   ranges: Record<string, [number, number]>;
@@ -35,6 +37,7 @@ export interface Manifest {
     modes: string[];
     within: string;
     materials: string[];
+    rest: string[];
     named: Record<string, number>;
   };
   dimensions: Record<string, [number | null, number | null]>[] | null;
@@ -61,6 +64,8 @@ export interface Frame {
   spin: Float32Array;
   moment: Float32Array;
   cluster: Uint32Array;
+  /** 1 for grains of clusters at rest, 0 for those of awake clusters; with rigid clusters. */
+  at_rest?: Uint8Array;
   pair: Uint32Array;
   force: Float32Array;
   share: Float32Array;

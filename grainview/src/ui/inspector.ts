@@ -38,6 +38,7 @@ export function grainRows(i: number, frame: Frame, dataset: Dataset): Row[] {
     ["spin", magnitudeAndComponents(vector(frame.spin, i), "rad/s")],
     ["moment", magnitudeAndComponents(vector(frame.moment, i), "A m²")],
   ];
+  if (frame.at_rest) rows.push(["moves", frame.at_rest[i] ? "at rest, as a rigid body" : "awake, by contact steps"]);
   if (grains.charge[i]) rows.push(["charge", quantity(grains.charge[i], "C")]);
   for (const q of others.filter((other) => other.available?.(dataset) ?? true)) {
     rows.push([q.label, quantity(q.values(frame, dataset)[i], q.unit)]);

@@ -100,12 +100,14 @@ export class TimeLine {
     return this.events.find((m) => m.frame === frame) ?? { made: 0, broken: 0 };
   }
 
-  show(frame: number, step: number): void {
+  /** Show a frame; `awake`: number of grains of awake clusters, if it is known. */
+  show(frame: number, step: number, awake: number | null = null): void {
     this.slider.value = String(frame);
     const { made, broken } = this.eventsOf(frame);
     const events = [made ? `${made} made` : "", broken ? `${broken} broken` : ""].filter(Boolean).join(", ");
     const time = quantity(this.times[frame], "s");
-    this.label.textContent = [`t = ${time}`, `frame ${frame} of ${this.times.length - 1}`, events]
+    const moving = awake === null ? "" : `${awake} awake`;
+    this.label.textContent = [`t = ${time}`, `frame ${frame} of ${this.times.length - 1}`, moving, events]
       .filter(Boolean)
       .join("  ·  ");
     this.label.title = `step ${step}`;

@@ -17,6 +17,8 @@ ALWAYS_LOST = (
     *("lost_forming", "lost_breaking", "lost_sliding", "lost_rolling", "lost_twisting"),
     *("lost_settling", "lost_quieting"),
 )
+AWAKE = "awake"
+"""Column of the number of grains of awake clusters; only with rigid clusters."""
 ROUNDING = 4.0 * np.finfo(float).eps
 """Relative change of the total energy that is attributed to rounding. Bodies at rest of up to 64,000 grains change by
 one unit in the last place."""

@@ -10,12 +10,15 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.frame import MODES as SHARES
+from ..io.frame import REST
 from ..schema import BY_NAME, OWN
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 
 MODES = ("within its limits", *SHARES)
 """Names of the values of `mode`: the contact mode that is at its limit."""
+REST_NAMES = ("awake", "at rest")
+"""Names of the values of `at_rest`."""
 AT_LIMIT = 0.999
 """Fraction of the critical displacement from which a mode is at its limit; clamping keeps it at 1 but for rounding."""
 
@@ -39,6 +42,11 @@ def cluster_rank(count: int, pairs: np.ndarray) -> np.ndarray:
     labels = cluster_labels(count, pairs)
     order = np.argsort(-cluster_sizes(labels), kind="stable")
     return np.argsort(order, kind="stable")[labels]
+
+
+def category_names(name: str, frame: Any) -> tuple[str, ...]:
+    """Names of the values 0, 1, … of a quantity of whole numbers: `material`, `at_rest` or `mode`."""
+    return {"material": tuple(material_names(frame)), REST: REST_NAMES, "mode": MODES}[name]
 
 
 def material_names(frame: Any) -> list[str]:
@@ -95,6 +103,11 @@ def _mode(frame: Any, _: np.ndarray | None) -> np.ndarray:
     return np.where(np.isnan(share).all(axis=1), np.nan, np.where(reached, worst, 0.0))
 
 
+def _at_rest(frame: Any, _: np.ndarray | None) -> np.ndarray:
+    found = getattr(frame, REST, None)
+    return np.full(len(frame.radius), np.nan) if found is None else np.asarray(found, dtype=np.float64)
+
+
 def _floats(of: Callable[[Any], Any]) -> Callable[[Any, np.ndarray | None], np.ndarray]:
     return lambda frame, _: np.asarray(of(frame), dtype=np.float64)
 
@@ -134,6 +147,7 @@ GRAINS = (
         "no grain has a moment, or there is no external field",
     ),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
+    Quantity(REST, "1", "awake or at rest", "categorical", _at_rest, "only runs with rigid clusters have it"),
     *(
         Quantity(name, BY_NAME[name].unit, name.replace("_", " "), "sequential", _own(name), "no grain has a value")
         for name in OWN

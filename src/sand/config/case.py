@@ -26,6 +26,7 @@ from ..simulation.walls import Wall, read_walls, wall_columns
 from .commands import BODIES, refuse_other_command
 from .errors import validate
 from .sections import (
+    CLUSTERS,
     Cadence,
     Count,
     Duration,
@@ -38,6 +39,7 @@ from .sections import (
     Seed,
     Stepping,
     Steps,
+    method_of,
     quantity,
     with_integrator,
     word,
@@ -352,7 +354,8 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     except BadInput:  # reported by the validation of the whole file
         return []
     try:
-        condition.check([*Ledger().columns, *columns, *_wall_names(content.get("walls"))])
+        rigid = isinstance(table := content.get("stepping"), dict) and method_of(table) == CLUSTERS["rigid"]
+        condition.check([*Ledger(rigid=rigid).columns, *columns, *_wall_names(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []

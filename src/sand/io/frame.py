@@ -18,11 +18,12 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | bonds/group | grains in contact |
 | log/particles/id | identity of each grain; absent if it is the index, as long as no grain was removed |
 | log/particles/NAME | own quantities of the user (`sand.schema.OWN`), if any grain has a value |
+| log/particles/at_rest | 1 for grains of clusters at rest, 0 for awake ones; only with rigid clusters |
 | log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
 | log/bonds/share | stretch, slide, roll and twist as shares of their limits |
-| late/particles/id, NAME | the same, in files whose first frame has no log/particles/id, NAME |
+| late/particles/id, NAME, at_rest | the same, in files whose first frame has no log/particles/id, NAME, at_rest |
 | log/crc32 | checksum of step, material names and all numbers of a frame |
 
 Vectors are in the laboratory frame.
@@ -48,14 +49,28 @@ OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
 IDENTITY, LATE = "id", "late/"
 """Name of the identities of grains, and beginning of the names of chunks that the first frame lacks."""
+REST = "at_rest"
+"""Name of the array that says which grains belong to clusters at rest."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
+SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, *OWN, REST))
+"""Logged arrays of grains that not all frames have."""
 
 
 def stored_frame(
-    step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray], *, exact: bool = False
+    step: int,
+    time: float,
+    grains: Grains,
+    box: Box,
+    contacts: Mapping[str, np.ndarray],
+    *,
+    exact: bool = False,
+    at_rest: np.ndarray | None = None,
 ) -> Any:
-    """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also positions and radii in float64."""
+    """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also positions and radii in float64.
+
+    `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters.
+    """
     import gsd.hoomd
 
     scale = float(grains.radius.mean())
@@ -97,6 +112,8 @@ def stored_frame(
         frame.log[f"particles/{IDENTITY}"] = np.array(grains.id)
         own = {name: getattr(grains, name) for name in OWN}
     frame.log |= {f"particles/{name}": values.copy() for name, values in own.items()}
+    if at_rest is not None:
+        frame.log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
@@ -107,11 +124,11 @@ def stored_frame(
 def append_frame(file: Any, frame: Any) -> None:
     """Append a frame to an open GSD file.
 
-    GSD reads no logged array that the first frame lacks: identities and own quantities that appear later are chunks of
-    names that begin with `LATE`.
+    GSD reads no logged array that the first frame lacks: identities, own quantities and what is at rest that appear
+    later are chunks of names that begin with `LATE`.
     """
     if len(file):
-        for name in [f"particles/{name}" for name in (IDENTITY, *OWN)]:
+        for name in SOMETIMES:
             if name in frame.log and not file.file.chunk_exists(0, f"log/{name}"):
                 file.file.write_chunk(LATE + name, frame.log.pop(name))
     file.append(frame)
@@ -120,11 +137,11 @@ def append_frame(file: Any, frame: Any) -> None:
 def read_stored(file: Any, number: int) -> Any:
     """A frame as it was given to `append_frame`."""
     stored = file[number]
-    for name in [f"particles/{name}" for name in (IDENTITY, *OWN)]:
+    for name in SOMETIMES:
         if file.file.chunk_exists(number, LATE + name):
             stored.log[name] = file.file.read_chunk(number, LATE + name)
-        elif name in stored.log and len(stored.log[name]) != stored.particles.N:
-            del stored.log[name]  # of the first frame, with another number of grains
+        elif name in stored.log and not file.file.chunk_exists(number, f"log/{name}"):
+            del stored.log[name]  # of the first frame
     return stored
 
 
@@ -162,8 +179,9 @@ class Frame:
     """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
     `material` (N,) holds indices into the names `materials`; `id` (N,) is the identity of each grain, which stays when
-    others are removed. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,), `force` [N],
-    `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
+    others are removed. `at_rest` (N,), True for grains of clusters at rest, single grains included, is None without
+    `sand.RigidClusters`. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,),
+    `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
     """
 
     def __init__(self, stored: Any):
@@ -181,6 +199,8 @@ class Frame:
         self.id = np.asarray(stored.log.get(f"particles/{IDENTITY}", np.arange(p.N)), np.uint32)
         for name in OWN:
             setattr(self, name, np.array(stored.log.get(f"particles/{name}", np.zeros(p.N))))
+        rest = stored.log.get(f"particles/{REST}")
+        self.at_rest = None if rest is None else np.asarray(rest) == 1
         names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
         self.materials, self.material = names, np.asarray(p.typeid)
         self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
@@ -205,7 +225,19 @@ class Frame:
         return f"<frame at {when}: {len(self)} grains, {len(self.pair)} contacts>"
 
 
-OF_GRAINS = ("position", "velocity", "spin", "moment", "orientation", "radius", "mass", "charge", "material", *OWN)
+OF_GRAINS = (
+    "position",
+    "velocity",
+    "spin",
+    "moment",
+    "orientation",
+    "radius",
+    "mass",
+    "charge",
+    "material",
+    REST,
+    *OWN,
+)
 OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
 
 
@@ -254,7 +286,10 @@ class FrameArrays(Sequence[np.ndarray]):
         return self._of(self.chosen[int(index)])
 
     def _of(self, number: int) -> np.ndarray:
-        return np.asarray(getattr(self.frames[number], self.name))
+        found = getattr(self.frames[number], self.name)
+        if found is None:
+            raise BadInput(f"{self.name}: frame {number} of {self.frames.path} has none; runs with rigid clusters do")
+        return np.asarray(found)
 
     def _stacked(self, arrays: list[np.ndarray]) -> np.ndarray:
         if len({array.shape for array in arrays}) > 1:

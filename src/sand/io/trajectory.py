@@ -91,15 +91,18 @@ class TrajectoryWriter:
         contacts: Mapping[str, np.ndarray],
         *,
         exact: bool = False,
+        at_rest: np.ndarray | None = None,
     ) -> None:
         """Append one frame; columns of `contacts` as in `ContactTable`; `exact`: positions and radii in float64.
+
+        `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters.
 
         Raises
         ------
         FilesFailed
             If the frame cannot be written; earlier ones stay.
         """
-        frame = stored_frame(step, time, grains, box, contacts, exact=exact)
+        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest)
         if self._is_stored(time, code_of(frame)):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS

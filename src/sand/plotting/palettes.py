@@ -23,6 +23,8 @@ STANDARD_MAPS = ("cividis", "viridis")
 """Alternative sequential maps of matplotlib."""
 MATERIAL_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
 """Colours of materials, used cyclically."""
+REST_COLOURS = (RED, "#A9B4C0")
+"""Colours of grains of awake clusters, and of clusters at rest."""
 WITHIN_LIMITS_COLOUR, MODE_COLOURS = SINGLE_COLOUR, (RED, BLUE, GREEN, PURPLE)
 """Colours of contacts within their limits, and at the limit of stretching, sliding, rolling or twisting."""
 
@@ -35,7 +37,7 @@ def palettes() -> dict[str, list[list[int]]]:
 
 
 def colours() -> dict[str, list[str] | str]:
-    """Colours of clusters, contact modes and materials for the viewer page (keys: grainview/README.md)."""
+    """Colours of clusters, contact modes, materials and rest for the viewer page (keys: grainview/README.md)."""
     return {
         "big": list(LARGEST_COLOURS),
         "small": list(OTHER_COLOURS),
@@ -43,4 +45,5 @@ def colours() -> dict[str, list[str] | str]:
         "modes": list(MODE_COLOURS),
         "within": WITHIN_LIMITS_COLOUR,
         "materials": list(MATERIAL_COLOURS),
+        "rest": list(REST_COLOURS),
     }

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
-from ..analysis.ledger_columns import LOSSES
+from ..analysis.ledger_columns import AWAKE, LOSSES
 from ..constants import BOLTZMANN
 from ..state.state import DAMPING, LOST
 from .style import (
@@ -115,21 +115,29 @@ def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
-    """Draw the mean cluster size S (Eq. 17) and the largest cluster; on the right axis the number of clusters."""
+    """Draw the mean cluster size S (Eq. 17) and the largest cluster; on the right axis the number of clusters.
+
+    With rigid clusters also the number of awake grains, as an area.
+    """
     t = ledger["time"] / time.size
     style = _markers(t)
+    awake = column(ledger, AWAKE) if AWAKE in ledger.columns else np.zeros(0)
     right = axes.twinx()
     right.plot(t, ledger["clusters"], color=MUTED, linewidth=1.0, label="clusters (right axis)", **style)
     axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest", **style)
     axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$", **style)
-    sizes = max(float(ledger[name].max()) for name in ("largest_cluster", "mean_cluster_size"))
+    sizes = max([float(ledger[name].max()) for name in ("largest_cluster", "mean_cluster_size")] + [peak(awake)])
     for own, top in ((axes, sizes), (right, float(ledger["clusters"].max()))):
         own.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)))
         _log_ticks(own, plain=True)
-    axes.set_ylabel("size (grains)")
+    areas = []
+    if awake.size:
+        low = np.full(len(t), axes.get_ylim()[0])
+        looks: dict[str, Any] = {"color": ORANGE, "alpha": 0.5, "linewidth": 0.0, "zorder": 0}
+        areas = [axes.fill_between(t, low, np.maximum(awake, low), step="mid", label="awake", **looks)]
+    axes.set_ylabel("grains" if areas else "size (grains)")
     right.tick_params(axis="y", pad=1.0, labelcolor=MUTED, labelsize=7)
-    lines = [*axes.get_lines(), *right.get_lines()]
-    legend_above(axes, lines)
+    legend_above(axes, [*axes.get_lines(), *right.get_lines(), *areas])
 
 
 def draw_energies(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from ..analysis.clusters import cluster_labels
 from ..analysis.frame_statistics import size_distribution
 from ..analysis.ledger_columns import LedgerColumns
-from ..analysis.quantities import material_names, measured, quantity
+from ..analysis.quantities import category_names, measured, quantity
 from ..errors import BadInput
 from .panels import (
     AxisUnit,
@@ -108,7 +108,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
             _bars(axes, sizes, numbers)
             axes.set(xlabel="grains per cluster", ylabel="number of clusters")
         elif what.kind == "categorical":
-            names = material_names(frame)
+            names = category_names(name, frame)
             axes.bar(names, np.bincount(values.astype(int), minlength=len(names)), width=0.6, color=BLUE)
             axes.set(xlabel=what.meaning, ylabel="number of grains")
         else:

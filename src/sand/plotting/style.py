@@ -9,8 +9,8 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#0072B2",
@@ -121,7 +121,7 @@ def format_number(value: float) -> str:
     return rf"{digits}$\times 10^{{{int(exponent)}}}$"
 
 
-def legend_above(axes: Axes, lines: Sequence[Line2D] = ()) -> None:
+def legend_above(axes: Axes, lines: Sequence[Artist] = ()) -> None:
     """Draw the legend of the axes, or of these lines, as one row above the axes, where it covers no data."""
     handles: list[Any] = list(lines) or axes.get_legend_handles_labels()[0]
     axes.legend(

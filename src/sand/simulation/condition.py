@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..analysis.ledger_columns import AWAKE
 from ..errors import BadInput, did_you_mean, shown
 from ..units import si
 from .ledger import MOMENTA, NUMBERS
@@ -91,7 +92,7 @@ def unit_of(column: str) -> str:
     """SI unit of a column of the ledger."""
     if column == "time":
         return "s"
-    if column in ("step", *NUMBERS):
+    if column in ("step", *NUMBERS, AWAKE):
         return "1"
     if column in MOMENTA:
         return "J s" if column.startswith("angular") else "kg m/s"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.internal_motion import internal_kinetic_energy
-from ..analysis.ledger_columns import LOSSES, LedgerColumns, dissipated_in
+from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
 from ..errors import BadInput
@@ -32,9 +32,9 @@ CORRECTION = "angular_momentum_corrected"
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 LOST_WALLS = "lost_walls"
 """Column of the energy that moving walls took from grains and contacts; only with walls."""
-COUNTED = {"step", "time", *NUMBERS}
+COUNTED = {"step", "time", *NUMBERS, AWAKE}
 """Columns that need no energies, see `count_row`."""
-WHOLE = {"step", *NUMBERS, "wall_contacts"} - {"mean_cluster_size"}
+WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
@@ -67,13 +67,14 @@ def log_row(
         CORRECTION: float(state.clock[CORRECTED]),
         INTERNAL: math.fsum(internal_kinetic_energy(state.grains, pairs, state.box)[0]),
     }
-    return row | {name: counts[name] for name in NUMBERS} | wall_row(state, walls)
+    return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
 def count_row(state: State) -> dict[str, float]:
     """The part of a row that needs no energies: step, time [s], counts of contacts and clusters."""
     contacts = int(state.count[CONTACTS])
     labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
+    at_rest = state.at_rest
     return {
         "step": state.steps,
         "time": state.time,
@@ -84,6 +85,7 @@ def count_row(state: State) -> dict[str, float]:
         "clusters": int(labels.max()) + 1,
         "mean_cluster_size": mean_cluster_size(labels),
         "largest_cluster": int(cluster_sizes(labels).max()),
+        **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
     }
 
 
@@ -111,18 +113,20 @@ class Ledger(LedgerColumns):
         Names of the energy columns of long-range and per-grain forces.
     walls : Sequence[str], optional
         Columns of the walls, see `walls.wall_columns`.
+    rigid : bool, optional
+        Whether clusters at rest are rigid: with the column `awake`.
     """
 
-    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = ()):
+    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, rigid: bool = False):
         others = [name for name in forces if name != MAGNETIC]
-        self.walls = tuple(walls)
-        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS}
+        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if rigid else NUMBERS
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
         if taken := [name for name in walls if name in {*own, *forces, LOST_WALLS, MAGNETIC}]:
             raise BadInput(f"walls: '{taken[0]}' is a column of the ledger; give this wall another name")
         lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
-        of_state = (*lost, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, *walls)
+        of_state = (*lost, "total", *MOMENTA, CORRECTION, INTERNAL, *numbers, *walls)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
@@ -149,9 +153,10 @@ class Ledger(LedgerColumns):
     def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
         """Restore the rows from the array of `to_array`; raises BadInput if it lacks a column of this ledger.
 
-        Further columns are those of forces that a change left out.
+        Further columns are those of forces that a change left out. Without the column `awake`, as in checkpoints of
+        versions that did not have it, the ledger goes on without it.
         """
-        if not set(columns) >= set(self.columns):
+        if not set(columns) >= set(self.columns) - {AWAKE}:
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
@@ -168,7 +173,8 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, *self.walls}
+        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, AWAKE}
+        others |= set(self.walls)
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN

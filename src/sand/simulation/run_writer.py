@@ -180,7 +180,7 @@ class RunWriter:
     def _frame(self, simulation: Simulation) -> None:
         assert self._trajectory is not None
         w = simulation.state
-        self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts)
+        self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts, at_rest=w.at_rest)
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
         """Write a checkpoint if it is due by the cadence of the simulation, or if the last one is old enough."""

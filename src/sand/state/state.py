@@ -161,6 +161,11 @@ class State:
         """Number of steps taken."""
         return int(self.count[STEPS])
 
+    @property
+    def at_rest(self) -> np.ndarray | None:
+        """Which grains (N,) belong to clusters at rest, single grains included; None without rigid clusters."""
+        return self.bodies.asleep == 1 if self.bodies.asleep.size else None
+
     def copy(self) -> State:
         """Independent copy (snapshot)."""
         copied = {name: type(group)(*(a.copy() for a in group)) for name in GROUPS for group in [getattr(self, name)]}

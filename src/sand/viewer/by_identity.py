@@ -102,6 +102,9 @@ class ByIdentity:
             stored = np.asarray(getattr(frame, name))
             columns[name] = np.full((count, stored.shape[1]), absent, stored.dtype)
             columns[name][rows] = stored
+        if frame.at_rest is not None:
+            columns["at_rest"] = np.ones(count, bool)
+            columns["at_rest"][rows] = frame.at_rest
         columns |= {"id": self.identity, "pair": rows[frame.pair]}
         for name, column in columns.items():
             setattr(whole, name, column)

@@ -87,6 +87,7 @@ class RunDataset:
         self.grains_count, self.materials = len(first), list(first.materials)
         self.unit = float(first.radius.mean())
         self.periodic = [length is not None for length in first.box.lengths]
+        self.says_rest = first.at_rest is not None
         self._grains, self.own = grains_packet(first, self.unit), list(own_values(first))
         self._lineage = Lineage(self.grains_count, self.frames.pairs)
         self._largest: dict[str, int] | None = None
@@ -162,6 +163,7 @@ class RunDataset:
                 "unit": self.unit,
                 "materials": self.materials,
                 "own": [{"id": name, "label": name.replace("_", " "), "unit": BY_NAME[name].unit} for name in self.own],
+                "at_rest": self.says_rest,
                 "periodic": self.periodic,
                 "field": self._field_entry(numbers),
                 "ranges": self.ranges(),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInput
+from ..io.frame import REST
 from ..io.run_folder import plain
 from ..schema import OWN, own_values
 
@@ -128,6 +129,7 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
         "position": frame.position / unit,
         **{name: getattr(frame, name) for name in ("velocity", "spin", "moment")},
         "cluster": names.astype(np.uint32),
+        **({} if getattr(frame, REST, None) is None else {REST: np.asarray(frame.at_rest, np.uint8)}),
         "pair": frame.pair.astype(np.uint32),
         **{name: getattr(frame, name) for name in ("force", "share", "overlap", "formed")},
     }

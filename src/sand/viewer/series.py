@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
-from ..analysis.ledger_columns import LedgerColumns
+from ..analysis.ledger_columns import AWAKE, LedgerColumns
 from ..analysis.quantities import measured
 from ..errors import BadInput
 from ..io.run_folder import plain
 from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
-from ..plotting.style import BLUE, MUTED, ON_DARK, SKY, TEXT_COLOUR
+from ..plotting.style import BLUE, MUTED, ON_DARK, RED, SKY, TEXT_COLOUR
 from ..schema import OWN
 
 MAX_POINTS = 2000
@@ -39,7 +39,7 @@ def series_from_ledger(ledger: LedgerColumns) -> dict[str, Any]:
     """Plots and contact events from a ledger; a plot whose columns are missing is left out."""
     thinned = ledger.select(evenly_spaced(len(ledger)))
     plots = []
-    for plot in (_clusters, _energies, _losses, _contacts, _balance):
+    for plot in (_clusters, _energies, _losses, _contacts, _balance, _awake):
         try:
             plots.append(plot(thinned))
         except (KeyError, ValueError):  # a ledger of another version
@@ -81,6 +81,10 @@ def _clusters(ledger: Any) -> dict[str, Any]:
         _line("number of clusters", MUTED, ledger["clusters"]),
     ]
     return _plot("clusters", "Clusters", lines, log=True)
+
+
+def _awake(ledger: LedgerColumns) -> dict[str, Any]:
+    return _plot("awake", "Awake grains", [_line("grains of awake clusters", RED, column(ledger, AWAKE))])
 
 
 def _energies(ledger: LedgerColumns) -> dict[str, Any]:

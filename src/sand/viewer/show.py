@@ -120,7 +120,8 @@ class Snapshot:
 def snapshot_dataset(simulation: Simulation, field: FieldDescription | None) -> RunDataset:
     """Present state of a simulation and its ledger so far; later steps do not change the dataset."""
     state = simulation.state
-    stored: Any = stored_frame(state.steps, state.time, state.grains.copy(), state.box, simulation.contacts)
+    grains, contacts = state.grains.copy(), simulation.contacts
+    stored: Any = stored_frame(state.steps, state.time, grains, state.box, contacts, at_rest=state.at_rest)
     ledger = LedgerColumns(simulation.ledger.columns, simulation.ledger.rows)
     frames = Snapshot(Frame(stored))
     dataset = RunDataset(frames, "simulation", "in memory", ledger=lambda: ledger, summary=dict, field=field)

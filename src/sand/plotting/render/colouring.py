@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.colors import Colormap
 
 from ...analysis.clusters import cluster_sizes
-from ...analysis.quantities import MODES, Quantity, material_names
-from ..palettes import DIVERGING, MATERIAL_COLOURS, MODE_COLOURS, SEQUENTIAL, WITHIN_LIMITS_COLOUR
+from ...analysis.quantities import Quantity, category_names
+from ..palettes import DIVERGING, MATERIAL_COLOURS, MODE_COLOURS, REST_COLOURS, SEQUENTIAL, WITHIN_LIMITS_COLOUR
 from ..style import LARGEST_COLOURS, SINGLE_COLOUR, format_si, rgb, si_prefix
 from .scene import cluster_colours, largest_clusters
 
@@ -78,11 +78,12 @@ def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) 
     if what.name == "cluster":  # by rank, not by name as on the viewer page: an image has no history
         return cluster_colours(label), ColourKey(what.name, _cluster_swatches(label))
     if what.kind == "categorical":
-        categories = {
-            "mode": (MODES, (WITHIN_LIMITS_COLOUR, *MODE_COLOURS)),
-            "material": (material_names(frame), MATERIAL_COLOURS),
-        }
-        names, colours = categories[what.name]
+        names = category_names(what.name, frame)
+        colours = {
+            "mode": (WITHIN_LIMITS_COLOUR, *MODE_COLOURS),
+            "material": MATERIAL_COLOURS,
+            "at_rest": REST_COLOURS,
+        }[what.name]
         table = np.array([rgb(colours[k % len(colours)]) for k in range(len(names))])
         present = np.unique(values[np.isfinite(values)]).astype(int)
         shown = table[np.where(np.isfinite(values), values, 0.0).astype(int)]
