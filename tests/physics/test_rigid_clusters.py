@@ -505,10 +505,12 @@ def test_ten_thousand_tumbling_pairs(seed):
 
 @pytest.mark.validate
 @pytest.mark.compiled("dipoles")
-def test_momenta_over_a_million_mixed_steps():
-    """An open gas: P and L after 10⁶ steps of bodies and contacts are those of the start, to 1e-12 of Σ|m v|, Σ|L_i|.
+@pytest.mark.parametrize(("steps", "bound"), [(100_000, 1e-12), (1_000_000, 1e-11)])
+def test_momenta_over_many_mixed_steps(steps, bound):
+    """An open gas: P and L after many steps of bodies and contacts are those of the start, by Σ|m v| and Σ|L_i|.
 
-    Rounding adds √10⁶ × 1e-16 × a few.
+    Rounding of the forces within clusters, some hundred times those between them, adds about 1e-15 of Σ|m v| per step
+    at random while orientations last, some hundred steps: 1e-15 √(steps·100).
     """
     sim = gas(box=None, number=30, forces=[contact(), sand.Dipoles(cutoff=None)])
     sim.run(steps=1)
@@ -516,16 +518,15 @@ def test_momenta_over_a_million_mixed_steps():
     def momenta():
         g = sim.regular_state.grains
         p = g.mass[:, None] * g.velocity
-        orbital = np.cross(g.position, p)
-        return p, orbital + g.inertia[:, None] * g.spin
+        return p, np.cross(g.position, p) + g.inertia[:, None] * g.spin
 
     start = momenta()
-    while sim.steps + sim.regular_state.count[CONTACT_STEPS] < 1_000_000:
+    while sim.steps + sim.regular_state.count[CONTACT_STEPS] < steps:
         sim.run(steps=1000)
     assert sim.regular_state.count[MADE] > 10 and sim.regular_state.count[CONTACT_STEPS] > 50_000
     for before, after in zip(start, momenta(), strict=True):
         size = np.linalg.norm(before, axis=1).sum() + np.linalg.norm(after, axis=1).sum()
-        assert np.linalg.norm((after - before).sum(axis=0)) < 1e-12 * size
+        assert np.linalg.norm((after - before).sum(axis=0)) < bound * size
 
 
 @pytest.mark.compiled("contacts")

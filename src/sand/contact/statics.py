@@ -190,8 +190,9 @@ def shares_of_limits(
 
     now = (pull - contacts.normal_force, size(contacts.slide + slide), size(contacts.roll + roll))
     change = (np.abs(pull), size(slide), size(roll), np.abs(twist))
-    with np.errstate(divide="ignore"):
-        return (
-            np.column_stack([x / limit for x, limit in zip((*now, np.abs(contacts.twist + twist)), limits, strict=True)]),
-            np.column_stack([x / limit for x, limit in zip(change, limits, strict=True)]),
-        )
+
+    def shares(sizes: tuple[np.ndarray, ...]) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            return np.column_stack([x / limit for x, limit in zip(sizes, limits, strict=True)])
+
+    return shares((*now, np.abs(contacts.twist + twist))), shares(change)

@@ -50,8 +50,8 @@ LARGEST_FLIGHT = 0.1
 TOUCH_SPEED = 1.2
 """Closing speeds are taken this much larger to predict a touch."""
 AWAKE, NEAR, LOADED, TOUCHING = range(4)
-"""Values of `BodyArrays.near`: nothing near; a touch within about two steps; loads of contacts that have changed by more
-than the reserve; a touch within the next step."""
+"""Values of `BodyArrays.near`: nothing near; a touch within about two steps; loads of contacts that may have changed by
+more than the reserve; a touch within the next step."""
 
 
 @formula

@@ -523,9 +523,10 @@ class RigidEngine(Engine):
 def list_gap(grains: Grains, box: Box) -> float:
     """Largest gap [m] of pairs that the driver of bodies looks at."""
     gap = LIST_GAP * float(grains.radius.min())
-    if None in box.lengths:
+    sides = [side for side in box.lengths if side is not None]
+    if len(sides) < 3:
         return gap
-    return max(gap, SHARE_OF_SPACING * (math.prod(box.lengths) / len(grains)) ** (1.0 / 3.0))
+    return max(gap, SHARE_OF_SPACING * (math.prod(sides) / len(grains)) ** (1.0 / 3.0))
 
 
 def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Grains) -> float:
