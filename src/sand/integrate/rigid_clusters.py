@@ -29,6 +29,7 @@ class RigidLimits(NamedTuple):
     longest_step: float  # [s]
     longest_awake: float  # [s], while a cluster is awake
     smallest_radius: float  # [m]
+    friction_rate: float  # fastest decay of a velocity or spin by friction in a gas [1/s]; 0 without gas
     shortest_step: float  # bodies that need a shorter step wake [s]; 0: the step of all bodies becomes as short
 
 
@@ -107,6 +108,6 @@ class RigidClusters:
         return self
 
     def flight_limits(self, longest_displacement: float) -> RigidLimits:
-        """Run-time numbers; the engine, which knows contacts and grains, sets the last three."""
+        """Run-time numbers; the engine, which knows contacts, gas and grains, sets the last four."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
-        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0)
+        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, 0.0)
