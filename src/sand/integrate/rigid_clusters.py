@@ -42,19 +42,20 @@ class RigidClusters:
     A cluster comes to rest when its vibrational energy has been low for half of its slowest period and no touch is
     ahead; it wakes before it may touch another grain, and before a load may move a contact. Single grains are bodies
     as well. Needs damped contacts (`sand.Contact(damping="critical", settling_time=…)`), without which no cluster comes
-    to rest. See docs/physics/rigid-clusters.md.
+    to rest. In a gas (`sand.Gas`) bodies have the friction and noise of their grains. See
+    docs/physics/rigid-clusters.md.
 
     Parameters
     ----------
     vibration : float, optional
         ε, vibrational energy below which a cluster may come to rest, in units of ½ k q_c², the smallest elastic energy
-        at which one of its contacts slips; 0 … 0.1, 0 not included. This energy is removed; the ledger has it as
-        `lost_quieting`.
+        at which one of its contacts slips; 0 … 0.1, 0 not included. In a thermal gas at least 3 (n − 1) k_B T for n
+        grains, and at most ½ k q_c². This energy is removed; the ledger has it as `lost_quieting`.
     step_fraction : float, optional
-        η, longest step in units of the time in which the loads of a body change; 0 … 0.2, 0 not included. Errors of
-        position and energy are proportional to η².
+        η, longest step in units of the time in which the loads of a body change, and of the shortest stopping time in
+        a gas; 0 … 0.2, 0 not included. Errors of position, energy and diffusion are proportional to η².
     longest_step : float or str, optional
-        Longest step of bodies [s]; with "auto" the loads, spins and flights of the bodies alone limit it.
+        Longest step of bodies [s]; with "auto" the loads, spins and flights of the bodies, and a gas, alone limit it.
     contact_stepping : Verlet, optional
         Integrator of the grains of awake clusters; in a case file a table of its keys.
 
