@@ -166,6 +166,30 @@ def test_noise_of_a_body_has_the_covariance_of_the_lyapunov_equation(monkeypatch
         assert np.abs((spread @ spread.T - exact) / np.outer(size, size)).max() < 1e-12
 
 
+def test_noise_does_not_depend_on_the_axes_across_a_straight_chain():
+    """Two frames of principal axes of a chain, turned about it by 1 rad: the same ΔP and ΔL in the laboratory frame.
+
+    To 1e-12 of their size: rates and axes across the chain are equal, and their choice is one of rounding.
+    """
+    numbers = gas(1e-8).numbers()
+    given = numbers.density, numbers.mean_speed, numbers.accommodation
+    x = PITCH * (np.arange(4) - 1.5)
+    inertia, found = 0.4 * MASS * 1e-16, []
+    for about in (0.0, 1.0):
+        bodies, turn = body_arrays(4, in_gas=True), Rotation.from_rotvec([0.3, -1.1, 0.4])
+        turn = turn * Rotation.from_rotvec([about, 0.0, 0.0])
+        bodies.member[:], bodies.start[1:], bodies.mass[0] = np.arange(4), 4, 4 * MASS
+        bodies.inertia[:, 0] = 4 * inertia, *[4 * inertia + MASS * (x**2).sum()] * 2
+        bodies.offset[0], bodies.orientation[:, 0] = x, turn.as_quat()
+        rates, modes = friction_modes(np.full(4, 1e-8), bodies.offset, 4 * MASS, bodies.inertia[:, 0], given)
+        bodies.decay[:, 0], bodies.mode[:, 0] = rates, modes.T.ravel()
+        grains = Arrays(radius=np.full(4, 1e-8), id=np.arange(4, dtype=np.uint32))
+        kick_body(grains, bodies, 0, 1, 1, 3e-9, numbers)
+        found.append([bodies.momentum[:, 0], turn.apply(bodies.angular_momentum[:, 0])])
+    for one, other in zip(*found, strict=True):
+        assert np.abs(one - other).max() < 1e-12 * np.abs(one).max()
+
+
 @pytest.mark.parametrize("length", [2, 5])
 def test_friction_of_a_straight_chain(length):
     """Rates of n equal spheres: f/m of translation, f_r/I about the axis, (n f_r + f Σs²)/(n I + m Σs²) across it.
@@ -191,13 +215,13 @@ def test_friction_of_a_straight_chain(length):
 
 @pytest.mark.compiled("contacts")
 def test_equipartition_and_diffusion_of_chains():
-    """200 chains of four in a gas, τ = 5 ns, 28 samples 10 τ apart: energies, and mean-square displacements.
+    """200 chains of four in a gas, τ = 5 ns, 20 samples 10 τ apart: energies, and mean-square displacements.
 
     3/2 k_B T of translation and of rotation.
-    K has 3 degrees of freedom each, 200 × 28 × 3 = 16,800 independent samples (e^(−10) remains) of ½ k_B T χ²: the mean
-    has a relative standard deviation √(2/16800) = 1.1 %. The displacement Δx in T = 10 τ is normal with variance
-    2 D (T − τ (1 − e^(−T/τ))), D = k_B T/(4 f), in each direction: along and across the chain 200 × 28 (× 2) samples,
-    1.9 % and 1.3 %. Steps of h ≤ 0.1 τ add h²/12τ² ≤ 0.08 %. Tolerances are four standard deviations.
+    K has 3 degrees of freedom each, 200 × 20 × 3 = 12,000 independent samples (e^(−10) remains) of ½ k_B T χ²: the mean
+    has a relative standard deviation √(2/12000) = 1.3 %. The displacement Δx in T = 10 τ is normal with variance
+    2 D (T − τ (1 − e^(−T/τ))), D = k_B T/(4 f), in each direction: along and across the chain 200 × 20 (× 2) samples,
+    2.2 % and 1.6 %. Steps of h ≤ 0.1 τ add h²/12τ² ≤ 0.08 %. Tolerances are four standard deviations.
     """
     tau, interval = 5e-9, 5e-8
     sim = sand.Simulation(chains(4, 200), [contact(), gas(tau)], stepping=sand.RigidClusters(), frame_every=1.0, seed=5)
@@ -205,7 +229,7 @@ def test_equipartition_and_diffusion_of_chains():
     assert sim.regular_state.bodies.asleep.all() and sim.regular_state.count[RESTED] == 200
     moving, turning, squares = [], [], []
     before = of_bodies(sim.grains, 4)[0]
-    for k in range(28):
+    for k in range(20):
         axis = sim.grains.position[3::4] - sim.grains.position[::4]
         axis /= np.linalg.norm(axis, axis=1)[:, None]
         sim.run(until=(k + 2) * interval)
@@ -215,12 +239,12 @@ def test_equipartition_and_diffusion_of_chains():
         along = ((centre - before) * axis).sum(axis=1) ** 2
         squares.append([along.mean(), (((centre - before) ** 2).sum(axis=1) - along).mean() / 2])
         before = centre
-    assert np.mean(moving) == pytest.approx(1.5 * KT, rel=0.044, abs=0.0)
-    assert np.mean(turning) == pytest.approx(1.5 * KT, rel=0.044, abs=0.0)
+    assert np.mean(moving) == pytest.approx(1.5 * KT, rel=0.052, abs=0.0)
+    assert np.mean(turning) == pytest.approx(1.5 * KT, rel=0.052, abs=0.0)
     exact = 2.0 * KT * tau / (4 * MASS) * (interval - tau * -math.expm1(-interval / tau))
     along, across = np.mean(squares, axis=0)
-    assert along == pytest.approx(exact, rel=0.076, abs=0.0)
-    assert across == pytest.approx(exact, rel=0.053, abs=0.0)
+    assert along == pytest.approx(exact, rel=0.09, abs=0.0)
+    assert across == pytest.approx(exact, rel=0.063, abs=0.0)
     assert sim.regular_state.count[WOKEN] == 0
 
 

@@ -12,9 +12,11 @@ with rates g_k, and the amplitudes c_k = e_k·w are independent: for any time t
 
     c_k → c_k e^(−g_k t) + √((1 − e^(−2 g_k t)) k_B T) ξ_k,    ΔP, ΔL = Σ_k Δc_k e_k
 
-without other forces.  In equilibrium the variance of each c_k is k_B T, that of (P − M u, L) is k_B T D, and a body
-with V = u and Ω = 0 stays so without noise.  One step of a body in a gas is kick, drift, friction, drift, kick (BAOAB,
-Leimkuhler & Matthews 2013), with drifts of half a step.
+without other forces, with ξ_k = u_k·ξ.  The six standard normal deviates ξ are along the axes of the laboratory frame,
+so that noise depends neither on the choice of modes of equal rates nor on that of equal principal axes.  In equilibrium
+the variance of each c_k is k_B T, that of (P − M u, L) is k_B T D, and a body with V = u and Ω = 0 stays so without
+noise.  One step of a body in a gas is kick, drift, friction, drift, kick (BAOAB, Leimkuhler & Matthews 2013), with
+drifts of half a step.
 """
 
 import math
@@ -85,23 +87,26 @@ def _kick_sphere(grains, bodies, first, seed, number, elapsed, gas):
 @formula
 def _kick_cluster(grains, bodies, first, seed, number, elapsed, gas):
     """As `kick_body`, of several grains: changes of P, in the frame of the body, and L."""
-    own = load(bodies.angular_momentum, first)
-    inertia = load(bodies.inertia, first)
+    q, own, inertia = (
+        load4(bodies.orientation, first),
+        load(bodies.angular_momentum, first),
+        load(bodies.inertia, first),
+    )
     wind = (gas.wind_x, gas.wind_y, gas.wind_z)
-    v = sub(scale(1.0 / bodies.mass[first], load(bodies.momentum, first)), wind)
-    v = turned_back(load4(bodies.orientation, first), v)
+    v = turned_back(q, sub(scale(1.0 / bodies.mass[first], load(bodies.momentum, first)), wind))
     w = (own[0] / inertia[0], own[1] / inertia[1], own[2] / inertia[2])
     a = b = (0.0, 0.0, 0.0)
     if gas.temperature_energy > 0.0:
-        a = normal_vector(seed, number, grains.id[first], STREAM1)
-        b = normal_vector(seed, number, grains.id[first], STREAM2)
-    noise = (a[0], a[1], a[2], b[0], b[1], b[2])
+        a = turned_back(q, normal_vector(seed, number, grains.id[first], STREAM1))
+        b = turned_back(q, normal_vector(seed, number, grains.id[first], STREAM2))
+        a = scale(1.0 / math.sqrt(bodies.mass[first]), a)
+        b = (b[0] / math.sqrt(inertia[0]), b[1] / math.sqrt(inertia[1]), b[2] / math.sqrt(inertia[2]))
     linear = angular = (0.0, 0.0, 0.0)
     for k in range(6):
         along = (bodies.mode[6 * k, first], bodies.mode[6 * k + 1, first], bodies.mode[6 * k + 2, first])
         about = (bodies.mode[6 * k + 3, first], bodies.mode[6 * k + 4, first], bodies.mode[6 * k + 5, first])
         decayed = decayed_fraction(bodies.decay[k, first], elapsed)
-        change = thermal_spread(decayed, gas.temperature_energy, 1.0) * noise[k]
+        change = thermal_spread(decayed, gas.temperature_energy, 1.0) * (dot(along, a) + dot(about, b))
         change -= decayed * (dot(along, v) + dot(about, w))
         linear, angular = axpy(change, along, linear), axpy(change, about, angular)
     return linear, angular
