@@ -242,7 +242,7 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
     assert removed == pytest.approx(kinetic(old) - kinetic(arrays), rel=1e-9, abs=1e-14 * kinetic(old))
     assert removed == pytest.approx(engine._measures.vibration[0], rel=1e-6, abs=1e-14 * kinetic(old))
     at_rest_state = state.copy()
-    state.bodies.near[0] = 2
+    state.bodies.near[0] = 3
     engine._wake()
     for name, array in at_rest_state.grains.arrays._asdict().items():
         assert array.tobytes() == getattr(state.grains.arrays, name).tobytes()

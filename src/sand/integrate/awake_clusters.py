@@ -19,7 +19,7 @@ from ..numerics.quaternion import turned_back
 from ..numerics.vec import accrue, across, add, cross, dot, load, load4, norm, put, scale, sub
 from ..state.state import CONTACTS
 from .parts import DT
-from .rigid_body import store_rest_loads
+from .rigid_body import store_loads
 
 
 class ClusterMeasures(NamedTuple):
@@ -140,6 +140,13 @@ def measure_clusters_stage(law: ContactLaw) -> Stage:
     return measure_clusters
 
 
+@stage("the loads on a body")
+def store_known_loads(grains, bodies, block):
+    """Store the present loads on the grains of body `block`, less their inertia, as the ones that are known."""
+    store_loads(grains, bodies, block)
+    return 0
+
+
 @stage("the fields between grains of a body")
 def store_rest(grains, bodies, span, block):
     """Store loads and fields of body `block` as it comes to rest: what its contacts carry, and what its grains feel.
@@ -148,9 +155,11 @@ def store_rest(grains, bodies, span, block):
     """
     first = bodies.member[bodies.start[block]]
     q = load4(bodies.orientation, first)
-    store_rest_loads(grains, bodies, block)
+    store_loads(grains, bodies, block)
     for k in range(bodies.start[block], bodies.start[block + 1]):
         i, field = bodies.member[k], (0.0, 0.0, 0.0)
+        put(bodies.rest_force, i, load(bodies.known_force, i))
+        put(bodies.rest_torque, i, load(bodies.known_torque, i))
         for m in range(bodies.start[block], bodies.start[block + 1]):
             j = bodies.member[m]
             if i != j:

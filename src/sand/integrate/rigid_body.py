@@ -224,21 +224,21 @@ def load_with_inertia(grains, bodies, i, q, linear, rate, spin):
 
 
 @loop
-def store_rest_loads(grains, bodies, b):
-    """Store the loads on the grains of body b, less their inertia, which its contacts carry as it comes to rest."""
+def store_loads(grains, bodies, b):
+    """Store the present loads on the grains of body b, less their inertia, as the ones that are known."""
     first = bodies.member[bodies.start[b]]
     q = load4(bodies.orientation, first)
     linear, rate, spin = accelerations(bodies, first)
     for k in range(bodies.start[b], bodies.start[b + 1]):
         i = bodies.member[k]
         force, torque, _ = load_with_inertia(grains, bodies, i, q, linear, rate, spin)
-        put(bodies.rest_force, i, turned_back(q, force))
-        put(bodies.rest_torque, i, turned_back(q, torque))
+        put(bodies.known_force, i, turned_back(q, force))
+        put(bodies.known_torque, i, turned_back(q, torque))
 
 
 @loop
 def contact_loads_bound(grains, bodies, b):
-    """Bound of the change of the loads of the contacts of a body since it came to rest, in units of their limits.
+    """Bound of the change of the loads of the contacts of a body from the known ones, in units of their limits.
 
     A contact divides the body into two parts, and carries the sum of the loads f = F − m a and t = M − I α on the
     grains of one part.  With their changes in the frame of the body, Σ|Δf| bounds the change of its force, and
@@ -251,8 +251,8 @@ def contact_loads_bound(grains, bodies, b):
     for k in range(bodies.start[b], bodies.start[b + 1]):
         i = bodies.member[k]
         force, torque, s = load_with_inertia(grains, bodies, i, q, linear, rate, spin)
-        forces += norm(sub(force, turned(q, load(bodies.rest_force, i))))
-        torques += norm(sub(torque, turned(q, load(bodies.rest_torque, i))))
+        forces += norm(sub(force, turned(q, load(bodies.known_force, i))))
+        torques += norm(sub(torque, turned(q, load(bodies.known_torque, i))))
         extent = max(extent, dot(s, s))
     torques += 2.0 * math.sqrt(extent) * forces
     return max(forces / bodies.strength[0, first], torques / bodies.strength[1, first])

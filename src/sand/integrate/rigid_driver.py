@@ -52,11 +52,9 @@ LARGEST_FLIGHT = 0.1
 """Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
 TOUCH_SPEED = 1.2
 """Closing speeds are taken this much larger to predict a touch."""
-AWAKE, NEAR, TOUCHING = range(3)
-"""Values of `BodyArrays.near`: nothing near; a touch within about two steps; within the next step."""
-WAKE_SHARE, LEAST_CHANGE = 0.75, 0.05
-"""Displacement of a contact, in units of its limit, above which its cluster wakes; and the change of its loads that
-wakes a cluster with a contact near, or at, its limit, which is common in rings, whose contacts load each other."""
+AWAKE, NEAR, LOADED, TOUCHING = range(4)
+"""Values of `BodyArrays.near`: nothing near; a touch within about two steps; loads of contacts that have changed by more
+than the reserve; a touch within the next step."""
 
 
 @formula
@@ -173,14 +171,16 @@ def find_near_bodies(grains, bodies, pair_list, count, span, gas, friction_rate,
 
 @loop
 def find_loaded_bodies(grains, bodies, clock, count):
-    """Mark bodies whose contacts may be near a limit."""
+    """Mark bodies the loads of whose contacts may have changed by more than their reserve."""
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1 and bodies.start[b + 1] - bodies.start[b] > 1:
-            bodies.load[first] = contact_loads_bound(grains, bodies, b)
-            clock[LARGEST_LOAD] = max(clock[LARGEST_LOAD], bodies.load[first])
-            if bodies.load[first] > max(WAKE_SHARE - bodies.strain[first], LEAST_CHANGE):
-                bodies.near[first] = TOUCHING
+            bound = contact_loads_bound(grains, bodies, b)
+            if bound > bodies.reserve[first]:
+                bodies.near[first] = max(bodies.near[first], LOADED)
+            else:
+                bodies.load[first] = bodies.changed[first] + bound
+                clock[LARGEST_LOAD] = max(clock[LARGEST_LOAD], bodies.load[first])
 
 
 @loop
@@ -188,7 +188,7 @@ def any_has_to_wake(bodies, count):
     """Whether any body asleep is marked."""
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
-        if bodies.near[first] == TOUCHING and bodies.asleep[first] == 1:
+        if bodies.near[first] >= LOADED and bodies.asleep[first] == 1:
             return True
     return False
 

@@ -6,6 +6,8 @@ laboratory frame.
 
 import math
 
+import numpy as np
+
 from ..compiler.jit import formula
 from .vec import add, axpy, cross, scale
 
@@ -79,4 +81,16 @@ def turning_rate(q, w):
         y * q[3] + z * q[0] - x * q[2],
         z * q[3] + x * q[1] - y * q[0],
         -x * q[0] - y * q[1] - z * q[2],
+    )
+
+
+def matrix_of(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a unit quaternion.  Not compiled."""
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
     )

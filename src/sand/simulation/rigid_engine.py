@@ -26,12 +26,13 @@ from ..integrate.body_friction import friction_modes
 from ..integrate.parts import DT, ContactParameters, Stop
 from ..integrate.rigid_body import product
 from ..integrate.rigid_clusters import SAMPLES, RigidLimits
-from ..integrate.rigid_driver import TOUCHING, advance_bodies, mark_near_bodies
+from ..integrate.rigid_driver import LOADED, advance_bodies, mark_near_bodies
 from ..integrate.stages import finish_gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
-from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
+from ..numerics.quaternion import matrix_of
+from ..state.arrays import LOADS_OF_BODIES, SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
 from ..state.state import (
     BODIES,
     BROKEN,
@@ -65,6 +66,7 @@ from ..state.state import (
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
+from .rigid_loads import may_stay_at_rest, rest_with_loads
 
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
@@ -146,10 +148,11 @@ class RigidEngine(Engine):
         self._regroup()
         alone = np.bincount(bodies.first, minlength=n) == 1
         alone &= bodies.first == np.arange(n)
-        for name in ("offset", "rest_force", "rest_torque", "inner_field"):
+        for name in ("offset", *LOADS_OF_BODIES, "inner_field"):
             getattr(bodies, name)[...] = 0.0
         bodies.turn[...] = np.array([[0.0], [0.0], [0.0], [1.0]])
-        bodies.strain[:] = bodies.load[:] = 0.0
+        bodies.changed[:] = bodies.load[:] = 0.0
+        bodies.reserve[:] = math.inf
         bodies.strength[...] = math.inf
         for i in np.flatnonzero(alone).tolist():
             self._rest_single(i)
@@ -165,10 +168,11 @@ class RigidEngine(Engine):
         bodies.angular_momentum[:, i] = (
             grains.inertia[i] * _turned_back(grains.orientation[:, i], grains.spin[:, i : i + 1]).ravel()
         )
-        for name in ("offset", "rest_force", "rest_torque", "inner_field"):
+        for name in ("offset", *LOADS_OF_BODIES, "inner_field"):
             getattr(bodies, name)[:, i] = 0.0
         bodies.turn[:, i] = 0.0, 0.0, 0.0, 1.0
-        bodies.strain[i] = bodies.load[i] = 0.0
+        bodies.changed[i] = bodies.load[i] = 0.0
+        bodies.reserve[i] = math.inf
         bodies.strength[:, i] = math.inf
 
     def _set_friction(self, first: int, index: np.ndarray) -> None:
@@ -242,14 +246,18 @@ class RigidEngine(Engine):
                 return stop
 
     def _wake(self) -> None:
-        """Wake all bodies that may touch, or whose contacts are loaded."""
-        bodies, state = self._state.bodies, self._state
-        for first in np.flatnonzero((bodies.near == TOUCHING) & (bodies.asleep == 1)).tolist():
+        """Wake all bodies that may touch, or the loads of whose contacts are near a limit."""
+        bodies, state, woken = self._state.bodies, self._state, False
+        for first in np.flatnonzero((bodies.near >= LOADED) & (bodies.asleep == 1)).tolist():
+            if bodies.near[first] == LOADED and may_stay_at_rest(state, self.law, self._current_table(state), first):
+                continue
             own = self._members(first)
             bodies.asleep[own] = 0
             bodies.event[first] = bodies.vibration[first] = state.time
             state.count[WOKEN] += 1
-        self._sort_members()
+            woken = True
+        if woken:
+            self._sort_members()
 
     def _inner_state(self) -> State:
         """The state of the awake grains, with contacts as they are and everything else as at a start."""
@@ -536,8 +544,7 @@ class RigidEngine(Engine):
         state.lost[QUIETING] += 0.5 * float((inertia * (w - spin) * (w + spin)).sum())
         grains.velocity[:, index], grains.spin[:, index] = new_v, spin
         bodies.asleep[index] = 1
-        bodies.load[first] = 0.0
-        bodies.strain[first] = self._measures.strain[np.searchsorted(self._awake, first)]
+        rest_with_loads(state, first, float(self._measures.strain[np.searchsorted(self._awake, first)]))
         bodies.strength[:, first] = self._measures.strength[:, np.searchsorted(self._awake, first)]
         number = int(np.searchsorted(np.unique(bodies.first), first))
         store_rest.run(self._current_table(state), (), number)
@@ -570,26 +577,14 @@ def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Gra
     return PERIODS * found / SAMPLES
 
 
-def _matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a unit quaternion."""
-    x, y, z, w = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def _turned(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Vectors (3, n) from the body to the laboratory frame."""
-    return _matrix(q) @ vectors
+    return matrix_of(q) @ vectors
 
 
 def _turned_back(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Vectors (3, n) from the laboratory frame to the body."""
-    return _matrix(q).T @ vectors
+    return matrix_of(q).T @ vectors
 
 
 def _quaternion(matrix: np.ndarray) -> np.ndarray:

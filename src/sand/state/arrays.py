@@ -131,7 +131,8 @@ class BodyArrays(NamedTuple):
     momentum: np.ndarray  # (3, N) of a body [kg m/s]
     orientation: np.ndarray  # (4, N) of a body: rotation from its principal axes to the laboratory frame
     angular_momentum: np.ndarray  # (3, N) of a body, in the body [J s]
-    strain: np.ndarray  # (N,) largest displacement of a contact of a body, in units of its limit
+    reserve: np.ndarray  # (N,) growth of the bound of contact loads after which the loads of a body are looked at anew
+    changed: np.ndarray  # (N,) largest change of a contact load since the body came to rest, when last looked at
     strength: np.ndarray  # (2, N) smallest force [N] and torque [N m] at which a contact of a body slips or breaks
     event: np.ndarray  # (N,) time at which the contacts of a body last changed [s]
     vibration: np.ndarray  # (N,) time at which the vibrational energy of a body was last above the limit [s]
@@ -139,6 +140,8 @@ class BodyArrays(NamedTuple):
     turn: np.ndarray  # (4, N) orientation of a grain, in the body
     rest_force: np.ndarray  # (3, N) force on a grain, less its inertia, when its body came to rest, in the body [N]
     rest_torque: np.ndarray  # (3, N) likewise [N m]
+    known_force: np.ndarray  # (3, N) likewise, when the loads of the contacts were last looked at [N]
+    known_torque: np.ndarray  # (3, N) likewise [N m]
     inner_field: np.ndarray  # (3, N) flux density of the other grains of its body at a grain, in the body [T]
     # not saved: they follow from the others, or are used within a step
     member: np.ndarray  # (N,) uint32: grains, sorted by body
@@ -147,10 +150,11 @@ class BodyArrays(NamedTuple):
     torque: np.ndarray  # (3, N) likewise, about its centre of mass [N m]
     decay: np.ndarray  # (6, N) rates of the modes of friction of a body in a gas [1/s]; (6, 0) without gas
     mode: np.ndarray  # (36, N) these modes, one after the other, see integrate.body_friction; (36, 0) likewise
-    load: np.ndarray  # (N,) bound of the loads of the contacts of a body, in units of their limits
-    near: np.ndarray  # (N,) uint8: 1 for the first grain of bodies that a grain of another body may touch soon
+    load: np.ndarray  # (N,) bound of the change of the loads of the contacts of a body, in units of their limits
+    near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `integrate.rigid_driver`
 
 
+LOADS_OF_BODIES = ("rest_force", "rest_torque", "known_force", "known_torque")
 SAVED_BODIES = BodyArrays._fields[: BodyArrays._fields.index("member")]
 """Arrays of the bodies in a checkpoint."""
 SAVED_LONG_RANGE = (
@@ -291,7 +295,7 @@ def cluster_arrays(grains: int) -> ClusterArrays:
 def body_arrays(grains: int, *, in_gas: bool = False) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
     vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
-    widths = dict.fromkeys((*vectors, "rest_force", "rest_torque", "inner_field", "force", "torque"), 3)
+    widths = dict.fromkeys((*vectors, *LOADS_OF_BODIES, "inner_field", "force", "torque"), 3)
     widths |= {"orientation": 4, "turn": 4, "strength": 2}
     found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
     for name, kind in (("first", np.uint32), ("member", np.uint32), ("asleep", np.uint8), ("near", np.uint8)):
