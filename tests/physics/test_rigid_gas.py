@@ -63,6 +63,11 @@ def of_bodies(grains, length):
     return centre, velocity, moving, kinetic - moving
 
 
+def orientation(sim):
+    """Rotations of the first grains of the chains of four."""
+    return Rotation.from_quat(sim.state.grains.arrays.orientation[:, ::4].T)
+
+
 class Arrays:
     """Named arrays, as a stage takes them."""
 
@@ -217,18 +222,19 @@ def test_friction_of_a_straight_chain(length):
 def test_equipartition_and_diffusion_of_chains():
     """200 chains of four in a gas, τ = 5 ns, 20 samples 10 τ apart: energies, and mean-square displacements.
 
-    3/2 k_B T of translation and of rotation.
-    K has 3 degrees of freedom each, 200 × 20 × 3 = 12,000 independent samples (e^(−10) remains) of ½ k_B T χ²: the mean
-    has a relative standard deviation √(2/12000) = 1.3 %. The displacement Δx in T = 10 τ is normal with variance
-    2 D (T − τ (1 − e^(−T/τ))), D = k_B T/(4 f), in each direction: along and across the chain 200 × 20 (× 2) samples,
-    2.2 % and 1.6 %. Steps of h ≤ 0.1 τ add h²/12τ² ≤ 0.08 %. Tolerances are four standard deviations.
+    3/2 k_B T of translation and of rotation: K has 3 degrees of freedom each, 200 × 20 × 3 = 12,000 independent samples
+    (e^(−10) remains) of ½ k_B T χ²: the mean has a relative standard deviation √(2/12000) = 1.3 %. The displacement Δx
+    in T = 10 τ is normal with variance 2 s, s = D (T − τ (1 − e^(−T/τ))), D = k_B T/(4 f), in each direction: along and
+    across the chain 200 × 20 (× 2) samples, 2.2 % and 1.6 %. Steps of h ≤ 0.1 τ add h²/12τ² ≤ 0.08 %. The axis tilts
+    by θ, ⟨sin²θ⟩ = ⅔ (1 − e^(−6 s)), and the chain turns about it by ⟨φ²⟩ = 2 s, with s of the rotational friction and
+    its relaxation time, across and along; tilts of 0.13 rad change φ² by 1 %. Tolerances are four standard deviations.
     """
     tau, interval = 5e-9, 5e-8
     sim = sand.Simulation(chains(4, 200), [contact(), gas(tau)], stepping=sand.RigidClusters(), frame_every=1.0, seed=5)
     sim.run(until=interval)
     assert sim.regular_state.bodies.asleep.all() and sim.regular_state.count[RESTED] == 200
     moving, turning, squares = [], [], []
-    before = of_bodies(sim.grains, 4)[0]
+    before, turned = of_bodies(sim.grains, 4)[0], orientation(sim)
     for k in range(20):
         axis = sim.grains.position[3::4] - sim.grains.position[::4]
         axis /= np.linalg.norm(axis, axis=1)[:, None]
@@ -237,14 +243,29 @@ def test_equipartition_and_diffusion_of_chains():
         moving.append(one.mean())
         turning.append(other.mean())
         along = ((centre - before) * axis).sum(axis=1) ** 2
-        squares.append([along.mean(), (((centre - before) ** 2).sum(axis=1) - along).mean() / 2])
-        before = centre
+        new = sim.grains.position[3::4] - sim.grains.position[::4]
+        tilt = 1.0 - (new * axis).sum(axis=1) ** 2 / (new**2).sum(axis=1)
+        twist = ((orientation(sim) * turned.inv()).as_rotvec() * axis).sum(axis=1) ** 2
+        across = (((centre - before) ** 2).sum(axis=1) - along) / 2
+        squares.append([along.mean(), across.mean(), tilt.mean(), twist.mean()])
+        before, turned = centre, orientation(sim)
     assert np.mean(moving) == pytest.approx(1.5 * KT, rel=0.052, abs=0.0)
     assert np.mean(turning) == pytest.approx(1.5 * KT, rel=0.052, abs=0.0)
-    exact = 2.0 * KT * tau / (4 * MASS) * (interval - tau * -math.expm1(-interval / tau))
-    along, across = np.mean(squares, axis=0)
-    assert along == pytest.approx(exact, rel=0.09, abs=0.0)
-    assert across == pytest.approx(exact, rel=0.063, abs=0.0)
+    numbers = gas(tau).numbers()
+    given = numbers.density, numbers.mean_speed, numbers.accommodation
+    spinning, s = 4 * body_friction.rotation_friction(1e-8, *given), PITCH * np.array([-1.5, -0.5, 0.5, 1.5])
+    inertia, arm = 4 * 0.4 * MASS * 1e-16, (s**2).sum()
+
+    def spread(mass, friction):
+        """D (T − τ (1 − e^(−T/τ))), D = k_B T/friction, τ = mass/friction."""
+        return KT / friction * (interval - mass / friction * -math.expm1(-interval * friction / mass))
+
+    along, across, tilt, twist = np.mean(squares, axis=0)
+    assert along == pytest.approx(2.0 * spread(4 * MASS, 4 * MASS / tau), rel=0.09, abs=0.0)
+    assert across == pytest.approx(2.0 * spread(4 * MASS, 4 * MASS / tau), rel=0.063, abs=0.0)
+    exact = -2.0 / 3.0 * math.expm1(-6.0 * spread(inertia + MASS * arm, spinning + MASS / tau * arm))
+    assert tilt == pytest.approx(exact, rel=0.063, abs=0.0)
+    assert twist == pytest.approx(2.0 * spread(inertia, spinning), rel=0.11, abs=0.0)
     assert sim.regular_state.count[WOKEN] == 0
 
 
