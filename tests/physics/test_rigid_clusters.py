@@ -672,7 +672,6 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     """One line for each, with what to do."""
     refused("without damping no cluster comes to rest; use damping = 'critical'", [sand.Contact()])
     refused("rigid clusters need sand.Contact", [sand.Dipoles()])
-    refused("do not move in a gas yet", [contact(), sand.Gas("100 K", pressure="1 mbar")])
     refused("with a bath_temperature no cluster", [contact(bath_temperature="100 K")])
     refused("cannot have driven grains", [contact()], driven=sand.Driven([0]))
     refused("cannot follow ramps yet", [contact(), sand.Field(sand.Ramp([0.0, 1e-9], [0.0, 1e-3]))])

@@ -151,42 +151,54 @@ def place_velocities(grains, bodies, b):
 
 
 @loop
-def drift_bodies(grains, bodies, count, span, dt, is_wrapped):
-    """Move and turn all bodies asleep with their grains by a step of dt [s].
+def move_body(bodies, b, span, dt):
+    """Move and turn body b by a step of dt [s]; its grains stay where they are."""
+    first = bodies.member[bodies.start[b]]
+    momentum, mass = load(bodies.momentum, first), bodies.mass[first]
+    centre = nearest_image(axpy(dt / mass, momentum, load(bodies.centre, first)), span)
+    q, angular, inertia = (
+        load4(bodies.orientation, first),
+        load(bodies.angular_momentum, first),
+        load(bodies.inertia, first),
+    )
+    if bodies.start[b + 1] - bodies.start[b] == 1:
+        q = free_sphere(q, angular, inertia[0], dt)
+    else:
+        pieces = int(dt * norm(spin_of(bodies, first)) / LARGEST_PIECE) + 1
+        for _ in range(pieces):
+            q, angular = free_rotation(q, angular, inertia, dt / pieces)
+    put(bodies.centre, first, centre)
+    put4(bodies.orientation, first, q)
+    put(bodies.angular_momentum, first, angular)
 
-    Positions of grains are wrapped into the box if `is_wrapped`, else continuous with those before.
+
+@loop
+def place_grains(grains, bodies, b, span, is_wrapped):
+    """Positions, orientations and moments of the grains of body b.
+
+    Positions are wrapped into the box if `is_wrapped`, else continuous with those before.
     """
-    for b in range(count[BODIES]):
-        first = bodies.member[bodies.start[b]]
-        if bodies.asleep[first] == 0:
-            continue
-        momentum, mass = load(bodies.momentum, first), bodies.mass[first]
-        centre = nearest_image(axpy(dt / mass, momentum, load(bodies.centre, first)), span)
-        q, angular, inertia = (
-            load4(bodies.orientation, first),
-            load(bodies.angular_momentum, first),
-            load(bodies.inertia, first),
-        )
-        if bodies.start[b + 1] - bodies.start[b] == 1:
-            q = free_sphere(q, angular, inertia[0], dt)
+    first = bodies.member[bodies.start[b]]
+    centre, q = load(bodies.centre, first), load4(bodies.orientation, first)
+    for k in range(bodies.start[b], bodies.start[b + 1]):
+        i = bodies.member[k]
+        position = add(centre, turned(q, load(bodies.offset, i)))
+        if is_wrapped:
+            put(grains.position, i, nearest_image(position, span))
         else:
-            spin = spin_of(bodies, first)
-            pieces = int(dt * norm(spin) / LARGEST_PIECE) + 1
-            for _ in range(pieces):
-                q, angular = free_rotation(q, angular, inertia, dt / pieces)
-        put(bodies.centre, first, centre)
-        put4(bodies.orientation, first, q)
-        put(bodies.angular_momentum, first, angular)
-        for k in range(bodies.start[b], bodies.start[b + 1]):
-            i = bodies.member[k]
-            position = add(centre, turned(q, load(bodies.offset, i)))
-            if is_wrapped:
-                put(grains.position, i, nearest_image(position, span))
-            else:
-                accrue(grains.position, i, nearest_image(sub(position, load(grains.position, i)), span))
-            own = product(q, load4(bodies.turn, i))
-            put4(grains.orientation, i, own)
-            put(grains.moment, i, turned(own, load(grains.body_moment, i)))
+            accrue(grains.position, i, nearest_image(sub(position, load(grains.position, i)), span))
+        own = product(q, load4(bodies.turn, i))
+        put4(grains.orientation, i, own)
+        put(grains.moment, i, turned(own, load(grains.body_moment, i)))
+
+
+@loop
+def drift_bodies(grains, bodies, count, span, dt, is_wrapped):
+    """Move and turn all bodies asleep with their grains by a step of dt [s]; `is_wrapped` as in `place_grains`."""
+    for b in range(count[BODIES]):
+        if bodies.asleep[bodies.member[bodies.start[b]]] == 1:
+            move_body(bodies, b, span, dt)
+            place_grains(grains, bodies, b, span, is_wrapped)
 
 
 @loop

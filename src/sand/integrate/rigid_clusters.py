@@ -29,6 +29,7 @@ class RigidLimits(NamedTuple):
     longest_step: float  # [s]
     longest_awake: float  # [s], while a cluster is awake
     smallest_radius: float  # [m]
+    friction_rate: float  # fastest decay of a velocity or spin by friction in a gas [1/s]; 0 without gas
     shortest_step: float  # bodies that need a shorter step wake [s]; 0: the step of all bodies becomes as short
 
 
@@ -41,19 +42,20 @@ class RigidClusters:
     A cluster comes to rest when its vibrational energy has been low for half of its slowest period and no touch is
     ahead; it wakes before it may touch another grain, and before a load may move a contact. Single grains are bodies
     as well. Needs damped contacts (`sand.Contact(damping="critical", settling_time=…)`), without which no cluster comes
-    to rest. See docs/physics/rigid-clusters.md.
+    to rest. In a gas (`sand.Gas`) bodies have the friction and noise of their grains. See
+    docs/physics/rigid-clusters.md.
 
     Parameters
     ----------
     vibration : float, optional
         ε, vibrational energy below which a cluster may come to rest, in units of ½ k q_c², the smallest elastic energy
-        at which one of its contacts slips; 0 … 0.1, 0 not included. This energy is removed; the ledger has it as
-        `lost_quieting`.
+        at which one of its contacts slips; 0 … 0.1, 0 not included. In a thermal gas at least 3 (n − 1) k_B T for n
+        grains, and at most ½ k q_c². This energy is removed; the ledger has it as `lost_quieting`.
     step_fraction : float, optional
-        η, longest step in units of the time in which the loads of a body change; 0 … 0.2, 0 not included. Errors of
-        position and energy are proportional to η².
+        η, longest step in units of the time in which the loads of a body change, and of the shortest stopping time in
+        a gas; 0 … 0.2, 0 not included. Errors of position, energy and diffusion are proportional to η².
     longest_step : float or str, optional
-        Longest step of bodies [s]; with "auto" the loads, spins and flights of the bodies alone limit it.
+        Longest step of bodies [s]; with "auto" the loads, spins and flights of the bodies, and a gas, alone limit it.
     contact_stepping : Verlet, optional
         Integrator of the grains of awake clusters; in a case file a table of its keys.
 
@@ -107,6 +109,6 @@ class RigidClusters:
         return self
 
     def flight_limits(self, longest_displacement: float) -> RigidLimits:
-        """Run-time numbers; the engine, which knows contacts and grains, sets the last three."""
+        """Run-time numbers; the engine, which knows contacts, gas and grains, sets the last four."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
-        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0)
+        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, 0.0)

@@ -1,9 +1,9 @@
 """The compiled driver of rigid clusters: steps of all bodies, until a cluster has to wake or contact steps are needed.
 
-One step:  choose h → kick ½h, drift, rotor → long-range and external forces on all grains → kick ½h.  The driver
-returns before a step in which bodies may touch (`Stop.TOUCH_AHEAD`).  While a cluster is awake it returns twice in a
-step: after the drift, so that grains of awake clusters take their contact steps (`AWAKE_STEPS`), and at the end
-(`AWAKE_LOADS`).
+One step:  choose h → kick ½h, drift, rotor → long-range and external forces on all grains → kick ½h.  In a gas the
+drift is two of ½h, with friction and noise between them (`body_friction`).  The driver returns before a step in which
+bodies may touch (`Stop.TOUCH_AHEAD`).  While a cluster is awake it returns twice in a step: after the drift, so that
+grains of awake clusters take their contact steps (`AWAKE_STEPS`), and at the end (`AWAKE_LOADS`).
 """
 
 import math
@@ -19,7 +19,9 @@ from ..state.state import (
     BODIES,
     BROKEN,
     COMPARED,
+    GAS,
     GRAINS_AWAKE,
+    KICKED,
     LARGEST_LOAD,
     LATE,
     LONG_RANGE_SKIN,
@@ -33,6 +35,7 @@ from ..state.state import (
     STEPS,
     TIME,
 )
+from .body_friction import drift_bodies_in_gas, gas_displacement
 from .force_calls import add_external_loads, sum_external, sum_pair_forces
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
@@ -133,10 +136,10 @@ def _approach(grains, bodies, i, h):
 
 
 @loop
-def find_near_bodies(grains, bodies, pair_list, count, span, h):
+def find_near_bodies(grains, bodies, pair_list, count, span, gas, friction_rate, h):
     """Mark bodies near others (`BodyArrays.near`) for a step of h [s].
 
-    A gap closes at most by the closing speed, a fifth more of it, and the curvature of the paths.
+    A gap closes at most by the closing speed, a fifth more of it, the curvature of the paths, and what a gas adds.
     """
     for p in range(count[PAIRS]):
         i, j = pair_list.pair[0, p], pair_list.pair[1, p]
@@ -151,6 +154,9 @@ def find_near_bodies(grains, bodies, pair_list, count, span, h):
         across = max(dot(v, v) - closing * closing, 0.0)
         reach = TOUCH_SPEED * closing * h + 0.5 * across / distance * h * h
         reach += _approach(grains, bodies, i, h) + _approach(grains, bodies, j, h)
+        if gas.gas.on:
+            reach += gas_displacement(grains, bodies, i, friction_rate, gas.gas, h)
+            reach += gas_displacement(grains, bodies, j, friction_rate, gas.gas, h)
         if gap > 2.0 * reach:
             continue
         both_awake = bodies.asleep[i] + bodies.asleep[j] == 0
@@ -187,8 +193,8 @@ def any_has_to_wake(bodies, count):
 
 
 @caller
-def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, bodies, count, program, table, h):
-    """Move all bodies asleep, and log the work of external forces that depend on time or position.
+def drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table, h):
+    """Move all bodies asleep, and log the work of external forces that depend on time or position, and of a gas.
 
     Grains of awake clusters stay where they are; the change of their energies with time is part of the work.
     """
@@ -196,7 +202,12 @@ def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, b
     if external_work.time_dependent:
         gained += sum_external(scratch, forces, program, table, end, ENERGY)
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
-    drift_bodies(grains, bodies, count, span, h, not external_work.position_dependent)
+    if gas.gas.on:
+        lost[GAS] += drift_bodies_in_gas(
+            grains, bodies, count, span, count[STEPS], gas, h, not external_work.position_dependent
+        )
+    else:
+        drift_bodies(grains, bodies, count, span, h, not external_work.position_dependent)
     if external_work.time_dependent:
         gained += sum_external(scratch, forces, program, table, end, ENERGY)
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
@@ -245,8 +256,8 @@ def awake_grains(bodies):
 
 @caller
 def first_half(
-    grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, criteria, forces, flight_limits,
-    program, table, until, shorten, some_awake
+    grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria, forces,
+    flight_limits, program, table, until, shorten, some_awake
 ):  # fmt: skip
     """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
     sum_body_loads(grains, bodies, count)
@@ -260,21 +271,21 @@ def first_half(
         if not shorten:
             return Stop.TIME_REACHED.value
         h = until - clock[TIME]
-    find_near_bodies(grains, bodies, pair_list, count, span, h)
+    find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, h)
     find_loaded_bodies(grains, bodies, clock, count)
     clock[STEP] = h
     if any_has_to_wake(bodies, count):
         return Stop.TOUCH_AHEAD.value
     kick_bodies(bodies, count, 0.5 * h)
-    drift_with_work(clock, lost, scratch, span, external_work, forces, grains, bodies, count, program, table, h)
+    drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table, h)
     count[STAGE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
 
 @caller
 def second_half(
-    grains, bodies, pair_list, long_range, clock, count, scratch, span, search, criteria, forces, queue, program, table,
-    awake
+    grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces, queue, program,
+    table, awake
 ):  # fmt: skip
     """Update the lists, sum the loads, and kick; returns the value of a `Stop`."""
     stop = update_lists(grains, pair_list, long_range, span, search, criteria, program, table)
@@ -285,6 +296,8 @@ def second_half(
     kick_bodies(bodies, count, 0.5 * clock[STEP])
     move_velocities(grains, bodies, count)
     clock[TIME] += clock[STEP]
+    if gas.gas.on:
+        clock[KICKED] = clock[TIME]
     clock[SOME_AWAKE] += clock[STEP] if awake > 0 else 0.0
     clock[GRAINS_AWAKE] += awake * clock[STEP]
     count[STEPS] += 1 if clock[STEP] > 0.0 else 0
@@ -294,8 +307,8 @@ def second_half(
 
 @caller
 def body_steps_until(
-    grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, criteria, forces,
-    flight_limits, queue, program, table, until, last, shorten
+    grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, gas, criteria,
+    forces, flight_limits, queue, program, table, until, last, shorten
 ):  # fmt: skip
     """Take steps until the last end of a step not after `until` [s], or step `last`; returns the value of a `Stop`."""
     awake = awake_grains(bodies)
@@ -310,13 +323,13 @@ def body_steps_until(
             if count[STEPS] >= last:
                 return Stop.NONE.value
             stop = first_half(
-                grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, criteria, forces,
-                flight_limits, program, table, until, shorten, awake > 0
+                grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria,
+                forces, flight_limits, program, table, until, shorten, awake > 0
             )  # fmt: skip
         if stop == Stop.NONE.value:
             stop = second_half(
-                grains, bodies, pair_list, long_range, clock, count, scratch, span, search, criteria, forces, queue,
-                program, table, awake
+                grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces,
+                queue, program, table, awake
             )  # fmt: skip
         if stop != Stop.NONE.value:
             return stop
@@ -325,23 +338,23 @@ def body_steps_until(
 @stage("the steps of rigid bodies")
 def advance_bodies(
     table, program, grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work,
-    criteria, forces, flight_limits, queue, until, last, shorten
+    gas, criteria, forces, flight_limits, queue, until, last, shorten
 ):  # fmt: skip
     """Take steps of all bodies, then end the work of the other threads; returns the value of a `Stop`."""
     stop = body_steps_until(
-        grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, criteria,
-        forces, flight_limits, queue, program, table, until, last, shorten
+        grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, gas,
+        criteria, forces, flight_limits, queue, program, table, until, last, shorten
     )  # fmt: skip
     join_workers(queue.words)
     return stop
 
 
 @stage("the search for touches of bodies")
-def mark_near_bodies(grains, bodies, pair_list, clock, count, span, criteria, flight_limits):
+def mark_near_bodies(grains, bodies, pair_list, clock, count, span, gas, criteria, flight_limits):
     """Mark bodies near others, for a step as long as the last one, and single grains that need short steps."""
     sum_body_loads(grains, bodies, count)
     bodies.near[:] = AWAKE
-    find_near_bodies(grains, bodies, pair_list, count, span, clock[STEP])
+    find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, clock[STEP])
     longest = 0.5 * flight_limits.step_fraction
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from ..compiler.jit import loop
 from ..compiler.stage import Stage, stage
 from ..contact.events import compact_contacts, forming_loops, settle_loop
 from ..contact.gather import gather
@@ -23,7 +24,7 @@ from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
-from ..state.state import CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
+from ..state.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from .motion import UNBOUNDED, drift_for, gather_and_kick
 from .parts import CYCLE_LENGTH, DT, SINCE, Stop
 from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions
@@ -255,13 +256,29 @@ def extrapolate(grains, long_range, scratch):
     return 0
 
 
+@loop
+def _kick_by_gas(grains, clock, count, lost, gas, elapsed):
+    """Drag and Brownian kicks of `elapsed` seconds; their numbers are those of steps, also of awake clusters."""
+    # the steps of grains of awake clusters are counted from 0 in each step of the bodies, CONTACT_STEPS before it
+    number = count[STEPS] + count[CONTACT_STEPS]
+    lost[GAS] += gas_kick(grains, gas.seed, number, elapsed, gas.gas)
+    clock[KICKED] = clock[TIME]
+
+
 @stage("the drag and noise of the gas")
 def kick_by_gas(grains, clock, count, lost, gas):
     """Drag and Brownian kicks for the time since the last; at ends of steps or cycles, about once per gas period."""
     elapsed = clock[TIME] - clock[KICKED]
     if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= gas.period:
-        lost[GAS] += gas_kick(grains, gas.seed, count[STEPS], elapsed, gas.gas)
-        clock[KICKED] = clock[TIME]
+        _kick_by_gas(grains, clock, count, lost, gas, elapsed)
+    return 0
+
+
+@stage("the drag and noise of the gas on awake clusters")
+def finish_gas(grains, clock, count, lost, gas):
+    """As `kick_by_gas`, for any time since the last, at the end of a step of the bodies."""
+    if clock[TIME] > clock[KICKED]:
+        _kick_by_gas(grains, clock, count, lost, gas, clock[TIME] - clock[KICKED])
     return 0
 
 

@@ -21,6 +21,7 @@ from ..forces.pair.ewald_force import EwaldForce
 from ..forces.pair.loops import LongRangeSums
 from ..grains import Grains
 from ..integrate.base import Integrator
+from ..integrate.body_friction import LARGEST_DEVIATE
 from ..integrate.parts import (
     ContactParameters,
     ExternalWork,
@@ -30,7 +31,8 @@ from ..integrate.parts import (
     StepParameters,
 )
 from ..integrate.program import Components
-from ..integrate.rigid_clusters import RigidClusters
+from ..integrate.rigid_clusters import RigidClusters, RigidLimits
+from ..integrate.rigid_driver import LARGEST_FLIGHT
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
 from ..material import SILICA
@@ -137,7 +139,8 @@ def build_engine(
         force, sums, _ = long_range[follower.index]
         long_range[follower.index] = force, sums, follower.force.numbers_at(cutoffs[follower.index])
     verlet = stepping.contact_stepping
-    control = _step_control(grains, verlet, by_type, pair_gap)
+    # friction and noise of bodies are exact: `_rigid_limits` says how long their steps may be
+    control = _step_control(grains, verlet, by_type._replace(gas=[]) if rigid else by_type, pair_gap)
     stepping = stepping.resolved(grains, control)
     parameters = StepParameters(
         box.span,
@@ -151,11 +154,7 @@ def build_engine(
         ForceNumbers(len(long_range), len(by_type.external)),
     )
     if rigid:
-        law = (by_type.contact or Contact()).contact_law
-        awake = min(parameters.flight_limits.longest_step, longest_step_awake(law, parameters.settings, grains))
-        limits = parameters.flight_limits._replace(longest_awake=awake, smallest_radius=float(grains.radius.min()))
-        if len(grains) >= WAKE_QUICK_FROM:
-            limits = limits._replace(shortest_step=awake)
+        limits = _rigid_limits(parameters, by_type, grains)
         parameters = parameters._replace(flight_limits=limits)
     components = Components(
         (by_type.contact or Contact()).contact_law,
@@ -182,7 +181,7 @@ def build_engine(
     parts = (state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower)
     engine = Engine(*parts)
     if rigid:
-        state.bodies = body_arrays(len(grains))
+        state.bodies = body_arrays(len(grains), in_gas=bool(by_type.gas))
         engine = RigidEngine(*parts, inner=inner_engine(wrapped, forces, box, verlet, seed))
     if any(map(ramps_of, forces)):
         changing = functools.partial(
@@ -204,6 +203,32 @@ def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verl
     )
 
 
+def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
+    """Limits of the steps of rigid clusters that depend on grains, contacts and gas.
+
+    In a gas a step is at most η τ, with the shortest stopping time τ of a grain, which no mode of a body falls below:
+    the exact friction needs no short step, but drifts of half a step with the velocities before and after it let a free
+    body diffuse too fast by h²/12τ², an error of the order of η² as that of the loads. Nor may noise alone move a grain
+    farther than `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations √(2 k_B T h/τ m).
+    """
+    law, limits = (forces.contact or Contact()).contact_law, parameters.flight_limits
+    longest, rate, gas = limits.longest_step, 0.0, parameters.gas.gas
+    if forces.gas:
+        rate = 1.0 / forces.gas[0].shortest_time(grains)
+        spread = LARGEST_DEVIATE * math.sqrt(2.0 * gas.temperature_energy * rate / float(grains.mass.min()))
+        longest = min(longest, limits.step_fraction / rate)
+        if spread > 0.0:
+            longest = min(longest, (2.0 * LARGEST_FLIGHT * parameters.criteria.pair_gap / spread) ** (2.0 / 3.0))
+    awake = min(longest, longest_step_awake(law, parameters.settings, grains))
+    return limits._replace(
+        longest_step=longest,
+        longest_awake=awake,
+        smallest_radius=float(grains.radius.min()),
+        friction_rate=rate,
+        shortest_step=awake if len(grains) >= WAKE_QUICK_FROM else limits.shortest_step,
+    )
+
+
 def check_rigid_clusters(forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall]) -> None:
     """Refuse what rigid clusters cannot do; all problems at once."""
     contact = next((f for f in forces if isinstance(f, Contact)), None)
@@ -217,8 +242,6 @@ def check_rigid_clusters(forces: Sequence[Force], driven: Sequence[Driven], wall
         )
     if contact is not None and contact.bath_temperature is not None:
         problems.append("with a bath_temperature no cluster comes to rest; leave it out, or use sand.Verlet")
-    if any(isinstance(force, Gas) for force in forces):
-        problems.append("rigid clusters do not move in a gas yet; leave [forces.gas] out, or use sand.Verlet")
     if any(map(ramps_of, forces)):
         problems.append("rigid clusters cannot follow ramps yet; use numbers, or sand.Verlet")
     if driven:

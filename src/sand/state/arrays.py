@@ -148,6 +148,8 @@ class BodyArrays(NamedTuple):
     start: np.ndarray  # (N+1,) uint32: first entry of each body in `member`
     force: np.ndarray  # (3, N) of all other grains and external forces on a body [N]
     torque: np.ndarray  # (3, N) likewise, about its centre of mass [N m]
+    decay: np.ndarray  # (6, N) rates of the modes of friction of a body in a gas [1/s]; (6, 0) without gas
+    mode: np.ndarray  # (36, N) these modes, one after the other, see integrate.body_friction; (36, 0) likewise
     load: np.ndarray  # (N,) bound of the change of the loads of the contacts of a body, in units of their limits
     near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `integrate.rigid_driver`
 
@@ -290,7 +292,7 @@ def cluster_arrays(grains: int) -> ClusterArrays:
     return ClusterArrays(np.zeros(grains, np.uint32), np.zeros(grains, np.uint8), np.zeros((3, grains)))
 
 
-def body_arrays(grains: int) -> BodyArrays:
+def body_arrays(grains: int, *, in_gas: bool = False) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
     vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
     widths = dict.fromkeys((*vectors, *LOADS_OF_BODIES, "inner_field", "force", "torque"), 3)
@@ -298,6 +300,7 @@ def body_arrays(grains: int) -> BodyArrays:
     found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
     for name, kind in (("first", np.uint32), ("member", np.uint32), ("asleep", np.uint8), ("near", np.uint8)):
         found[name] = np.zeros(grains, kind)
+    found |= {name: np.zeros((rows, grains if in_gas else 0)) for name, rows in (("decay", 6), ("mode", 36))}
     return BodyArrays(**(found | {"start": np.zeros(grains + 1, np.uint32)}))
 
 
