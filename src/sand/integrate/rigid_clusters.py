@@ -17,8 +17,8 @@ from .verlet import Verlet
 
 MOST_VIBRATION, MOST_STEP_FRACTION = 0.1, 0.2
 """Largest values accepted: above, clusters would come to rest while they swing, and steps would not be accurate."""
-SAMPLES = 4.0
-"""Longest step while a cluster is awake, in these parts of the shortest time after which a cluster may be at rest."""
+SAMPLES = 4
+"""Vibrations of awake clusters are measured this often in the shortest time after which a cluster may be at rest."""
 
 
 class RigidLimits(NamedTuple):
@@ -27,7 +27,7 @@ class RigidLimits(NamedTuple):
     vibration: float  # vibrational energy below which a cluster may be at rest, in units of ½ k q_c²
     step_fraction: float  # longest step times the rate of change of a body's loads
     longest_step: float  # [s]
-    longest_awake: float  # [s], while a cluster is awake
+    longest_awake: float  # [s], while a cluster is awake: the shortest time after which one may be at rest
     smallest_radius: float  # [m]
     friction_rate: float  # fastest decay of a velocity or spin by friction in a gas [1/s]; 0 without gas
     shortest_step: float  # bodies that need a shorter step wake [s]; 0: the step of all bodies becomes as short

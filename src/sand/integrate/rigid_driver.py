@@ -160,7 +160,7 @@ def find_near_bodies(grains, bodies, pair_list, count, span, gas, friction_rate,
         if gap > 2.0 * reach:
             continue
         both_awake = bodies.asleep[i] + bodies.asleep[j] == 0
-        if gap <= reach and not both_awake:
+        if not gap > reach and not both_awake:  # also if the reach is not a number
             bodies.near[one] = bodies.near[other] = TOUCHING
             count[LATE] += 1 if gap < 0.0 else 0
         else:

@@ -31,7 +31,7 @@ from ..integrate.parts import (
     StepParameters,
 )
 from ..integrate.program import Components
-from ..integrate.rigid_clusters import RigidClusters, RigidLimits
+from ..integrate.rigid_clusters import SAMPLES, RigidClusters, RigidLimits
 from ..integrate.rigid_driver import LARGEST_FLIGHT
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
@@ -225,7 +225,7 @@ def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grai
         longest_awake=awake,
         smallest_radius=float(grains.radius.min()),
         friction_rate=rate,
-        shortest_step=awake if len(grains) >= WAKE_QUICK_FROM else limits.shortest_step,
+        shortest_step=awake / SAMPLES if len(grains) >= WAKE_QUICK_FROM else limits.shortest_step,
     )
 
 

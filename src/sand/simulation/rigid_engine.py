@@ -67,7 +67,7 @@ from ..state.state import (
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
-from .rigid_loads import may_stay_at_rest, rest_with_loads
+from .rigid_loads import body_number, may_stay_at_rest, rest_with_loads
 
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
@@ -110,6 +110,7 @@ class RigidEngine(Engine):
     _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
     _inner_grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # of the inner state
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
+    _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _slips: int = field(init=False, default=0)  # in the contact steps of the present step of bodies
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
@@ -162,6 +163,12 @@ class RigidEngine(Engine):
         bodies.strength[...] = math.inf
         for i in np.flatnonzero(alone).tolist():
             self._rest_single(i)
+        self._list_awake()
+        if self._awake.size:  # the search for touches needs mass and inertia of awake clusters
+            present, self._vibrated = self._inner_state(), np.zeros(len(self._awake), bool)
+            self._measure_vibrations(present)
+            for k, own in self._awake_clusters():
+                self._describe(k, own, present)
         self._sum_outer_loads()
 
     def _rest_single(self, i: int) -> None:
@@ -195,10 +202,9 @@ class RigidEngine(Engine):
         """Lists of the grains of each body."""
         bodies, n = self._state.bodies, len(self._state.grains)
         bodies.member[:] = np.argsort(bodies.first, kind="stable")
-        firsts = np.unique(bodies.first)
-        self._state.count[BODIES] = len(firsts)
-        bodies.start[: len(firsts)] = np.searchsorted(bodies.first[bodies.member], firsts)
-        bodies.start[len(firsts) :] = n
+        starts = np.flatnonzero(np.diff(bodies.first[bodies.member].astype(np.int64), prepend=-1))
+        self._state.count[BODIES] = len(starts)
+        bodies.start[: len(starts)], bodies.start[len(starts) :] = starts, n
         self._list_awake()
 
     def _list_awake(self) -> None:
@@ -336,7 +342,15 @@ class RigidEngine(Engine):
         inner._drive(-math.inf, 1)
         present.count[STEPS] = 0
         self._kick_awake(present)
-        stop = inner._drive(end, math.inf, shorten=True)
+        self._vibrated = np.zeros(len(self._awake), bool)
+        pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / self._limits.longest_awake)
+        for k in range(1, pieces):
+            stop = inner._drive(before + (end - before) * k / pieces, math.inf, shorten=True)
+            if stop is not Stop.TIME_REACHED:
+                break
+            self._measure_vibrations(present)
+        else:
+            stop = inner._drive(end, math.inf, shorten=True)
         if stop is not Stop.TIME_REACHED:
             for grain in (GRAIN1, GRAIN2):
                 own = int(present.count[grain])
@@ -347,6 +361,20 @@ class RigidEngine(Engine):
         self._finish_gas(present)
         self._copy_back(present)
         return Stop.NONE
+
+    def _measure_vibrations(self, present: State) -> None:
+        """Measure awake clusters; notes the grains of those that vibrate too much to come to rest."""
+        measures = self._measures
+        measure_clusters_stage(self.law).run(self._inner_table(present), measures)
+        allowed = self._vibration_at_rest(measures.size, measures.limit)
+        self._vibrated |= (measures.vibration > allowed)[measures.first.astype(np.int64)]
+
+    def _awake_clusters(self) -> list[tuple[int, np.ndarray]]:
+        """First grain and all grains of each awake cluster that was measured, as indices of awake grains."""
+        numbers = self._measures.first.astype(np.int64)
+        order = np.argsort(numbers, kind="stable")
+        starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+        return list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
 
     def _finish_gas(self, present: State) -> None:
         """Drag and noise of the gas on awake grains since their last kick, so that none is left for the next step."""
@@ -435,16 +463,13 @@ class RigidEngine(Engine):
         for name in ("velocity", "spin"):
             getattr(state.grains.arrays, name)[..., self._awake] = getattr(present.grains.arrays, name)
         measures = self._measures
-        measure_clusters_stage(self.law).run(self._inner_table(present), measures)
-        numbers = measures.first.astype(np.int64)
-        order = np.argsort(numbers, kind="stable")
-        starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
-        clusters = list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
-        firsts = self._awake[numbers]
+        self._measure_vibrations(present)
+        clusters, firsts = self._awake_clusters(), self._awake[measures.first.astype(np.int64)]
         if not np.array_equal(firsts, bodies.first[self._awake]):
-            self._rename(firsts)
+            changed = self._rename(firsts)
             for k, own in clusters:
-                self._describe(k, own, present)
+                if changed[k]:
+                    self._describe(k, own, present)
         mark_near_bodies.run(self._current_table(state))
         rested = False
         for k, own in clusters:
@@ -456,7 +481,7 @@ class RigidEngine(Engine):
                 continue
             if self._slips and measures.strain[k] > MOVING_STRAIN:
                 bodies.event[first] = state.time
-            if measures.vibration[k] > self._vibration_at_rest(len(own), float(measures.limit[k])):
+            if self._vibrated[own].any():
                 bodies.vibration[first] = state.time
             wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
             quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
@@ -480,8 +505,8 @@ class RigidEngine(Engine):
             self.warnings.append(SPANS)
         return fits
 
-    def _vibration_at_rest(self, size: int, limit: float) -> float:
-        """Vibrational energy [J] below which a cluster of `size` grains may come to rest; `limit` is its ½ k q_c².
+    def _vibration_at_rest(self, size: np.ndarray, limit: np.ndarray) -> np.ndarray:
+        """Vibrational energy [J] below which clusters of `size` grains may come to rest; `limit` is their ½ k q_c².
 
         In a thermal gas this is at least 3 (n − 1) k_B T, the mean kinetic energy of the 6 n − 6 modes of a cluster in
         equilibrium with the gas, but no more than ½ k q_c², with which one contact would slip. Dashpots without noise
@@ -490,23 +515,27 @@ class RigidEngine(Engine):
         come to rest as fast as without gas, and few would in a dense or hot gas with ε ½ k q_c² alone.
         """
         thermal = 3.0 * (size - 1) * self.parameters.gas.gas.temperature_energy
-        return max(self._limits.vibration * limit, min(thermal, limit))
+        return np.maximum(self._limits.vibration * limit, np.minimum(thermal, limit))
 
     @property
     def _limits(self) -> RigidLimits:
         limits: RigidLimits = self.parameters.flight_limits
         return limits
 
-    def _rename(self, firsts: np.ndarray) -> None:
-        """New first grains of the clusters of the awake grains, after contacts formed or broke."""
-        bodies = self._state.bodies
-        before = bodies.first[self._awake].copy()
-        for first in np.unique(firsts):
-            own = firsts == first
-            if not np.array_equal(own, before == first):
-                bodies.event[first] = bodies.vibration[first] = self._state.time
+    def _rename(self, firsts: np.ndarray) -> np.ndarray:
+        """New first grains of the clusters of the awake grains, after contacts formed or broke.
+
+        Returns whether the cluster of each awake grain has other grains than before.
+        """
+        bodies, n = self._state.bodies, len(self._state.grains)
+        before = bodies.first[self._awake]
+        # a cluster is the same if all of its grains had its first grain, and no other grain had
+        other = np.bincount(firsts, before != firsts, n) + np.bincount(before, before != firsts, n)
+        changed = other[firsts] > 0
+        bodies.event[firsts[changed]] = bodies.vibration[firsts[changed]] = self._state.time
         bodies.first[self._awake] = firsts
         self._sort_members()
+        return changed
 
     def _regroup(self) -> None:
         """Clusters from the contacts of all grains."""
@@ -555,8 +584,7 @@ class RigidEngine(Engine):
         bodies.asleep[index] = 1
         rest_with_loads(state, first, float(self._measures.strain[np.searchsorted(self._awake, first)]))
         bodies.strength[:, first] = self._measures.strength[:, np.searchsorted(self._awake, first)]
-        number = int(np.searchsorted(np.unique(bodies.first), first))
-        store_rest.run(self._current_table(state), (), number)
+        store_rest.run(self._current_table(state), (), body_number(state, first))
         if self.parameters.gas.gas.on:
             self._set_friction(first, index)
         state.count[RESTED] += 1
@@ -572,10 +600,9 @@ def list_gap(grains: Grains, box: Box) -> float:
 
 
 def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Grains) -> float:
-    """Longest step [s] of bodies while clusters are awake, so that their vibrations are seen often enough.
+    """Longest step [s] of bodies while clusters are awake: the shortest time after which a cluster may be at rest.
 
-    A quarter of the shortest time for which they must be low: PERIODS of the slowest mode of the contact of two of the
-    smallest grains of each material.
+    That is PERIODS of the slowest mode of the contact of two of the smallest grains of each material.
     """
     found, of_pair = math.inf, contact_constants(law)
     members = [np.flatnonzero(grains.arrays.material == k) for k in range(len(grains.materials))]
@@ -592,7 +619,7 @@ def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Gra
             )
             if slowest > 0.0:
                 found = min(found, 2.0 * math.pi / math.sqrt(slowest))
-    return PERIODS * found / SAMPLES
+    return PERIODS * found
 
 
 def _turned(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
