@@ -1,9 +1,15 @@
-"""Growth with rigid clusters beside growth grain by grain: the main job with damping, paired seeds, and tests."""
+"""Growth with rigid clusters beside growth grain by grain: the main job with damping, paired seeds, and tests.
+
+`python -m benchmarks --rigid-clusters` writes docs/physics/rigid-clusters.csv.  `python -m benchmarks.rigid_clusters`
+with `thin` or `many` reports the CPU time of a gas of 1000 grains, a hundred times thinner than the main job, until the
+mean cluster size is 20, or of 10⁴ grains for 5 µs.
+"""
 
 from __future__ import annotations
 
 import json
 import multiprocessing
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -121,3 +127,41 @@ def write(seeds: int = 32, out: Path = Path("rigid-clusters.jsonl"), table: Path
     """Write the table of all variants."""
     write_table(table, compared(runs(list(VARIANTS), seeds, out)))
     return table
+
+
+GASES: dict[str, tuple[int, float, float, float, dict[str, Any]]] = {
+    "thin": (1000, 12e-6, 1e-2, 20.0, {}),
+    "many": (10_000, BOX * 100.0 ** (1.0 / 3.0), 5e-6, np.inf, {"periodic": "ewald", "accuracy": 1e-3}),
+}
+"""Grains, box [m], end [s], mean cluster size at which to end, and settings of the dipoles of two larger gases."""
+
+
+def report(name: str) -> None:
+    """Run a larger gas on one thread and print what it costs, a line for each fiftieth of its time."""
+    warnings.simplefilter("ignore")
+    sand.set_threads(1)
+    number, box, end, largest, dipoles = GASES[name]
+    iron = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg"}
+    grains = sand.setup.gas(number, box, temperature=TEMPERATURE, seed=1, **iron)
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns")
+    forces = [contact, sand.Dipoles(**dipoles)]
+    sim = sand.Simulation(grains, forces, box=box, stepping=sand.RigidClusters(), frame_every=end)
+    begun, size = time.process_time(), 1.0
+    parts = 50 if largest == np.inf else 1000
+    for k in range(1, parts + 1):
+        if size >= largest:
+            break
+        sim.run(until=end * k / parts)
+        count, clock = sim.regular_state.count, sim.regular_state.clock
+        size = sim.ledger.rows[-1]["mean_cluster_size"]
+        print(
+            f"{1e6 * sim.time:8.2f} µs, {time.process_time() - begun:6.1f} s of CPU: mean size {size:.2f}, "
+            f"{sim.steps} steps of bodies, {count[CONTACT_STEPS]} of contacts, {count[MADE]} contacts formed, "
+            f"{count[BROKEN]} broken, {count[WOKEN]} woken, {count[LATE]} seen late, "
+            f"{clock[GRAINS_AWAKE] / sim.time / number:.2%} of the grains awake, energy error {sim.ledger.drift:.1e}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    report(sys.argv[1])

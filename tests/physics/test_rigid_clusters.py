@@ -236,8 +236,7 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
     engine._measures = cluster_measures(6)
     present = engine.inner._state
     measure_clusters_stage(engine.law).run(engine._inner_table(present), engine._measures)
-    engine._describe(0, np.arange(3), present)
-    engine._rest(0, np.arange(3))
+    engine._rest(np.arange(3), present.clusters.offset[:, :3])
     assert state.bodies.asleep.tolist() == [1, 1, 1, 0, 0, 0]
     old = before.grains.arrays
     for name in ("position", "orientation", "moment"):

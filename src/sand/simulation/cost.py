@@ -19,6 +19,7 @@ from ..compiler.jit import cache_folder
 from ..compiler.progress import compilation_seconds
 from ..contact.law import contact_constants
 from ..contact.model import Contact
+from ..integrate.rigid_clusters import RigidClusters
 from ..integrate.step_control import FLIGHT_FRACTION, MAX_SPIN_ANGLE
 from ..integrate.task_queue import uses_task_queue
 from ..neighbours.settings import share_within
@@ -68,11 +69,16 @@ def _name(force: Any, simulation: Simulation) -> str:
 
 
 def shortest_step(simulation: Simulation) -> float:
-    """Step [s] while there are contacts, 2π/ω_max over the steps per period; without contacts that of free flight."""
+    """Step [s] while there are contacts, 2π/ω_max over the steps per period; without contacts that of free flight.
+
+    With rigid clusters, the longest step of bodies while a cluster is awake.
+    """
     engine, grains = simulation._engine, simulation.start
     criteria, verlet = engine.parameters.criteria, simulation.stepping.contact_stepping
     if criteria.fixed > 0.0:
         return float(criteria.fixed)
+    if isinstance(simulation.stepping, RigidClusters):  # steps of bodies; in the main job they are half as long
+        return float(engine.parameters.flight_limits.longest_awake)
     contact = next((force for force in simulation.forces if isinstance(force, Contact)), None)
     if contact is not None and len(grains) > 1:
         smallest = [

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.clusters import cluster_labels
 from ..box import Box
 from ..compiler.stage import Stage
 from ..compiler.table import Table
@@ -23,17 +22,14 @@ from ..integrate.awake_clusters import (
     measure_clusters_stage,
     store_rest,
 )
-from ..integrate.body_friction import friction_modes
 from ..integrate.parts import DT, ContactParameters, Stop
-from ..integrate.rigid_body import product
 from ..integrate.rigid_clusters import SAMPLES, RigidLimits
 from ..integrate.rigid_driver import LOADED, advance_bodies, mark_near_bodies
 from ..integrate.stages import finish_gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
-from ..numerics.quaternion import matrix_of
-from ..state.arrays import LOADS_OF_BODIES, SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
+from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
 from ..state.state import (
     BODIES,
     BROKEN,
@@ -64,10 +60,20 @@ from ..state.state import (
     WOKEN,
     State,
 )
+from .bodies import (
+    body_number,
+    describe_body,
+    form_bodies,
+    members,
+    rest_cluster,
+    rest_grain,
+    set_friction,
+    sort_members,
+)
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
-from .rigid_loads import body_number, may_stay_at_rest, rest_with_loads
+from .rigid_loads import may_stay_at_rest, rest_with_loads
 
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
@@ -143,68 +149,23 @@ class RigidEngine(Engine):
             bodies = self._state.bodies
             firsts, sizes = np.unique(bodies.first, return_counts=True)
             for first in firsts[(sizes > 1) & (bodies.asleep[firsts] == 1)].tolist():
-                self._set_friction(first, self._members(first))
+                set_friction(self._state, self.parameters.gas.gas, members(self._state, first))
 
     def _form_bodies(self) -> None:
         """Make a body of each grain without contacts; clusters are awake."""
         state = self._state
-        bodies, n = state.bodies, len(state.grains)
-        bodies.first[:], bodies.asleep[:] = np.arange(n), 0
-        bodies.event[:] = bodies.vibration[:] = state.time
-        self._sort_members()
-        self._regroup()
-        alone = np.bincount(bodies.first, minlength=n) == 1
-        alone &= bodies.first == np.arange(n)
-        for name in ("offset", *LOADS_OF_BODIES, "inner_field"):
-            getattr(bodies, name)[...] = 0.0
-        bodies.turn[...] = np.array([[0.0], [0.0], [0.0], [1.0]])
-        bodies.changed[:] = bodies.load[:] = 0.0
-        bodies.reserve[:] = math.inf
-        bodies.strength[...] = math.inf
-        for i in np.flatnonzero(alone).tolist():
-            self._rest_single(i)
+        form_bodies(state)
         self._list_awake()
         if self._awake.size:  # the search for touches needs mass and inertia of awake clusters
             present, self._vibrated = self._inner_state(), np.zeros(len(self._awake), bool)
             self._measure_vibrations(present)
-            for k, own in self._awake_clusters():
-                self._describe(k, own, present)
+            for _, own in self._awake_clusters():
+                describe_body(state, self._awake[own], present.clusters.offset[:, own])
         self._sum_outer_loads()
 
-    def _rest_single(self, i: int) -> None:
-        """Make a body of a single grain."""
-        bodies, grains = self._state.bodies, self._state.grains.arrays
-        bodies.asleep[i] = 1
-        bodies.mass[i], bodies.inertia[:, i] = grains.mass[i], grains.inertia[i]
-        bodies.centre[:, i], bodies.orientation[:, i] = grains.position[:, i], grains.orientation[:, i]
-        bodies.momentum[:, i] = grains.mass[i] * grains.velocity[:, i]
-        bodies.angular_momentum[:, i] = (
-            grains.inertia[i] * _turned_back(grains.orientation[:, i], grains.spin[:, i : i + 1]).ravel()
-        )
-        for name in ("offset", *LOADS_OF_BODIES, "inner_field"):
-            getattr(bodies, name)[:, i] = 0.0
-        bodies.turn[:, i] = 0.0, 0.0, 0.0, 1.0
-        bodies.changed[i] = bodies.load[i] = 0.0
-        bodies.reserve[i] = math.inf
-        bodies.strength[:, i] = math.inf
-
-    def _set_friction(self, first: int, index: np.ndarray) -> None:
-        """Modes of friction in the gas of the body of the grains `index`."""
-        bodies, gas = self._state.bodies, self.parameters.gas.gas
-        numbers = gas.density, gas.mean_speed, gas.accommodation
-        radius, offset = self._state.grains.arrays.radius[index], bodies.offset[:, index]
-        bodies.decay[:, first], modes = friction_modes(
-            radius, offset, bodies.mass[first], bodies.inertia[:, first], numbers
-        )
-        bodies.mode[:, first] = modes.T.ravel()
-
     def _sort_members(self) -> None:
-        """Lists of the grains of each body."""
-        bodies, n = self._state.bodies, len(self._state.grains)
-        bodies.member[:] = np.argsort(bodies.first, kind="stable")
-        starts = np.flatnonzero(np.diff(bodies.first[bodies.member].astype(np.int64), prepend=-1))
-        self._state.count[BODIES] = len(starts)
-        bodies.start[: len(starts)], bodies.start[len(starts) :] = starts, n
+        """Lists of the grains of each body, and of awake grains."""
+        sort_members(self._state)
         self._list_awake()
 
     def _list_awake(self) -> None:
@@ -212,10 +173,6 @@ class RigidEngine(Engine):
         contacts, used = self._state.contacts, int(self._state.count[CONTACTS])
         self._awake = np.flatnonzero(self._state.bodies.asleep == 0)
         self._columns = np.flatnonzero(self._state.bodies.asleep[contacts.pair[0, :used]] == 0)
-
-    def _members(self, first: int) -> np.ndarray:
-        """Grains of a body."""
-        return np.flatnonzero(self._state.bodies.first == first)
 
     def _sum_outer_loads(self) -> None:
         """Sum the loads of all bodies on each other."""
@@ -263,8 +220,7 @@ class RigidEngine(Engine):
         for first in np.flatnonzero((bodies.near >= LOADED) & (bodies.asleep == 1)).tolist():
             if bodies.near[first] == LOADED and may_stay_at_rest(state, self.law, self._current_table(state), first):
                 continue
-            own = self._members(first)
-            bodies.asleep[own] = 0
+            bodies.asleep[members(state, first)] = 0
             bodies.event[first] = bodies.vibration[first] = state.time
             state.count[WOKEN] += 1
             woken = True
@@ -469,14 +425,14 @@ class RigidEngine(Engine):
             changed = self._rename(firsts)
             for k, own in clusters:
                 if changed[k]:
-                    self._describe(k, own, present)
+                    describe_body(state, self._awake[own], present.clusters.offset[:, own])
         mark_near_bodies.run(self._current_table(state))
         rested = False
         for k, own in clusters:
             first = int(self._awake[k])
             if len(own) == 1:
                 if bodies.near[first] == 0:
-                    self._rest_single(first)
+                    rest_grain(state, first)
                     rested = True
                 continue
             if self._slips and measures.strain[k] > MOVING_STRAIN:
@@ -486,8 +442,7 @@ class RigidEngine(Engine):
             wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
             quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
             if quiet and bodies.near[first] == 0 and self._fits(own, present):
-                self._describe(k, own, present)
-                self._rest(first, self._awake[own])
+                self._rest(self._awake[own], present.clusters.offset[:, own])
                 rested = True
         if rested:
             self._sort_members()
@@ -537,56 +492,17 @@ class RigidEngine(Engine):
         self._sort_members()
         return changed
 
-    def _regroup(self) -> None:
-        """Clusters from the contacts of all grains."""
-        state = self._state
-        pair = state.contacts.pair[:, : state.count[CONTACTS]].T
-        labels = cluster_labels(len(state.grains), pair)
-        first = np.full(labels.max() + 1, len(labels))
-        np.minimum.at(first, labels, np.arange(len(labels)))
-        state.bodies.first[:] = first[labels]
-        self._sort_members()
-
-    def _describe(self, k: int, own: np.ndarray, present: State) -> None:
-        """Mass, centre, principal axes and offsets of an awake cluster, as of a body."""
-        bodies, first, index = self._state.bodies, int(self._awake[k]), self._awake[own]
-        grains, s = present.grains.arrays, present.clusters.offset[:, own]
-        m, inertia = grains.mass[own], grains.inertia[own]
-        tensor = ((m * s**2).sum() + inertia.sum()) * np.eye(3) - (m * s) @ s.T
-        principal, axes = np.linalg.eigh(tensor)
-        if np.linalg.det(axes) < 0.0:
-            axes[:, 0] *= -1.0
-        bodies.mass[first], bodies.inertia[:, first] = m.sum(), principal
-        bodies.centre[:, first] = self._state.box.wrap((grains.position[:, own[0]] - s[:, 0])[None])[0]
-        bodies.orientation[:, first] = _quaternion(axes)
-        bodies.offset[:, index] = axes.T @ s
-
-    def _rest(self, first: int, index: np.ndarray) -> None:
-        """Project the velocities of a cluster on the rigid motion with its P and L; from now on it is a body."""
-        state, bodies, grains = self._state, self._state.bodies, self._state.grains.arrays
-        q = bodies.orientation[:, first]
-        m, inertia = grains.mass[index], grains.inertia[index]
-        v, w = grains.velocity[:, index], grains.spin[:, index]
-        s = _turned(q, bodies.offset[:, index])
-        momentum = (m * v).sum(axis=1)
-        u = v - (momentum / m.sum())[:, None]
-        angular = (m * np.cross(s, u, axis=0) + inertia * w).sum(axis=1)
-        bodies.momentum[:, first] = momentum
-        bodies.angular_momentum[:, first] = _turned_back(q, angular[:, None]).ravel()
-        inverse = np.array([-1.0, -1.0, -1.0, 1.0]) * q
-        for i in index:
-            bodies.turn[:, i] = product(tuple(inverse), tuple(grains.orientation[:, i]))
-        spin = _turned(q, (bodies.angular_momentum[:, first] / bodies.inertia[:, first])[:, None])
-        new_v = (momentum / m.sum())[:, None] + np.cross(spin, s, axis=0)
-        state.lost[QUIETING] += 0.5 * float((m * (v - new_v) * (v + new_v)).sum())
-        state.lost[QUIETING] += 0.5 * float((inertia * (w - spin) * (w + spin)).sum())
-        grains.velocity[:, index], grains.spin[:, index] = new_v, spin
-        bodies.asleep[index] = 1
-        rest_with_loads(state, first, float(self._measures.strain[np.searchsorted(self._awake, first)]))
-        bodies.strength[:, first] = self._measures.strength[:, np.searchsorted(self._awake, first)]
+    def _rest(self, index: np.ndarray, offset: np.ndarray) -> None:
+        """Make a body of the grains of a cluster, at vectors `offset` from its centre of mass."""
+        state, measures, first = self._state, self._measures, int(index[0])
+        describe_body(state, index, offset)
+        state.lost[QUIETING] += rest_cluster(state, index)
+        at = np.searchsorted(self._awake, first)
+        rest_with_loads(state, first, float(measures.strain[at]))
+        state.bodies.strength[:, first] = measures.strength[:, at]
         store_rest.run(self._current_table(state), (), body_number(state, first))
         if self.parameters.gas.gas.on:
-            self._set_friction(first, index)
+            set_friction(state, self.parameters.gas.gas, index)
         state.count[RESTED] += 1
 
 
@@ -620,20 +536,3 @@ def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Gra
             if slowest > 0.0:
                 found = min(found, 2.0 * math.pi / math.sqrt(slowest))
     return PERIODS * found
-
-
-def _turned(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Vectors (3, n) from the body to the laboratory frame."""
-    return matrix_of(q) @ vectors
-
-
-def _turned_back(q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Vectors (3, n) from the laboratory frame to the body."""
-    return matrix_of(q).T @ vectors
-
-
-def _quaternion(matrix: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation matrix."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(matrix).as_quat()

@@ -9,7 +9,8 @@ from ..contact.law import ContactLaw
 from ..contact.statics import ROWS, responses, responses_stage, shares_of_limits
 from ..integrate.awake_clusters import store_known_loads
 from ..numerics.quaternion import matrix_of
-from ..state.state import BODIES, CONTACTS, State
+from ..state.state import CONTACTS, State
+from .bodies import body_number, members
 
 LARGEST_SWING, LEAST_CHANGE = 0.9, 0.02
 """A cluster that wakes swings about the displacements that balance its loads, at first by as much as they have changed.
@@ -31,12 +32,6 @@ def reserve_of(shares: np.ndarray, changes: np.ndarray) -> float:
     return float(np.maximum(0.5 * (LARGEST_SWING - shares - changes), LEAST_CHANGE - changes).min())
 
 
-def body_number(state: State, first: int) -> int:
-    """Number of the body with this first grain."""
-    bodies = state.bodies
-    return int(np.searchsorted(bodies.member[bodies.start[: state.count[BODIES]]], first))
-
-
 def rest_with_loads(state: State, first: int, strain: float) -> None:
     """What is known of a body that comes to rest now, with the largest displacement of its contacts."""
     bodies = state.bodies
@@ -51,7 +46,7 @@ def may_stay_at_rest(state: State, law: ContactLaw, table: Table, first: int) ->
     `contact.statics`.
     """
     bodies = state.bodies
-    own = np.flatnonzero(bodies.first == first)
+    own = members(state, first)
     pair = state.contacts.pair[:, : state.count[CONTACTS]]
     columns = np.flatnonzero(bodies.first[pair[0]] == first)
     rows = np.zeros((ROWS, state.contacts.pair.shape[1]))
