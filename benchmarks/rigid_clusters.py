@@ -66,7 +66,7 @@ def growth(given: tuple[str, int]) -> dict[str, Any]:
     names = {"made": MADE, "broken": BROKEN, "slipped": SLIPPED, "late": LATE, "woken": WOKEN, "rested": RESTED}
     found |= {name: int(count[k]) for name, k in (names | {"contact_steps": CONTACT_STEPS}).items()}
     found |= {"steps": sim.steps, "awake": clock[SOME_AWAKE] / sim.time, "drift": sim.ledger.drift}
-    found |= {"grains_awake": clock[GRAINS_AWAKE] / sim.time / len(sim.grains)}
+    found |= {"grains_awake": clock[GRAINS_AWAKE] / sim.time}
     found |= {"quieting": row["lost_quieting"], "settling": row["lost_settling"], "dissipated": sim.ledger.dissipated}
     pairs = sim.contacts["pair"]
     labels, position = cluster_labels(100, pairs), unwrapped(sim.grains.position, pairs, sim.box)
@@ -158,7 +158,7 @@ def report(name: str) -> None:
             f"{1e6 * sim.time:8.2f} µs, {time.process_time() - begun:6.1f} s of CPU: mean size {size:.2f}, "
             f"{sim.steps} steps of bodies, {count[CONTACT_STEPS]} of contacts, {count[MADE]} contacts formed, "
             f"{count[BROKEN]} broken, {count[WOKEN]} woken, {count[LATE]} seen late, "
-            f"{clock[GRAINS_AWAKE] / sim.time / number:.2%} of the grains awake, energy error {sim.ledger.drift:.1e}",
+            f"{clock[GRAINS_AWAKE] / sim.time:.2%} of the grains awake, energy error {sim.ledger.drift:.1e}",
             flush=True,
         )
 

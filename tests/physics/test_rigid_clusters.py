@@ -539,6 +539,90 @@ def test_a_touch_in_the_first_step_of_an_awake_cluster_is_seen():
     assert sim.contacts["formed"][1] == pytest.approx(1e-10, rel=0.1, abs=0.0)
 
 
+@pytest.mark.compiled("dipoles")
+def test_a_condition_is_checked_in_every_step_of_bodies():
+    """The run ends at the step in which the first contact forms: the one before has none."""
+    sim = gas()
+    result = sim.run(until="120 ns", stop="contacts >= 1")
+    assert result.condition == "contacts >= 1" and sim.regular_state.count[MADE] == 1
+    before = gas()
+    before.run(steps=sim.steps - 1)
+    assert before.regular_state.count[MADE] == 0
+
+
+@pytest.mark.compiled("contacts")
+def test_a_run_that_is_awake_most_of_the_time_says_so(monkeypatch):
+    """A chain that spans half of the box is awake all the time: after many contact steps there is a warning."""
+    monkeypatch.setattr("sand.simulation.run_writer.LONG_RUN", 1000)
+    grains = sand.Grains(PITCH * np.array([[k - 2.5, 0.0, 0.0] for k in range(6)]), 1e-8, "iron")
+    sim = sand.Simulation(grains, [contact()], box="180 nm", stepping=sand.RigidClusters(), frame_every=1.0)
+    with pytest.warns(UserWarning, match="awake most of the time: clusters = 'grains'"):
+        sim.run(until="2 ns")
+
+
+@pytest.mark.compiled("dipoles")
+def test_changes_form_no_contact_twice():
+    """A run with many small changes: every pair has one contact, as grain by grain."""
+    sim = gas()
+    for k in range(1, 31):
+        sim.run(until=k * 5e-9)
+        with sim.change() as change:
+            change.velocity[0] *= 1.0000001
+    pairs = np.sort(sim.contacts["pair"], axis=1)
+    assert len(pairs) > 5 and len(np.unique(pairs, axis=0)) == len(pairs)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.parametrize("speed", [30.0, 100.0])
+def test_a_fast_awake_cluster_does_not_pass_through_a_grain(speed):
+    """A pair, awake at the start, flies at a resting grain at many times the thermal speed: a contact forms in time."""
+    for gap in (2e-8, 5e-8, 9e-8):
+        position = [[0.0, 0.0, 0.0], [PITCH, 0.0, 0.0], [PITCH + 2e-8 + gap, 0.0, 0.0]]
+        velocity = [[speed, 0.0, 0.0], [speed, 0.0, 0.0], [0.0, 0.0, 0.0]]
+        grains = sand.Grains(position, 1e-8, "iron", velocity=velocity)
+        sim = sand.Simulation(grains, [contact()], stepping=sand.RigidClusters(), frame_every=1.0)
+        sim.run(until=1.5 * gap / speed + 1e-10)
+        assert sim.regular_state.count[MADE] + sim.state.count[MADE] >= 1 and sim.state.count[LATE] == 0
+        assert sim.ledger.drift < 3e-3  # grain by grain: 7e-4
+
+
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("dipoles", [sand.Dipoles(), sand.Dipoles(periodic="ewald")], ids=["cut-off", "ewald"])
+def test_restart_in_a_wide_box_changes_no_bit(tmp_path, dipoles):
+    """A box wider than twice the cut-off, which follows the clusters: resumed while clusters are awake."""
+    runs = [
+        gas(number=40, box="2 um", forces=[contact(), dipoles], seed=3, out=tmp_path / k) for k in ("whole", "parts")
+    ]
+    for sim in runs:  # closer together than in a gas of this box
+        with sim.change() as change:
+            change.velocity[:] -= 3e6 * sim.grains.position
+    runs[0].run(until="300 ns")
+    parts = runs[1]
+    for k in range(1, 6):
+        parts.run(until=k * 5e-8 + 1e-9)
+        parts = sand.resume(tmp_path / "parts")
+    parts.run(until="300 ns")
+    assert different(runs[0], parts) == [] and parts.regular_state.count[MADE] > 2
+
+
+@pytest.mark.compiled("contacts")
+def test_a_stop_within_contact_steps_leaves_the_state_before_the_step():
+    """A head-on impact so fast that the contact is compressed beyond reason, and a grain that flies elsewhere.
+
+    The run stops with the grains named; all grains are where they were at the time of the state.
+    """
+    position = [[0.0, 0.0, 0.0], [2.2e-8, 0.0, 0.0], [0.0, 3e-7, 0.0]]
+    velocity = [[2e4, 0.0, 0.0], [-2e4, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    grains = sand.Grains(position, 1e-8, "iron", velocity=velocity)
+    sim = sand.Simulation(grains, [contact()], stepping=sand.RigidClusters(longest_step="0.1 ns"), frame_every=1.0)
+    result = sim.run(until="1 ns")
+    assert result.outcome.is_physics and set(result.grains) <= {0, 1} and result.grains
+    state = sim.regular_state
+    flown = state.grains.position - np.array(position)
+    assert np.abs(flown[2] - [0.0, state.time * 1.0, 0.0]).max() < 1e-18
+    assert np.abs(flown[0] - [2e4 * state.time, 0.0, 0.0]).max() < 1e-10  # its contact pulls
+
+
 @pytest.mark.compiled("contacts")
 def test_a_cluster_that_spans_half_of_the_box_stays_awake_and_says_so():
     """A straight chain of six, 97 nm from centre to centre, in a box of 180 nm and of 250 nm: awake, with a warning."""
@@ -682,17 +766,21 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     """One line for each, with what to do."""
     refused("without damping no cluster comes to rest; use damping = 'critical'", [sand.Contact()])
     refused("rigid clusters need sand.Contact", [sand.Dipoles()])
-    refused("with a bath_temperature no cluster", [contact(bath_temperature="100 K")])
+    refused("with bath_temperature in .forces.contact. no cluster", [contact(bath_temperature="100 K")])
+    refused("with twist_factor = 0 in .forces.contact. a contact has no limit", [contact(twist_factor=0.0)])
     refused("cannot have driven grains", [contact()], driven=sand.Driven([0]))
-    refused("cannot follow ramps yet", [contact(), sand.Field(sand.Ramp([0.0, 1e-9], [0.0, 1e-3]))])
+    refused(
+        "cannot follow the ramp field.flux_density; use a number, or use clusters = 'grains'",
+        [contact(), sand.Field(sand.Ramp([0.0, 1e-9], [0.0, 1e-3]))],
+    )
 
 
 @pytest.mark.parametrize(
     ("given", "match"),
     [
-        ({"vibration": 0.2}, "stepping: vibration = 0.2 must be at most 0.1"),
+        ({"vibration": 0.2}, "stepping: vibration = 0.2 must be above 0 and at most 0.1"),
         ({"vibration": 0.0}, "stepping: vibration"),
-        ({"step_fraction": 1.0}, "stepping: step_fraction = 1 must be at most 0.2"),
+        ({"step_fraction": 1.0}, "stepping: step_fraction = 1 must be above 0 and at most 0.2"),
         ({"longest_step": "1 m"}, "stepping: longest_step"),
         ({"contact_stepping": sand.Verlet(far="taylor")}, "far = 'taylor' is not possible with rigid clusters"),
     ],

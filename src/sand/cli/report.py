@@ -311,8 +311,13 @@ def results(summary: dict[str, Any]) -> Rows:
 
     rate = summary["ns_per_grain_step"]
     wall = format_wall_time(summary["wall_seconds"])
+    rigid = summary.get("rigid_clusters")
+    if rigid:  # steps of bodies have no cost of their own
+        rate = None
+    awake: Rows = [("awake", awake_share(rigid))] if rigid else []
     return [
         ("time", f"{format_quantity(summary['time'], 's')} in {summary['steps']} steps"),
+        *awake,
         ("clusters", clusters(summary)),
         (
             "contacts",
@@ -322,6 +327,14 @@ def results(summary: dict[str, Any]) -> Rows:
         ("energy drift", f"{summary['drift']:.2g} of the dissipated and kinetic energy"),
         ("wall time", wall if rate is None else f"{wall}, {rate:.3g} ns per grain and step"),
     ]
+
+
+def awake_share(rigid: dict[str, Any]) -> str:
+    """How long clusters were awake, and steps of contacts, from `rigid_clusters` of a summary."""
+    return (
+        f"some cluster {rigid['time_awake']:.2%} of the time, a grain {rigid['grains_awake']:.2%} of it on average; "
+        f"{rigid['contact_steps']} contact steps"
+    )
 
 
 def clusters(row: dict[str, Any]) -> str:

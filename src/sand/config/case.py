@@ -55,7 +55,8 @@ class RunSection(Section):
     """End of the run as a number of steps, completed to the end of the cycle."""
     stop: str | None = None
     """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
-    ledger compared (< <= > >= == !=) with numbers with units; checked every 100 steps, see `Simulation.run`."""
+    ledger compared (< <= > >= == !=) with numbers with units; checked every 100 steps, with rigid clusters in every
+    step, see `Simulation.run`."""
     frame_every: Cadence | None = None
     """Frames: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default 1/200
     of `until`."""

@@ -68,7 +68,8 @@ def template(name: str) -> str:
         *((f"[forces.{force}]", _summary(kind), keys_of(kind)) for force, kind in FORCES.items()),
     ]
     for method, kind in INTEGRATORS.items():
-        chosen = Key("method", f"Integrator; allowed: {', '.join(INTEGRATORS)}.", method)
+        meaning = f'Integrator; allowed: {", ".join(INTEGRATORS)}. clusters = "rigid" stands for "rigid-clusters".'
+        chosen = Key("method", meaning, method)
         tables.append(("[stepping]", _summary(kind), [chosen, *keys_of(kind)]))
     tables.append(("[neighbours]", _summary(Neighbours), keys_of(Neighbours)))
     tables.append(("[[driven]]", _summary(Driven), keys_of(Driven)))
@@ -128,11 +129,14 @@ def keys_of(kind: Any) -> list[Key]:
             for name, field in kind.model_fields.items()
         ]
     meanings = parameter_docs(kind)
-    return [
-        Key(one.name, meanings.get(one.name, ""), REQUIRED if one.default is dataclasses.MISSING else one.default)
-        for one in dataclasses.fields(kind)
-        if one.init
-    ]
+    return [Key(one.name, meanings.get(one.name, ""), _default_of(one)) for one in dataclasses.fields(kind) if one.init]
+
+
+def _default_of(one: Any) -> Any:
+    """Default of a field of a dataclass; None of one that is a table of its own."""
+    if one.default is not dataclasses.MISSING:
+        return one.default
+    return REQUIRED if one.default_factory is dataclasses.MISSING else None
 
 
 def _bounds(metadata: list[Any]) -> str:

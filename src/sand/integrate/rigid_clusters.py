@@ -85,7 +85,7 @@ class RigidClusters:
                 unit = "s" if key == "longest_step" else "1"
                 object.__setattr__(self, key, si(value, unit, f"stepping: {key}", above=0.0))
                 if getattr(self, key) > most:
-                    problems.append(f"stepping: {key} = {getattr(self, key):g} must be at most {most:g}")
+                    problems.append(f"stepping: {key} = {getattr(self, key):g} must be above 0 and at most {most:g}")
             except BadInput as error:
                 problems.extend(error.problems)
         if not isinstance(self.contact_stepping, Verlet):

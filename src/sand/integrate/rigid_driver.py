@@ -52,7 +52,7 @@ LARGEST_FLIGHT = 0.1
 """Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
 TOUCH_SPEED = 1.2
 """Closing speeds are taken this much larger to predict a touch."""
-AWAKE, NEAR, LOADED, TOUCHING = range(4)
+CLEAR, NEAR, LOADED, TOUCHING = range(4)
 """Values of `BodyArrays.near`: nothing near; a touch within about two steps; loads of contacts that may have changed by
 more than the reserve; a touch within the next step."""
 
@@ -83,7 +83,7 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
     Bodies that alone require steps below `shortest_step` are marked, and not considered.
     """
     square = fastest = turning = 0.0
-    bodies.near[:] = AWAKE
+    bodies.near[:] = CLEAR
     quick = (limits.step_fraction / limits.shortest_step) ** 2 if limits.shortest_step > 0.0 else math.inf
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
@@ -100,8 +100,7 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
             speed = dot(v, v)
             if not speed < math.inf:
                 return math.nan
-            if bodies.asleep[first] == 1:
-                fastest = max(fastest, speed)
+            fastest = max(fastest, speed)
     for p in range(count[PAIRS]):
         i, j = pair_list.pair[0, p], pair_list.pair[1, p]
         if bodies.first[i] != bodies.first[j] and bodies.asleep[i] + bodies.asleep[j] > 0:
@@ -299,7 +298,7 @@ def second_half(
     if gas.gas.on:
         clock[KICKED] = clock[TIME]
     clock[SOME_AWAKE] += clock[STEP] if awake > 0 else 0.0
-    clock[GRAINS_AWAKE] += awake * clock[STEP]
+    clock[GRAINS_AWAKE] += awake * clock[STEP] / grains.mass.size
     count[STEPS] += 1 if clock[STEP] > 0.0 else 0
     count[STAGE] = 0
     return Stop.AWAKE_LOADS.value if awake > 0 else Stop.NONE.value
@@ -353,7 +352,7 @@ def advance_bodies(
 def mark_near_bodies(grains, bodies, pair_list, clock, count, span, gas, criteria, flight_limits):
     """Mark bodies near others, for a step as long as the last one, and single grains that need short steps."""
     sum_body_loads(grains, bodies, count)
-    bodies.near[:] = AWAKE
+    bodies.near[:] = CLEAR
     find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, clock[STEP])
     longest = 0.5 * flight_limits.step_fraction
     for b in range(count[BODIES]):

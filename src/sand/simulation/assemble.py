@@ -195,12 +195,18 @@ def build_engine(
     return engine
 
 
+def _between_all(force: Force) -> Force:
+    """The force between nearest images of all pairs of grains, without a cut-off, which would depend on time."""
+    near: Any = force.of_nearest_images() if isinstance(force, EwaldForce) else force
+    defaults = {each.name: each.default for each in dataclasses.fields(near)}
+    settings = {"cutoff": None} | ({"cut": defaults["cut"]} if "cut" in defaults else {})
+    return cast("Force", dataclasses.replace(near, **settings)) if "cutoff" in defaults else cast("Force", near)
+
+
 def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verlet, seed: int) -> Engine:
     """The engine of the grains of awake clusters; what images other than the nearest one add is left to the bodies."""
-    near = [force.of_nearest_images() if isinstance(force, EwaldForce) else force for force in forces]
-    return build_engine(
-        grains, cast("list[Force]", near), box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False
-    )
+    near = [_between_all(force) for force in forces]
+    return build_engine(grains, near, box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False)
 
 
 def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
@@ -229,25 +235,34 @@ def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grai
     )
 
 
+GRAINS = "use clusters = 'grains' (sand.Verlet)"
+
+
 def check_rigid_clusters(forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall]) -> None:
     """Refuse what rigid clusters cannot do; all problems at once."""
     contact = next((f for f in forces if isinstance(f, Contact)), None)
     problems = []
     if contact is None:
-        problems.append("rigid clusters need sand.Contact; without contacts use sand.Verlet")
+        problems.append("rigid clusters need sand.Contact; without contacts use clusters = 'grains' (sand.Verlet)")
     elif contact.damping == "none":
         problems.append(
             "without damping no cluster comes to rest; use damping = 'critical' and a settling_time, such as 5 ns, in "
             "[forces.contact] (sand.Contact)"
         )
+    for name in ("slide_factor", "roll_factor", "twist_factor") if contact is not None else ():
+        if getattr(contact, name) == 0.0:
+            problems.append(f"with {name} = 0 in [forces.contact] a contact has no limit to rest at; {GRAINS}")
     if contact is not None and contact.bath_temperature is not None:
-        problems.append("with a bath_temperature no cluster comes to rest; leave it out, or use sand.Verlet")
-    if any(map(ramps_of, forces)):
-        problems.append("rigid clusters cannot follow ramps yet; use numbers, or sand.Verlet")
+        problems.append(
+            f"with bath_temperature in [forces.contact] no cluster comes to rest; leave it out, or {GRAINS}"
+        )
+    for force in forces:
+        for name in ramps_of(force):
+            problems.append(f"rigid clusters cannot follow the ramp {force.name}.{name}; use a number, or {GRAINS}")
     if driven:
-        problems.append("rigid clusters cannot have driven grains; use sand.Verlet")
+        problems.append(f"rigid clusters cannot have driven grains; {GRAINS}")
     if walls:
-        problems.append("rigid clusters cannot have walls; use sand.Verlet")
+        problems.append(f"rigid clusters cannot have walls; {GRAINS}")
     if problems:
         raise BadInput([f"stepping: {line}" for line in problems])
 

@@ -14,8 +14,8 @@ from ..errors import BadInput, did_you_mean, shown
 from ..units import si
 from .ledger import MOMENTA, NUMBERS
 
-EVERY = 100
-"""Regular steps between two checks of a condition."""
+EVERY, EVERY_LONG = 100, 1
+"""Regular steps between two checks of a condition, and those of rigid clusters, which are up to 1000 times as long."""
 GIVEN = "given"
 """Text of a condition that is a function of a script, in case.toml."""
 LONGEST, DEEPEST = 1000, 20

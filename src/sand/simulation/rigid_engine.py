@@ -24,12 +24,12 @@ from ..integrate.awake_clusters import (
 )
 from ..integrate.parts import DT, ContactParameters, Stop
 from ..integrate.rigid_clusters import SAMPLES, RigidLimits
-from ..integrate.rigid_driver import LOADED, advance_bodies, mark_near_bodies
+from ..integrate.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
 from ..integrate.stages import finish_gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
-from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
+from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, ContactArrays, cluster_arrays
 from ..state.state import (
     BODIES,
     BROKEN,
@@ -81,8 +81,8 @@ more than ten grains n²/10 of these, about half the period of the slowest bendi
 LIST_GAP, SHARE_OF_SPACING = 3.0, 0.15
 """Largest gap of pairs that the driver of bodies looks at, in smallest radii, and, in thin gases, in mean distances of
 neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
-MOVING_STRAIN = 0.9
-"""Displacement of a contact, in units of its limit, from which on it may be the one that slid, rolled or twisted."""
+SLIP_LOSSES = slice(1, 4)
+"""Rows of `ContactArrays.lost` that change when a contact slides, rolls or twists beyond a limit."""
 WAKE_QUICK_FROM = 2000
 """Fewest grains with which bodies that need short steps wake, instead of shortening the steps of all bodies: a sum over
 all pairs then costs more than the contact steps of a few grains."""
@@ -90,10 +90,9 @@ SPANS = (
     "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
     "rigid body, and takes contact steps all the time; use a larger box"
 )
-CONTACT_COLUMNS = (
-    *("pointer1", "pointer2", "twist", "formed", "lost", "damping", "force", "torque1", "torque2", "flag"),
-)
-"""Arrays of contacts, besides pairs and constants, that the inner engine needs and changes."""
+NOT_COPIED = ("pair", "constants", "every_step", "side", "start", "gather_order")
+CONTACT_COLUMNS = tuple(name for name in ContactArrays._fields if name not in NOT_COPIED)
+"""Arrays of contacts that the inner engine needs and changes; pairs are numbered anew, the others follow."""
 MOVING = ("position", "velocity", "orientation", "spin", "moment")
 
 
@@ -117,7 +116,7 @@ class RigidEngine(Engine):
     _inner_grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # of the inner state
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
     _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
-    _slips: int = field(init=False, default=0)  # in the contact steps of the present step of bodies
+    _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
 
@@ -201,13 +200,17 @@ class RigidEngine(Engine):
         if state.count[BODIES] == 0 or (state.count[STAGE] == 1 and state.clock[STEP] == 0.0):
             return super()._call_driver(until, last, shorten)
         self._list_awake()  # of a copy of the state, or a loaded one
+        before: dict[str, np.ndarray] = {}
         while True:
+            if self._awake.size and state.count[STAGE] == 0:
+                before = {name: array.copy() for name, array in state.to_arrays().items()}
             stop = self._bodies_driver(until, last, shorten)
             if stop is Stop.TOUCH_AHEAD:
                 self._wake()
             elif stop is Stop.AWAKE_STEPS:
                 failed = self._take_contact_steps()
                 if failed is not Stop.NONE:
+                    self._return_to(before)
                     return failed
             elif stop is Stop.AWAKE_LOADS:
                 self._finish_step()
@@ -308,15 +311,20 @@ class RigidEngine(Engine):
         else:
             stop = inner._drive(end, math.inf, shorten=True)
         if stop is not Stop.TIME_REACHED:
-            for grain in (GRAIN1, GRAIN2):
-                own = int(present.count[grain])
-                state.count[grain] = self._awake[own] if own >= 0 else -1
-            self._copy_back(present)
-            state.clock[TIME], state.count[STAGE] = present.time, 0
             return stop
         self._finish_gas(present)
         self._copy_back(present)
         return Stop.NONE
+
+    def _return_to(self, before: dict[str, np.ndarray]) -> None:
+        """Return to the state at the start of a step, in whose contact steps something failed, and name the grains."""
+        assert self.inner is not None
+        state, awake, count = self._state, self._awake, self.inner._state.count
+        limiting = [int(count[grain]) for grain in (GRAIN1, GRAIN2)]
+        state.from_arrays(before)
+        self._sort_members()
+        for grain, own in zip((GRAIN1, GRAIN2), limiting, strict=True):
+            state.count[grain] = awake[own] if 0 <= own < len(awake) else -1
 
     def _measure_vibrations(self, present: State) -> None:
         """Measure awake clusters; notes the grains of those that vibrate too much to come to rest."""
@@ -371,6 +379,7 @@ class RigidEngine(Engine):
             getattr(state.grains.arrays, name)[..., index] = getattr(present.grains.arrays, name)
         made, broken = int(present.count[MADE]), int(present.count[BROKEN])
         used = int(present.count[CONTACTS])
+        self._note_slips(present, used)
         if made == 0 and broken == 0:
             for name in CONTACT_COLUMNS:
                 if getattr(state.contacts, name).shape[-1]:
@@ -379,13 +388,25 @@ class RigidEngine(Engine):
             self._replace_contacts(present, used)
         for number in (MADE, BROKEN, SLIPPED):
             state.count[number] += present.count[number]
-        self._slips = int(present.count[SLIPPED])
         state.count[CONTACT_STEPS] += present.count[STEPS]
         state.lost += present.lost
         present.lost[:] = 0.0
         state.clock[SETTLED] = present.clock[SETTLED]
         state.clock[CORRECTED] += present.clock[CORRECTED]
         present.count[MADE] = present.count[BROKEN] = present.count[SLIPPED] = 0
+
+    def _note_slips(self, present: State, used: int) -> None:
+        """Note the grains whose contacts have slipped in this step of bodies: losses of these contacts have grown."""
+        self._slipped = np.zeros(len(self._awake), bool)
+        if not present.count[SLIPPED]:
+            return
+        contacts, columns = self._state.contacts, self._columns
+        lost = [each.tobytes() for each in contacts.lost[SLIP_LOSSES, columns].T]
+        before = dict(zip(map(frozenset, contacts.pair[:, columns].T.tolist()), lost, strict=True))
+        pairs = present.contacts.pair[:, :used].T
+        for pair, now in zip(pairs, present.contacts.lost[SLIP_LOSSES, :used].T, strict=True):
+            if before.get(frozenset(self._awake[pair].tolist())) != now.tobytes():
+                self._slipped[pair] = True
 
     def _replace_contacts(self, present: State, used: int) -> None:
         """Contacts of all grains after some formed or broke: those at rest, then those of awake grains."""
@@ -407,6 +428,7 @@ class RigidEngine(Engine):
             array[..., :first] = array[..., kept]
             array[..., first:end] = pairs if name == "pair" else getattr(present.contacts, name)[..., :used]
         state.count[CONTACTS] = end
+        state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
         resort_contacts_by_grain(state.grains.arrays, contacts, state.count)
         self._columns = np.arange(first, end)
 
@@ -426,22 +448,26 @@ class RigidEngine(Engine):
             for k, own in clusters:
                 if changed[k]:
                     describe_body(state, self._awake[own], present.clusters.offset[:, own])
+        # vectors from the centres of mass now, as those of grains of bodies that are not turned
+        bodies.offset[:, self._awake] = present.clusters.offset
+        bodies.orientation[:, self._awake] = np.array([[0.0], [0.0], [0.0], [1.0]])
+        bodies.inner_field[:, self._awake] = 0.0
         mark_near_bodies.run(self._current_table(state))
         rested = False
         for k, own in clusters:
             first = int(self._awake[k])
             if len(own) == 1:
-                if bodies.near[first] == 0:
+                if bodies.near[first] == CLEAR:
                     rest_grain(state, first)
                     rested = True
                 continue
-            if self._slips and measures.strain[k] > MOVING_STRAIN:
+            if self._slipped[own].any():
                 bodies.event[first] = state.time
             if self._vibrated[own].any():
                 bodies.vibration[first] = state.time
             wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
             quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
-            if quiet and bodies.near[first] == 0 and self._fits(own, present):
+            if quiet and bodies.near[first] == CLEAR and self._fits(own, present):
                 self._rest(self._awake[own], present.clusters.offset[:, own])
                 rested = True
         if rested:

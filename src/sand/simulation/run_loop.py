@@ -7,8 +7,9 @@ import time as wall
 from typing import Any
 
 from ..integrate.parts import Stop
+from ..integrate.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
-from .condition import EVERY, Condition, OwnCondition
+from .condition import EVERY, EVERY_LONG, Condition, OwnCondition
 from .ledger import COUNTED, count_row
 from .observers import call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome
@@ -32,7 +33,8 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
     if condition is not None and simulation._met == (key_of(condition), simulation.steps):
         return Outcome.CONDITION_MET
     frames, rows, saves = _schedules(simulation)
-    checks = Schedule(None if condition is None else Cadence("steps", EVERY), simulation.time, simulation.steps)
+    every = EVERY_LONG if isinstance(simulation.stepping, RigidClusters) else EVERY
+    checks = Schedule(None if condition is None else Cadence("steps", every), simulation.time, simulation.steps)
     updates = UpdateSchedule(simulation)
     if condition is not None and simulation.steps == 0.0 == simulation.time and _is_met(simulation, condition):
         return Outcome.CONDITION_MET

@@ -47,6 +47,8 @@ from .updater import described
 
 Simulation = Any
 """`sand.Simulation`, which imports this module."""
+LONG_RUN = 100_000
+"""Contact steps from which on a run with rigid clusters tells that its clusters were awake most of the time."""
 CHECKPOINT_EVERY = 60.0
 """Longest wall time [s] between checkpoints."""
 AT_OUTPUT_EVERY = 1.0
@@ -297,6 +299,14 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
     }
 
 
+def is_mostly_awake(simulation: Simulation) -> bool:
+    """Whether the grains of a long run with rigid clusters were awake more than half of the time."""
+    state = simulation.regular_state
+    if state.count[CONTACT_STEPS] < LONG_RUN:
+        return False
+    return bool(state.clock[GRAINS_AWAKE] > 0.5 * state.time)
+
+
 def rigid_clusters(simulation: Simulation, ledger: Ledger) -> dict[str, Any]:
     """What rigid clusters did: time awake, steps of each level, energy removed at rest, largest load; or nothing."""
     state = simulation.regular_state
@@ -306,7 +316,7 @@ def rigid_clusters(simulation: Simulation, ledger: Ledger) -> dict[str, Any]:
     dissipated = ledger.dissipated
     found = {
         "time_awake": float(clock[SOME_AWAKE]) / time,
-        "grains_awake": float(clock[GRAINS_AWAKE]) / time / len(simulation.grains),
+        "grains_awake": float(clock[GRAINS_AWAKE]) / time,
         "steps_of_bodies": state.steps,
         "contact_steps": int(count[CONTACT_STEPS]),
         "woken": int(count[WOKEN]),

@@ -38,7 +38,7 @@ from .ledger import Ledger, kinetic_energies, log_row
 from .observers import Observer
 from .outcome import Outcome, Result
 from .run_loop import run_loop
-from .run_writer import RunWriter
+from .run_writer import RunWriter, is_mostly_awake
 from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
 from .stop import StopCriteria, stop_criteria
@@ -539,6 +539,8 @@ class Simulation(ReadOnlySettings):
         if outcome.is_physics:
             self._record_output()
         ledger = self.ledger.with_row(self._log_row())
+        if is_mostly_awake(self):
+            self._warn("clusters were awake most of the time: clusters = 'grains' (sand.Verlet) costs no more")
         met = (self._stopped_by or criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
         result = Result(outcome, self.steps, self.time, ledger.drift, grains, met)
         if self.writer:

@@ -50,7 +50,7 @@ CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s
 SETTLED = 11  # time at which settling was last applied to clusters [s]
 WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
 SOME_AWAKE = 13  # time with any cluster awake [s], of rigid clusters
-GRAINS_AWAKE = 14  # time awake of all grains, summed [s]
+GRAINS_AWAKE = 14  # mean time awake of a grain [s]
 LARGEST_LOAD = 15  # largest change of the loads of the contacts of a cluster at rest, in units of their limits
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
