@@ -768,6 +768,11 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     refused("rigid clusters need sand.Contact", [sand.Dipoles()])
     refused("with bath_temperature in .forces.contact. no cluster", [contact(bath_temperature="100 K")])
     refused("with twist_factor = 0 in .forces.contact. a contact has no limit", [contact(twist_factor=0.0)])
+    refused("need order = 'as given' or 'auto'", [contact()], neighbours=sand.Neighbours(order="curve"))
+    with pytest.warns(
+        UserWarning, match="without settling_time in .forces.contact. .sand.Contact. long chains vibrate"
+    ):
+        gas(forces=[sand.Contact(damping="critical")], number=4)
     refused("cannot have driven grains", [contact()], driven=sand.Driven([0]))
     refused(
         "cannot follow the ramp field.flux_density; use a number, or use clusters = 'grains'",

@@ -131,7 +131,7 @@ def _approach(grains, bodies, i, h):
     w = load(grains.spin, i)
     smallest = min(inertia[0], min(inertia[1], inertia[2]))
     linear = norm(load(bodies.force, first)) / mass + s * norm(load(bodies.torque, first)) / smallest
-    return (linear + 0.5 * dot(w, w) * s) * h * h
+    return (linear + dot(w, w) * s) * h * h
 
 
 @loop

@@ -110,7 +110,7 @@ def build_engine(
     """
     warnings = check_system(grains, forces, box, fresh=fresh)
     if isinstance(stepping, RigidClusters):
-        check_rigid_clusters(forces, driven, walls)
+        warnings += check_rigid_clusters(forces, driven, walls, neighbours)
     check_driven(driven, grains, forces, stepping, neighbours)
     by_type = _forces_by_type(forces, grains)
     check_walls(walls, grains, by_type.contact, box, stepping, fresh=fresh)
@@ -238,8 +238,10 @@ def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grai
 GRAINS = "use clusters = 'grains' (sand.Verlet)"
 
 
-def check_rigid_clusters(forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall]) -> None:
-    """Refuse what rigid clusters cannot do; all problems at once."""
+def check_rigid_clusters(
+    forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall], neighbours: Neighbours
+) -> list[str]:
+    """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
     contact = next((f for f in forces if isinstance(f, Contact)), None)
     problems = []
     if contact is None:
@@ -263,8 +265,16 @@ def check_rigid_clusters(forces: Sequence[Force], driven: Sequence[Driven], wall
         problems.append(f"rigid clusters cannot have driven grains; {GRAINS}")
     if walls:
         problems.append(f"rigid clusters cannot have walls; {GRAINS}")
+    if neighbours.order == "curve":
+        problems.append(f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}")
     if problems:
         raise BadInput([f"stepping: {line}" for line in problems])
+    if contact is not None and contact.settling_time is None:
+        return [
+            "without settling_time in [forces.contact] (sand.Contact) long chains vibrate, and stay awake, for "
+            "microseconds; 5 ns is usual for grains of 10 nm"
+        ]
+    return []
 
 
 def _changing_parameters(

@@ -24,7 +24,7 @@ from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import CONTACTS, OUTSIDE, State
+from ..state.state import CONTACTS, LATE, OUTSIDE, State
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
 from .cadence import SHORTEST_DURATION
@@ -541,6 +541,8 @@ class Simulation(ReadOnlySettings):
         ledger = self.ledger.with_row(self._log_row())
         if is_mostly_awake(self):
             self._warn("clusters were awake most of the time: clusters = 'grains' (sand.Verlet) costs no more")
+        if self.regular_state.count[LATE]:
+            self._warn("grains of two bodies overlapped before their touch was seen; halve step_fraction in [stepping]")
         met = (self._stopped_by or criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
         result = Result(outcome, self.steps, self.time, ledger.drift, grains, met)
         if self.writer:
