@@ -6,7 +6,7 @@ import numpy as np
 
 from ..compiler.table import Table
 from ..contact.law import ContactLaw
-from ..contact.statics import ROWS, responses, responses_stage, shares_of_limits
+from ..contact.static_loads import ROWS, responses, responses_stage, shares_of_limits
 from ..integrate.awake_clusters import store_known_loads
 from ..numerics.quaternion import matrix_of
 from ..state.state import CONTACTS, State
@@ -43,7 +43,7 @@ def may_stay_at_rest(state: State, law: ContactLaw, table: Table, first: int) ->
     """Compute the loads of the contacts of a body; if none is near a limit, they become the known ones.
 
     Contacts carry what they carried at rest, and the changes of the loads on the grains since then, less inertia, by
-    `contact.statics`.
+    `contact.static_loads`.
     """
     bodies = state.bodies
     own = members(state, first)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact.statics import ROWS, displacement_changes, responses, responses_stage, shares_of_limits
+from sand.contact.static_loads import ROWS, displacement_changes, responses, responses_stage, shares_of_limits
 from tests.physics.setups import rest_distance
 
 PITCH = rest_distance(sand.IRON, 1e-8, 1e-8)
