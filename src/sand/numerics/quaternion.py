@@ -94,3 +94,22 @@ def matrix_of(q: np.ndarray) -> np.ndarray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def quaternion_of(matrix: np.ndarray) -> np.ndarray:
+    """Unit quaternion ϱ of a rotation matrix, the inverse of `matrix_of`.  Not compiled.
+
+    Each row of the matrix 4 ϱ ϱᵀ, whose elements are sums of those of the rotation matrix, is proportional to ϱ; the
+    longest one is accurate (Shepperd 1978).
+    """
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    products = np.array(
+        [
+            [1 + a - e - i, b + d, c + g, h - f],
+            [b + d, 1 - a + e - i, f + h, c - g],
+            [c + g, f + h, 1 - a - e + i, d - b],
+            [h - f, c - g, d - b, 1 + a + e + i],
+        ]
+    )
+    longest = products[np.argmax(products.diagonal())]
+    return longest / np.linalg.norm(longest)

@@ -10,7 +10,7 @@ from ..analysis.clusters import cluster_labels
 from ..forces.gas.loops import GasParameters
 from ..integrate.body_friction import friction_modes
 from ..integrate.rigid_body import product
-from ..numerics.quaternion import matrix_of
+from ..numerics.quaternion import matrix_of, quaternion_of
 from ..state.arrays import LOADS_OF_BODIES
 from ..state.state import BODIES, CONTACTS, State
 
@@ -88,7 +88,7 @@ def describe_body(state: State, index: np.ndarray, offset: np.ndarray) -> None:
         axes[:, 0] *= -1.0
     bodies.mass[first], bodies.inertia[:, first] = m.sum(), principal
     bodies.centre[:, first] = state.box.wrap((grains.position[:, first] - offset[:, 0])[None])[0]
-    bodies.orientation[:, first] = _quaternion(axes)
+    bodies.orientation[:, first] = quaternion_of(axes)
     bodies.offset[:, index] = axes.T @ offset
 
 
@@ -132,9 +132,3 @@ def set_friction(state: State, gas: GasParameters, index: np.ndarray) -> None:
     )
     bodies.mode[:, first] = modes.T.ravel()
 
-
-def _quaternion(matrix: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation matrix."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(matrix).as_quat()

@@ -31,7 +31,14 @@ from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.program import Components, build_program
 from ..integrate.respa import clear_long_range_loads
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
-from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, take_blocks, uses_task_queue
+from ..integrate.task_queue import (
+    TaskQueue,
+    benefits_from_workers,
+    new_task_queue,
+    release_workers,
+    take_blocks,
+    uses_task_queue,
+)
 from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
@@ -118,6 +125,8 @@ class Engine:
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
+    _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
+    _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
     _output_state: State | None = field(init=False, default=None)  # made from the regular state when first needed
 
@@ -409,10 +418,21 @@ class Engine:
     def _call_table(self, until: float, last: float, shorten: bool) -> tuple[Table, Any]:
         """The table for one call of the driver, and its task queue."""
         state, table = self._state, self._current_table(self._state)
-        queue = new_task_queue(len(state.grains), state.contacts.flag.size)
+        queue = self._task_queue(len(state.grains), state.contacts.flag.size)
         for name, value in (("queue", queue), ("until", float(until)), ("last", int(last)), ("shorten", shorten)):
             table.set(name, value)
         return table, queue
+
+    def _task_queue(self, grains: int, contacts: int) -> TaskQueue:
+        """An empty task queue for one call of the driver: in small simulations, without other threads, that of the last one.
+
+        A thread that starts late could otherwise take blocks of the next call.
+        """
+        if self._queue is not None and self._queue_size == (grains, contacts) and not uses_task_queue(grains):
+            self._queue.words[:] = 0
+        else:
+            self._queue, self._queue_size = new_task_queue(grains, contacts), (grains, contacts)
+        return self._queue
 
     def uncompiled(self) -> list[str]:
         """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
