@@ -1,4 +1,4 @@
-"""Makes tests/reference/run-v9: a small run with a checkpoint, which releases with the same format must read.
+"""Makes tests/reference/run-v10: a small run with a checkpoint, which releases with the same format must read.
 
     python tests/reference/make_checkpoint.py
 

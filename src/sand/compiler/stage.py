@@ -177,6 +177,9 @@ class Stage:
         """Call the stage from Python; returns the integer that the function returns."""
         if not COMPILED:
             return int(self.in_python(table, parameters, block))
+        if isinstance(parameters, tuple) and not parameters:
+            address = table.stages.get(self) or table.stages.setdefault(self, self.address(table, parameters))
+            return int(call_from_python(address, table.address, table.address, block))
         row = np.array([*words_of(parameters), 0], np.int64)
         return int(call_from_python(self.address(table, parameters), table.address, address_of(row), block))
 

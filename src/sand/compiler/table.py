@@ -173,6 +173,13 @@ class Table:
     ----------
     names : tuple of str
         Names of all parts, in the order of the table; the same in all simulations, so that stages can be shared.
+
+    Attributes
+    ----------
+    address : int
+        Address of the table.
+    stages : dict[Stage, int]
+        Addresses of stages without parameters that were called, for the present structures of the parts.
     """
 
     def __init__(self, names: tuple[str, ...]):
@@ -180,6 +187,7 @@ class Table:
         self._parts, self._rows = dict[str, Any](), dict[str, np.ndarray]()
         self._structures, self._keys = dict[str, Any](), dict[str, int]()
         self._addresses = np.zeros(len(names), np.int64)
+        self.address, self.stages = address_of(self._addresses), dict[Any, int]()
 
     def set(self, name: str, value: Any) -> None:
         """Set a part; nothing is done if it is the same object, or the same number, as before."""
@@ -190,8 +198,13 @@ class Table:
             return
         self._parts[name] = value
         if COMPILED and value is not None:
-            self._rows[name], self._structures[name] = np.array(words_of(value), np.int64), structure_of(value)
-            self._keys[name] = _number_of(self.place(name))
+            self._rows[name] = np.array(words_of(value), np.int64)
+            if type(value) is not type(before) or type(value) not in NUMBERS:
+                self._structures[name] = structure_of(value)
+                key = _number_of(self.place(name))
+                if self._keys.get(name) != key:
+                    self._keys[name] = key
+                    self.stages.clear()
             self._addresses[self.index(name)] = address_of(self._rows[name])
 
     def snapshot(self) -> Table:
@@ -216,8 +229,3 @@ class Table:
     def key(self, name: str) -> int:
         """A number that is the same for equal places: long tuples are slow to compare."""
         return self._keys[name]
-
-    @property
-    def address(self) -> int:
-        """Address of the table."""
-        return address_of(self._addresses)

@@ -29,7 +29,7 @@ from ..numerics.quaternion import turned, turned_back
 from ..numerics.random import normal_vector
 from ..numerics.vec import accrue, add, axpy, dot, load, load4, norm, put, scale, sub
 from ..state.state import BODIES
-from .rigid_body import move_body, place_grains
+from .rigid_body import move_body, place_grains, takes_one_step
 
 STREAM1, STREAM2 = 32, 33
 """Random-number streams of `numerics.random`, distinct from those of all other uses."""
@@ -155,7 +155,7 @@ def kick_body(grains, bodies, b, seed, number, elapsed, gas):
 
 @loop
 def drift_bodies_in_gas(grains, bodies, count, span, number, gas, dt, is_wrapped):
-    """Half a drift, friction and noise of dt [s], and half a drift of all bodies asleep, as `rigid_body.drift_bodies`.
+    """Half a drift, friction and noise of dt [s], and half a drift, of the bodies that `rigid_body.drift_bodies` moves.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def drift_bodies_in_gas(grains, bodies, count, span, number, gas, dt, is_wrapped
     """
     transferred = 0.0
     for b in range(count[BODIES]):
-        if bodies.asleep[bodies.member[bodies.start[b]]] == 1:
+        if takes_one_step(bodies, bodies.member[bodies.start[b]]):
             move_body(bodies, b, span, 0.5 * dt)
             transferred += kick_body(grains, bodies, b, gas.seed, number, dt, gas.gas)
             move_body(bodies, b, span, 0.5 * dt)

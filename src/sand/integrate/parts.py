@@ -46,6 +46,7 @@ class Stop(IntEnum):
     TOUCH_AHEAD = 12  # bodies may touch within the next step: they have to wake
     AWAKE_STEPS = 13  # awake clusters have to take their contact steps
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep
+    SUBSTEPS = 15  # some bodies have to take substeps within the step of all bodies
 
 
 class ContactParameters(NamedTuple):

@@ -105,16 +105,18 @@ def free_sphere(q, angular, inertia, t):
 
 @loop
 def sum_body_loads(grains, bodies, count):
-    """Sum force [N] and torque [N m] about the centre of mass of each body; awake ones included."""
+    """Sum force [N] and torque [N m] about the centre of mass of each body, but what acts in substeps."""
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         q = load4(bodies.orientation, first)
         force = torque = (0.0, 0.0, 0.0)
         for k in range(bodies.start[b], bodies.start[b + 1]):
             i = bodies.member[k]
-            own = load(grains.force, i)
+            own, turning = load(grains.force, i), load(grains.torque, i)
+            if bodies.quick[first] == 1:
+                own, turning = sub(own, load(bodies.quick_force, i)), sub(turning, load(bodies.quick_torque, i))
             force = add(force, own)
-            torque = add(torque, add(load(grains.torque, i), cross(turned(q, load(bodies.offset, i)), own)))
+            torque = add(torque, add(turning, cross(turned(q, load(bodies.offset, i)), own)))
         put(bodies.force, first, force)
         put(bodies.torque, first, torque)
 
@@ -192,11 +194,17 @@ def place_grains(grains, bodies, b, span, is_wrapped):
         put(grains.moment, i, turned(own, load(grains.body_moment, i)))
 
 
+@formula
+def takes_one_step(bodies, first):
+    """Whether a body takes the step of all bodies in one: it is at rest, and takes no substeps."""
+    return bodies.asleep[first] == 1 and bodies.quick[first] == 0
+
+
 @loop
 def drift_bodies(grains, bodies, count, span, dt, is_wrapped):
-    """Move and turn all bodies asleep with their grains by a step of dt [s]; `is_wrapped` as in `place_grains`."""
+    """Move and turn all bodies with one step by dt [s], with their grains; `is_wrapped` as in `place_grains`."""
     for b in range(count[BODIES]):
-        if bodies.asleep[bodies.member[bodies.start[b]]] == 1:
+        if takes_one_step(bodies, bodies.member[bodies.start[b]]):
             move_body(bodies, b, span, dt)
             place_grains(grains, bodies, b, span, is_wrapped)
 

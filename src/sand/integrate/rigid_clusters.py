@@ -31,6 +31,7 @@ class RigidLimits(NamedTuple):
     smallest_radius: float  # [m]
     friction_rate: float  # fastest decay of a velocity or spin by friction in a gas [1/s]; 0 without gas
     shortest_step: float  # bodies that need a shorter step wake [s]; 0: the step of all bodies becomes as short
+    substeps: bool  # whether bodies may take several steps within a step of all bodies
 
 
 @register
@@ -109,6 +110,6 @@ class RigidClusters:
         return self
 
     def flight_limits(self, longest_displacement: float) -> RigidLimits:
-        """Run-time numbers; the engine, which knows contacts, gas and grains, sets the last four."""
+        """Run-time numbers; the engine, which knows contacts, gas and grains, sets the last five."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
-        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, 0.0)
+        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, 0.0, False)

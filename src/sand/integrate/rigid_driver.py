@@ -2,7 +2,8 @@
 
 One step:  choose h → kick ½h, drift, rotor → long-range and external forces on all grains → kick ½h.  In a gas the
 drift is two of ½h, with friction and noise between them (`body_friction`).  The driver returns before a step in which
-bodies may touch (`Stop.TOUCH_AHEAD`).  While a cluster is awake it returns twice in a step: after the drift, so that
+bodies may touch (`Stop.TOUCH_AHEAD`), and before one in which some bodies take substeps (`Stop.SUBSTEPS`), see
+`substeps`.  While a cluster is awake it returns twice in a step: after the drift, so that
 grains of awake clusters take their contact steps (`AWAKE_STEPS`), and at the end (`AWAKE_LOADS`).
 """
 
@@ -23,7 +24,6 @@ from ..state.state import (
     GRAINS_AWAKE,
     KICKED,
     LARGEST_LOAD,
-    LATE,
     LONG_RANGE_SKIN,
     MADE,
     OUTSIDE,
@@ -33,9 +33,11 @@ from ..state.state import (
     STAGE,
     STEP,
     STEPS,
+    SUBSTEPS,
     TIME,
 )
-from .body_friction import drift_bodies_in_gas, gas_displacement
+from .body_friction import drift_bodies_in_gas
+from .body_touches import CLEAR, LOADED, NEAR, TOUCHING, find_near_bodies
 from .force_calls import add_external_loads, sum_external, sum_pair_forces
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
@@ -44,17 +46,13 @@ from .respa import add_long_range_loads
 from .rigid_body import contact_loads_bound, drift_bodies, kick_bodies, move_velocities, spin_of, sum_body_loads
 from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
 from .step_control import is_close, is_past
+from .substeps import AFTER_SUBSTEPS, choose_shared_step
 from .task_queue import join_workers
 
 LARGEST_TURN = 1.0
 """Largest rotation of a body in one step [rad], so that loads that turn with it are averaged over six directions."""
-LARGEST_FLIGHT = 0.1
+LARGEST_FLIGHT = 0.2
 """Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
-TOUCH_SPEED = 1.2
-"""Closing speeds are taken this much larger to predict a touch."""
-CLEAR, NEAR, LOADED, TOUCHING = range(4)
-"""Values of `BodyArrays.near`: nothing near; a touch within about two steps; loads of contacts that may have changed by
-more than the reserve; a touch within the next step."""
 
 
 @formula
@@ -77,45 +75,8 @@ def squared_rates(grains, bodies, criteria, limits, b):
 
 
 @loop
-def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_awake):
-    """The next step [s], a power of two of the longest one; NaN if the state is not finite.
-
-    Bodies that alone require steps below `shortest_step` are marked, and not considered.
-    """
-    square = fastest = turning = 0.0
-    bodies.near[:] = CLEAR
-    quick = (limits.step_fraction / limits.shortest_step) ** 2 if limits.shortest_step > 0.0 else math.inf
-    for b in range(count[BODIES]):
-        first = bodies.member[bodies.start[b]]
-        if bodies.asleep[first] == 1:
-            spin = spin_of(bodies, first)
-            turning = max(turning, dot(spin, spin) / (LARGEST_TURN * LARGEST_TURN))
-            rate = squared_rates(grains, bodies, criteria, limits, b)
-            if rate > quick:
-                bodies.near[first] = TOUCHING
-            else:
-                square = max(square, rate)
-        for k in range(bodies.start[b], bodies.start[b + 1]):
-            v = load(grains.velocity, bodies.member[k])
-            speed = dot(v, v)
-            if not speed < math.inf:
-                return math.nan
-            fastest = max(fastest, speed)
-    for p in range(count[PAIRS]):
-        i, j = pair_list.pair[0, p], pair_list.pair[1, p]
-        if bodies.first[i] != bodies.first[j] and bodies.asleep[i] + bodies.asleep[j] > 0:
-            apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-            v = sub(load(grains.velocity, i), load(grains.velocity, j))
-            rate = dot(v, v) / dot(apart, apart)
-            if rate > quick:
-                bodies.near[bodies.first[i]] = bodies.near[bodies.first[j]] = TOUCHING
-            else:
-                square = max(square, rate)
-    rate = max(math.sqrt(square) / limits.step_fraction, math.sqrt(turning))
-    rate = max(rate, math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap))
-    h = min(limits.longest_step, criteria.longest)
-    if some_awake:
-        h = min(h, limits.longest_awake)
+def within_rate(h, rate):
+    """The step h [s], or the largest of h/2, h/4, … that is at most 1/`rate`."""
     if h * rate > 1.0:
         h *= 2.0 ** math.floor(-math.log2(h * rate))
         h = 0.5 * h if h * rate > 1.0 else h
@@ -123,48 +84,53 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
 
 
 @loop
-def _approach(grains, bodies, i, h):
-    """Distance [m] that grain i may move in h seconds besides its velocity: twice the present accelerations."""
-    first = bodies.first[i]
-    mass, inertia = bodies.mass[first], load(bodies.inertia, first)
-    s = norm(load(bodies.offset, i))
-    w = load(grains.spin, i)
-    smallest = min(inertia[0], min(inertia[1], inertia[2]))
-    linear = norm(load(bodies.force, first)) / mass + s * norm(load(bodies.torque, first)) / smallest
-    return (linear + dot(w, w) * s) * h * h
+def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_awake, may_wake):
+    """The next step [s] of all bodies, a power of two of the longest one; NaN if the state is not finite.
 
+    With `may_wake`, bodies that alone require steps below `shortest_step` are marked, and not considered.
 
-@loop
-def find_near_bodies(grains, bodies, pair_list, count, span, gas, friction_rate, h):
-    """Mark bodies near others (`BodyArrays.near`) for a step of h [s].
-
-    A gap closes at most by the closing speed, a fifth more of it, the curvature of the paths, and what a gas adds.
+    Returns
+    -------
+    tuple of float
+        The step that all bodies require, and the longest one that the flight of the fastest grain allows.
     """
+    square = fastest = 0.0
+    bodies.near[:] = CLEAR
+    wakes = (limits.step_fraction / limits.shortest_step) ** 2 if may_wake else math.inf
+    for b in range(count[BODIES]):
+        first = bodies.member[bodies.start[b]]
+        if bodies.asleep[first] == 1:
+            spin = spin_of(bodies, first)
+            rate = squared_rates(grains, bodies, criteria, limits, b)
+            if rate > wakes:
+                bodies.near[first] = TOUCHING
+                rate = 0.0
+            rate = max(rate, dot(spin, spin) * (limits.step_fraction / LARGEST_TURN) ** 2)
+            bodies.rate[first] = rate
+            square = max(square, rate)
+        for k in range(bodies.start[b], bodies.start[b + 1]):
+            v = load(grains.velocity, bodies.member[k])
+            speed = dot(v, v)
+            if not speed < math.inf:
+                return math.nan, math.nan
+            fastest = max(fastest, speed)
     for p in range(count[PAIRS]):
         i, j = pair_list.pair[0, p], pair_list.pair[1, p]
-        one, other = bodies.first[i], bodies.first[j]
-        if one == other:
-            continue
-        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        distance = norm(apart)
-        gap = distance - grains.radius[i] - grains.radius[j]
-        v = sub(load(grains.velocity, i), load(grains.velocity, j))
-        closing = max(-dot(v, apart) / distance, 0.0)
-        across = max(dot(v, v) - closing * closing, 0.0)
-        reach = TOUCH_SPEED * closing * h + 0.5 * across / distance * h * h
-        reach += _approach(grains, bodies, i, h) + _approach(grains, bodies, j, h)
-        if gas.gas.on:
-            reach += gas_displacement(grains, bodies, i, friction_rate, gas.gas, h)
-            reach += gas_displacement(grains, bodies, j, friction_rate, gas.gas, h)
-        if gap > 2.0 * reach:
-            continue
-        both_awake = bodies.asleep[i] + bodies.asleep[j] == 0
-        if not gap > reach and not both_awake:  # also if the reach is not a number
-            bodies.near[one] = bodies.near[other] = TOUCHING
-            count[LATE] += 1 if gap < 0.0 else 0
-        else:
-            bodies.near[one] = max(bodies.near[one], NEAR)
-            bodies.near[other] = max(bodies.near[other], NEAR)
+        if bodies.first[i] != bodies.first[j] and bodies.asleep[i] + bodies.asleep[j] > 0:
+            apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+            v = sub(load(grains.velocity, i), load(grains.velocity, j))
+            rate = dot(v, v) / dot(apart, apart)
+            one, other = bodies.first[i], bodies.first[j]
+            if rate > wakes:
+                bodies.near[one] = bodies.near[other] = TOUCHING
+            else:
+                square = max(square, rate)
+                bodies.rate[one], bodies.rate[other] = max(bodies.rate[one], rate), max(bodies.rate[other], rate)
+    longest = min(limits.longest_step, criteria.longest)
+    if some_awake:
+        longest = min(longest, limits.longest_awake)
+    longest = within_rate(longest, math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap))
+    return within_rate(longest, math.sqrt(square) / limits.step_fraction), longest
 
 
 @loop
@@ -193,7 +159,7 @@ def any_has_to_wake(bodies, count):
 
 @caller
 def drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table, h):
-    """Move all bodies asleep, and log the work of external forces that depend on time or position, and of a gas.
+    """Move the bodies at rest without substeps; log the work of external forces of time or position, and of a gas.
 
     Grains of awake clusters stay where they are; the change of their energies with time is part of the work.
     """
@@ -203,7 +169,7 @@ def drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grai
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
     if gas.gas.on:
         lost[GAS] += drift_bodies_in_gas(
-            grains, bodies, count, span, count[STEPS], gas, h, not external_work.position_dependent
+            grains, bodies, count, span, count[STEPS] + count[SUBSTEPS], gas, h, not external_work.position_dependent
         )
     else:
         drift_bodies(grains, bodies, count, span, h, not external_work.position_dependent)
@@ -259,22 +225,37 @@ def first_half(
     flight_limits, program, table, until, shorten, some_awake
 ):  # fmt: skip
     """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
+    bodies.quick[:] = 0
     sum_body_loads(grains, bodies, count)
-    h = longest_step(grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake)
+    substeps = flight_limits.substeps and not some_awake
+    may_wake = flight_limits.shortest_step > 0.0 and not substeps
+    h, longest = longest_step(
+        grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake, may_wake
+    )  # fmt: skip
+    shared = h
+    if substeps:
+        shared = choose_shared_step(grains, bodies, pair_list, count, span, gas, flight_limits, h, longest)
     if not h > 0.0:
         call_stage(program, EXPLAIN, table, Stop.NOT_FINITE.value)
         return Stop.NOT_FINITE.value
     if clock[TIME] + h == clock[TIME]:
         return Stop.NO_STEP.value
-    if is_past(clock[TIME] + h, until):
+    takes_substeps = shared > h
+    if is_past(clock[TIME] + shared, until):
         if not shorten:
+            bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
-        h = until - clock[TIME]
-    find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, h)
+        shared = until - clock[TIME]
+    h = shared
+    if not takes_substeps:
+        find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, h)
     find_loaded_bodies(grains, bodies, clock, count)
     clock[STEP] = h
     if any_has_to_wake(bodies, count):
+        bodies.quick[:] = 0
         return Stop.TOUCH_AHEAD.value
+    if takes_substeps:
+        return Stop.SUBSTEPS.value
     kick_bodies(bodies, count, 0.5 * h)
     drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table, h)
     count[STAGE] = 1
@@ -294,6 +275,7 @@ def second_half(
     sum_body_loads(grains, bodies, count)
     kick_bodies(bodies, count, 0.5 * clock[STEP])
     move_velocities(grains, bodies, count)
+    bodies.quick[:] = 0
     clock[TIME] += clock[STEP]
     if gas.gas.on:
         clock[KICKED] = clock[TIME]
@@ -325,6 +307,12 @@ def body_steps_until(
                 grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria,
                 forces, flight_limits, program, table, until, shorten, awake > 0
             )  # fmt: skip
+        elif count[STAGE] == AFTER_SUBSTEPS:
+            drift_with_work(
+                clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table,
+                clock[STEP]
+            )  # fmt: skip
+            count[STAGE] = 1
         if stop == Stop.NONE.value:
             stop = second_half(
                 grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces,

@@ -34,14 +34,19 @@ class WorkerThreads:
         """A new pool for the same stage."""
         return WorkerThreads(self._work)
 
+    @property
+    def have_started(self) -> bool:
+        """Whether any thread has started."""
+        return bool(self._inboxes)
+
     def start(self, table: Table) -> None:
         """Run the stage with the parts in a table on all threads but the caller's; returns at once."""
-        if not COMPILED:  # without the compiler nothing is atomic
+        workers = threads() - 1
+        if not COMPILED or workers == 0:  # without the compiler nothing is atomic
             return
         if self._process != os.getpid():  # threads do not survive a fork
             self._inboxes.clear()
             self._process = os.getpid()
-        workers = threads() - 1
         while len(self._inboxes) < workers:
             inbox: queue.SimpleQueue = queue.SimpleQueue()
             threading.Thread(target=_run, args=(inbox,), name="sand-worker", daemon=True).start()

@@ -41,6 +41,7 @@ from ..ramps import ramps_of
 from ..setup.from_frame import StrainedContacts
 from ..state.arrays import OVER_ALLOCATION, body_arrays
 from ..state.state import COMPARED, CUT_RADIUS
+from .body_engine import BodyEngine
 from .checks import check_system
 from .cluster_cutoff import follow_clusters
 from .driven import Driven, check_driven, driven_arrays
@@ -49,6 +50,7 @@ from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refu
 from .new_state import new_state
 from .ramped import RampedForces
 from .rigid_engine import WAKE_QUICK_FROM, RigidEngine, list_gap, longest_step_awake
+from .substeps import Substeps
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
 WIDE_FROM = 64
@@ -183,6 +185,8 @@ def build_engine(
     if rigid:
         state.bodies = body_arrays(len(grains), in_gas=bool(by_type.gas))
         engine = RigidEngine(*parts, inner=inner_engine(wrapped, forces, box, verlet, seed))
+        if parameters.flight_limits.substeps:
+            engine.substeps = substeps_of(engine)
     if any(map(ramps_of, forces)):
         changing = functools.partial(
             _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
@@ -209,6 +213,18 @@ def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verl
     return build_engine(grains, near, box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False)
 
 
+def substeps_of(engine: RigidEngine) -> Substeps:
+    """Substeps by the loops of the engine of awake grains, with the limits of the steps of bodies."""
+    inner = engine.inner
+    assert inner is not None
+    names = (each.name for each in dataclasses.fields(Engine) if each.init)
+    settings: dict[str, Any] = {name: getattr(inner, name) for name in names}
+    limits = engine.parameters.flight_limits._replace(substeps=False, shortest_step=0.0)
+    given = {"flight_limits": limits, "criteria": engine.parameters.criteria}
+    settings["parameters"] = inner.parameters._replace(**given)
+    return Substeps(BodyEngine(**settings))
+
+
 def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
     """Limits of the steps of rigid clusters that depend on grains, contacts and gas.
 
@@ -218,6 +234,7 @@ def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grai
     farther than `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations √(2 k_B T h/τ m).
     """
     law, limits = (forces.contact or Contact()).contact_law, parameters.flight_limits
+    work = parameters.external_work
     longest, rate, gas = limits.longest_step, 0.0, parameters.gas.gas
     if forces.gas:
         rate = 1.0 / forces.gas[0].shortest_time(grains)
@@ -232,6 +249,7 @@ def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grai
         smallest_radius=float(grains.radius.min()),
         friction_rate=rate,
         shortest_step=awake / SAMPLES if len(grains) >= WAKE_QUICK_FROM else limits.shortest_step,
+        substeps=not (work.time_dependent or work.position_dependent),
     )
 
 

@@ -30,7 +30,8 @@ def sort_members(state: State) -> None:
     """Fill the lists of the grains of each body."""
     bodies = state.bodies
     bodies.member[:] = np.argsort(bodies.first, kind="stable")
-    starts = np.flatnonzero(np.diff(bodies.first[bodies.member].astype(np.int64), prepend=-1))
+    first = bodies.first[bodies.member]
+    starts = np.append(0, np.flatnonzero(first[1:] != first[:-1]) + 1)
     state.count[BODIES] = len(starts)
     bodies.start[: len(starts)], bodies.start[len(starts) :] = starts, len(state.grains)
 
@@ -131,4 +132,3 @@ def set_friction(state: State, gas: GasParameters, index: np.ndarray) -> None:
         radius, offset, bodies.mass[first], bodies.inertia[:, first], numbers
     )
     bodies.mode[:, first] = modes.T.ravel()
-

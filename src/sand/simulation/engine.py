@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import math
+import operator
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -32,6 +33,7 @@ from ..integrate.program import Components, build_program
 from ..integrate.respa import clear_long_range_loads
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
+    SHARED,
     TaskQueue,
     benefits_from_workers,
     new_task_queue,
@@ -79,6 +81,8 @@ from .ramped import RampedForces
 
 CONTACT = Contact.name
 """Name of the contact model among the forces."""
+ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
+"""The arrays of a state that stages take, besides those of the grains."""
 
 
 @dataclass
@@ -125,6 +129,7 @@ class Engine:
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
+    _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
     _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
@@ -410,9 +415,11 @@ class Engine:
 
     def _current_table(self, state: State) -> Table:
         """The table with the present arrays of the state."""
-        self._table.set("grains", state.grains.arrays)
-        for name in (*GROUPS, "clock", "count", "lost"):
-            self._table.set(name, getattr(state, name))
+        present = (state.grains.arrays, *ARRAYS(state))
+        if not all(map(operator.is_, present, self._present)):
+            for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
+                self._table.set(name, value)
+            self._present = present
         return self._table
 
     def _call_table(self, until: float, last: float, shorten: bool) -> tuple[Table, Any]:
@@ -424,12 +431,14 @@ class Engine:
         return table, queue
 
     def _task_queue(self, grains: int, contacts: int) -> TaskQueue:
-        """An empty task queue for one call of the driver: in small simulations, without other threads, that of the last one.
+        """An empty task queue for one call of the driver: the last one, if no other thread has seen it.
 
         A thread that starts late could otherwise take blocks of the next call.
         """
-        if self._queue is not None and self._queue_size == (grains, contacts) and not uses_task_queue(grains):
+        alone = self._workers is None or not self._workers.have_started
+        if self._queue is not None and self._queue_size == (grains, contacts) and alone:
             self._queue.words[:] = 0
+            self._queue.words[SHARED] = uses_task_queue(grains)
         else:
             self._queue, self._queue_size = new_task_queue(grains, contacts), (grains, contacts)
         return self._queue

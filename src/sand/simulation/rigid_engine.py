@@ -27,6 +27,7 @@ from ..integrate.rigid_clusters import SAMPLES, RigidLimits
 from ..integrate.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
 from ..integrate.stages import finish_gas
 from ..integrate.step_control import INCREASE_INTERVAL
+from ..integrate.substeps import kick_by_slow_loads, place_all_velocities, split_loads
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
 from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, ContactArrays, cluster_arrays
@@ -47,7 +48,6 @@ from ..state.state import (
     LONG_RANGE_SUMS,
     MADE,
     OUTSIDE,
-    PAIRS,
     QUIETING,
     RESTED,
     SETTLED,
@@ -70,15 +70,17 @@ from .bodies import (
     set_friction,
     sort_members,
 )
+from .body_engine import BodyEngine
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
 from .rigid_loads import may_stay_at_rest, rest_with_loads
+from .substeps import LOADS, Substeps
 
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
 more than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
-LIST_GAP, SHARE_OF_SPACING = 3.0, 0.15
+LIST_GAP, SHARE_OF_SPACING = 3.0, 0.3
 """Largest gap of pairs that the driver of bodies looks at, in smallest radii, and, in thin gases, in mean distances of
 neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
 SLIP_LOSSES = slice(1, 4)
@@ -97,7 +99,7 @@ MOVING = ("position", "velocity", "orientation", "spin", "moment")
 
 
 @dataclass
-class RigidEngine(Engine):
+class RigidEngine(BodyEngine):
     """An engine whose clusters at rest move as rigid bodies.
 
     The state is that of all grains.  While clusters are awake, their grains are copied to a smaller state, on which
@@ -108,9 +110,12 @@ class RigidEngine(Engine):
     ----------
     inner : Engine
         The engine of awake grains; its state is replaced as clusters wake and come to rest.
+    substeps : Substeps or None
+        Steps of the bodies that need shorter ones than all others.
     """
 
     inner: Engine | None = None
+    substeps: Substeps | None = None
     _inner_workers: WorkerThreads | None = field(init=False, default=None)
     _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
     _inner_grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # of the inner state
@@ -127,7 +132,11 @@ class RigidEngine(Engine):
 
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
-        return [*super()._drivers(), (advance_bodies, ()), (mark_near_bodies, ())]
+        own = [(advance_bodies, ()), (mark_near_bodies, ())]
+        if self.substeps is not None:
+            loads = [np.zeros((3, 1)) for _ in LOADS]
+            own += [(kick_by_slow_loads, ()), (place_all_velocities, ()), (split_loads, (*loads, np.zeros(1)))]
+        return [*super()._drivers(), *own]
 
     def begin(self) -> None:
         """As `Engine.begin`; clusters start awake, single grains as bodies."""
@@ -182,18 +191,6 @@ class RigidEngine(Engine):
         self._bodies_driver(-math.inf, state.steps + 1)
         state.clock[TIME], state.count[LONG_RANGE_SUMS] = before, sums
 
-    def _bodies_driver(self, until: float, last: float, shorten: bool = False) -> Stop:
-        """Call the driver of bodies; enlarges arrays that overflow."""
-        while True:
-            stop = self._run_program(advance_bodies, until, last, shorten)
-            if stop is Stop.PAIRS_FULL:
-                found, self._state.count[PAIRS] = int(self._state.count[PAIRS]), 0
-                self._state.grow_pairs(int(1.1 * found))
-            elif stop is Stop.LIST_FULL:
-                self._state.grow_rows()
-            else:
-                return stop
-
     def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """One call of the driver: of all grains before the first step, else of bodies and awake clusters."""
         state = self._state
@@ -214,6 +211,13 @@ class RigidEngine(Engine):
                     return failed
             elif stop is Stop.AWAKE_LOADS:
                 self._finish_step()
+            elif stop is Stop.SUBSTEPS:
+                assert self.substeps is not None
+                failed = self.substeps.take(state, self._current_table(state))
+                if failed is Stop.TOUCH_AHEAD:
+                    self._wake()
+                elif failed is not Stop.NONE:
+                    return failed
             else:
                 return stop
 

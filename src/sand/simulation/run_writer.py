@@ -34,6 +34,7 @@ from ..state.state import (
     RESTED,
     SOME_AWAKE,
     STAGE,
+    SUBSTEPS,
     WOKEN,
 )
 from ..version import __version__
@@ -318,6 +319,7 @@ def rigid_clusters(simulation: Simulation, ledger: Ledger) -> dict[str, Any]:
         "time_awake": float(clock[SOME_AWAKE]) / time,
         "grains_awake": float(clock[GRAINS_AWAKE]) / time,
         "steps_of_bodies": state.steps,
+        "substeps_of_bodies": int(count[SUBSTEPS]),
         "contact_steps": int(count[CONTACT_STEPS]),
         "woken": int(count[WOKEN]),
         "came_to_rest": int(count[RESTED]),

@@ -152,9 +152,14 @@ class BodyArrays(NamedTuple):
     mode: np.ndarray  # (36, N) these modes, one after the other, see integrate.body_friction; (36, 0) likewise
     load: np.ndarray  # (N,) bound of the change of the loads of the contacts of a body, in units of their limits
     near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `integrate.rigid_driver`
+    rate: np.ndarray  # (N,) square of the largest rate that limits the step of a body [1/s²]
+    quick: np.ndarray  # (N,) uint8: whether a body takes substeps within the present step, see `integrate.substeps`
+    quick_force: np.ndarray  # (3, N) force on a grain that acts in substeps; 0 for all others [N]
+    quick_torque: np.ndarray  # (3, N) likewise [N m]
 
 
 LOADS_OF_BODIES = ("rest_force", "rest_torque", "known_force", "known_torque")
+FLAGS_OF_BODIES = ("asleep", "near", "quick")
 SAVED_BODIES = BodyArrays._fields[: BodyArrays._fields.index("member")]
 """Arrays of the bodies in a checkpoint."""
 SAVED_LONG_RANGE = (
@@ -296,9 +301,10 @@ def body_arrays(grains: int, *, in_gas: bool = False) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
     vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
     widths = dict.fromkeys((*vectors, *LOADS_OF_BODIES, "inner_field", "force", "torque"), 3)
+    widths |= {"quick_force": 3, "quick_torque": 3}
     widths |= {"orientation": 4, "turn": 4, "strength": 2}
     found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
-    for name, kind in (("first", np.uint32), ("member", np.uint32), ("asleep", np.uint8), ("near", np.uint8)):
+    for name, kind in {"first": np.uint32, "member": np.uint32, **dict.fromkeys(FLAGS_OF_BODIES, np.uint8)}.items():
         found[name] = np.zeros(grains, kind)
     found |= {name: np.zeros((rows, grains if in_gas else 0)) for name, rows in (("decay", 6), ("mode", 36))}
     return BodyArrays(**(found | {"start": np.zeros(grains + 1, np.uint32)}))

@@ -82,10 +82,11 @@ CONTACT_STEPS = 20  # steps of grains of clusters that are awake
 WOKEN = 21  # bodies woken
 RESTED = 22  # clusters that came to rest, and move as rigid bodies
 LATE = 23  # pairs that overlapped before their bodies were woken
+SUBSTEPS = 24  # steps of bodies that take several within a step of all bodies
 COUNT = (
     *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
     *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "wall_contacts"),
-    *("bodies", "contact_steps", "woken", "rested", "late"),
+    *("bodies", "contact_steps", "woken", "rested", "late", "substeps"),
 )
 
 # --- indices of State.cutoff (float64): the cut-off of dipoles that follows the largest clusters -----------------
