@@ -104,8 +104,11 @@ def free_sphere(q, angular, inertia, t):
 
 
 @loop
-def sum_body_loads(grains, bodies, count):
-    """Sum force [N] and torque [N m] about the centre of mass of each body, but what acts in substeps."""
+def sum_body_loads(grains, bodies, count, holds_loads):
+    """Sum force [N] and torque [N m] about the centre of mass of each body; awake ones included.
+
+    The `excluded` loads on the grains of quick bodies, or of all if `holds_loads`, are left out.
+    """
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         q = load4(bodies.orientation, first)
@@ -113,8 +116,9 @@ def sum_body_loads(grains, bodies, count):
         for k in range(bodies.start[b], bodies.start[b + 1]):
             i = bodies.member[k]
             own, turning = load(grains.force, i), load(grains.torque, i)
-            if bodies.quick[first] == 1:
-                own, turning = sub(own, load(bodies.quick_force, i)), sub(turning, load(bodies.quick_torque, i))
+            if holds_loads or bodies.quick[first] == 1:
+                own = sub(own, load(bodies.excluded_force, i))
+                turning = sub(turning, load(bodies.excluded_torque, i))
             force = add(force, own)
             torque = add(torque, add(turning, cross(turned(q, load(bodies.offset, i)), own)))
         put(bodies.force, first, force)

@@ -30,8 +30,8 @@ class RigidLimits(NamedTuple):
     longest_awake: float  # [s], while a cluster is awake: the shortest time after which one may be at rest
     smallest_radius: float  # [m]
     friction_rate: float  # fastest decay of a velocity or spin by friction in a gas [1/s]; 0 without gas
-    shortest_step: float  # bodies that need a shorter step wake [s]; 0: the step of all bodies becomes as short
     substeps: bool  # whether bodies may take several steps within a step of all bodies
+    holds_loads: bool  # whether these are substeps, in which other loads on the grains are known but do not act
 
 
 @register
@@ -110,6 +110,8 @@ class RigidClusters:
         return self
 
     def flight_limits(self, longest_displacement: float) -> RigidLimits:
-        """Run-time numbers; the engine, which knows contacts, gas and grains, sets the last five."""
+        """Run-time numbers; the engine, which knows contacts, gas and grains, sets all but the first three."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
-        return RigidLimits(self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, 0.0, False)
+        return RigidLimits(
+            self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, substeps=False, holds_loads=False
+        )

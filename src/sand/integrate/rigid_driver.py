@@ -15,7 +15,7 @@ from ..compiler.program import call_stage
 from ..compiler.stage import stage
 from ..neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
 from ..numerics.quaternion import turned
-from ..numerics.vec import dot, load, load4, norm, put, sub
+from ..numerics.vec import accrue, dot, load, load4, norm, put, sub
 from ..state.state import (
     BODIES,
     BROKEN,
@@ -37,7 +37,7 @@ from ..state.state import (
     TIME,
 )
 from .body_friction import drift_bodies_in_gas
-from .body_touches import CLEAR, LOADED, NEAR, TOUCHING, find_near_bodies
+from .body_touches import CLEAR, LOADED, find_near_bodies
 from .force_calls import add_external_loads, sum_external, sum_pair_forces
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
@@ -46,7 +46,7 @@ from .respa import add_long_range_loads
 from .rigid_body import contact_loads_bound, drift_bodies, kick_bodies, move_velocities, spin_of, sum_body_loads
 from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
 from .step_control import is_close, is_past
-from .substeps import AFTER_SUBSTEPS, choose_shared_step
+from .substeps import AFTER_SUBSTEPS, choose_shared_step, squared_rate
 from .task_queue import join_workers
 
 LARGEST_TURN = 1.0
@@ -57,21 +57,14 @@ LARGEST_FLIGHT = 0.2
 
 @formula
 def squared_rates(grains, bodies, criteria, limits, b):
-    """Square of the largest rate [1/s²] at which the loads of a body change.
-
-    Rotation in the field of other bodies: Σ|μ B|/I; translation: 4 F/(M d), d two of the smallest radii, for forces
-    that fall with the distance like those of dipoles, r⁻⁴, or slower.
-    """
+    """`squared_rate` of body b by the fields of other bodies and its force."""
     first = bodies.member[bodies.start[b]]
-    q, inertia = load4(bodies.orientation, first), load(bodies.inertia, first)
-    energy = 0.0
+    q, energy = load4(bodies.orientation, first), 0.0
     for k in range(bodies.start[b], bodies.start[b + 1]):
         i = bodies.member[k]
         outer = sub(load(grains.field, i), turned(q, load(bodies.inner_field, i)))
         energy += norm(load(grains.moment, i)) * (norm(outer) + criteria.outer_field)
-    smallest = min(inertia[0], min(inertia[1], inertia[2]))
-    force = norm(load(bodies.force, first))
-    return max(energy / smallest, 2.0 * force / (bodies.mass[first] * limits.smallest_radius))
+    return squared_rate(bodies, first, load(bodies.force, first), energy, limits.smallest_radius)
 
 
 @loop
@@ -84,10 +77,8 @@ def within_rate(h, rate):
 
 
 @loop
-def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_awake, may_wake):
+def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_awake):
     """The next step [s] of all bodies, a power of two of the longest one; NaN if the state is not finite.
-
-    With `may_wake`, bodies that alone require steps below `shortest_step` are marked, and not considered.
 
     Returns
     -------
@@ -96,15 +87,11 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
     """
     square = fastest = 0.0
     bodies.near[:] = CLEAR
-    wakes = (limits.step_fraction / limits.shortest_step) ** 2 if may_wake else math.inf
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1:
             spin = spin_of(bodies, first)
             rate = squared_rates(grains, bodies, criteria, limits, b)
-            if rate > wakes:
-                bodies.near[first] = TOUCHING
-                rate = 0.0
             rate = max(rate, dot(spin, spin) * (limits.step_fraction / LARGEST_TURN) ** 2)
             bodies.rate[first] = rate
             square = max(square, rate)
@@ -121,16 +108,13 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
             v = sub(load(grains.velocity, i), load(grains.velocity, j))
             rate = dot(v, v) / dot(apart, apart)
             one, other = bodies.first[i], bodies.first[j]
-            if rate > wakes:
-                bodies.near[one] = bodies.near[other] = TOUCHING
-            else:
-                square = max(square, rate)
-                bodies.rate[one], bodies.rate[other] = max(bodies.rate[one], rate), max(bodies.rate[other], rate)
-    longest = min(limits.longest_step, criteria.longest)
-    if some_awake:
-        longest = min(longest, limits.longest_awake)
-    longest = within_rate(longest, math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap))
-    return within_rate(longest, math.sqrt(square) / limits.step_fraction), longest
+            square = max(square, rate)
+            bodies.rate[one], bodies.rate[other] = max(bodies.rate[one], rate), max(bodies.rate[other], rate)
+    longest = within_rate(
+        min(limits.longest_step, criteria.longest), math.sqrt(fastest) / (LARGEST_FLIGHT * criteria.pair_gap)
+    )
+    rate = math.sqrt(square) / limits.step_fraction
+    return within_rate(longest, max(rate, 1.0 / limits.longest_awake) if some_awake else rate), longest
 
 
 @loop
@@ -199,7 +183,9 @@ def update_lists(grains, pair_list, long_range, span, search, criteria, program,
 
 
 @caller
-def sum_outer_loads(grains, long_range, clock, count, scratch, forces, queue, program, table):
+def sum_outer_loads(
+    grains, bodies, long_range, clock, count, scratch, forces, holds_loads, queue, program, table
+):  # fmt: skip
     """Sum all loads but those of contacts, over all pairs of grains, at the time of the end of the step."""
     for i in range(grains.mass.size):
         put(grains.force, i, (0.0, 0.0, 0.0))
@@ -208,6 +194,10 @@ def sum_outer_loads(grains, long_range, clock, count, scratch, forces, queue, pr
     if forces.pair > 0:
         sum_pair_forces(long_range, count, forces, queue, program, table)
         add_long_range_loads(grains, long_range)
+    if holds_loads:
+        for i in range(grains.mass.size):
+            accrue(grains.force, i, load(bodies.excluded_force, i))
+            accrue(grains.torque, i, load(bodies.excluded_torque, i))
 
 
 @loop
@@ -226,14 +216,10 @@ def first_half(
 ):  # fmt: skip
     """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
     bodies.quick[:] = 0
-    sum_body_loads(grains, bodies, count)
-    substeps = flight_limits.substeps and not some_awake
-    may_wake = flight_limits.shortest_step > 0.0 and not substeps
-    h, longest = longest_step(
-        grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake, may_wake
-    )  # fmt: skip
+    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
+    h, longest = longest_step(grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake)
     shared = h
-    if substeps:
+    if flight_limits.substeps:
         shared = choose_shared_step(grains, bodies, pair_list, count, span, gas, flight_limits, h, longest)
     if not h > 0.0:
         call_stage(program, EXPLAIN, table, Stop.NOT_FINITE.value)
@@ -264,23 +250,26 @@ def first_half(
 
 @caller
 def second_half(
-    grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces, queue, program,
-    table, awake
+    grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces, flight_limits,
+    queue, program, table, awake, had_substeps
 ):  # fmt: skip
     """Update the lists, sum the loads, and kick; returns the value of a `Stop`."""
     stop = update_lists(grains, pair_list, long_range, span, search, criteria, program, table)
     if stop != Stop.NONE.value:
         return stop
-    sum_outer_loads(grains, long_range, clock, count, scratch, forces, queue, program, table)
-    sum_body_loads(grains, bodies, count)
+    sum_outer_loads(
+        grains, bodies, long_range, clock, count, scratch, forces, flight_limits.holds_loads, queue, program, table
+    )  # fmt: skip
+    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
     kick_bodies(bodies, count, 0.5 * clock[STEP])
     move_velocities(grains, bodies, count)
     bodies.quick[:] = 0
     clock[TIME] += clock[STEP]
     if gas.gas.on:
         clock[KICKED] = clock[TIME]
-    clock[SOME_AWAKE] += clock[STEP] if awake > 0 else 0.0
-    clock[GRAINS_AWAKE] += awake * clock[STEP] / grains.mass.size
+    if not had_substeps:
+        clock[SOME_AWAKE] += clock[STEP] if awake > 0 else 0.0
+        clock[GRAINS_AWAKE] += awake * clock[STEP] / grains.mass.size
     count[STEPS] += 1 if clock[STEP] > 0.0 else 0
     count[STAGE] = 0
     return Stop.AWAKE_LOADS.value if awake > 0 else Stop.NONE.value
@@ -295,7 +284,7 @@ def body_steps_until(
     awake = awake_grains(bodies)
     invalidate_speeds(pair_list)
     while True:
-        stop = Stop.NONE.value
+        stop, had_substeps = Stop.NONE.value, count[STAGE] == AFTER_SUBSTEPS
         if count[STAGE] == 0:
             if count[COMPARED] >= 0 and count[COMPARED] != count[MADE] + count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
@@ -307,7 +296,7 @@ def body_steps_until(
                 grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria,
                 forces, flight_limits, program, table, until, shorten, awake > 0
             )  # fmt: skip
-        elif count[STAGE] == AFTER_SUBSTEPS:
+        elif had_substeps:
             drift_with_work(
                 clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table,
                 clock[STEP]
@@ -316,7 +305,7 @@ def body_steps_until(
         if stop == Stop.NONE.value:
             stop = second_half(
                 grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces,
-                queue, program, table, awake
+                flight_limits, queue, program, table, awake, had_substeps
             )  # fmt: skip
         if stop != Stop.NONE.value:
             return stop
@@ -337,16 +326,9 @@ def advance_bodies(
 
 
 @stage("the search for touches of bodies")
-def mark_near_bodies(grains, bodies, pair_list, clock, count, span, gas, criteria, flight_limits):
-    """Mark bodies near others, for a step as long as the last one, and single grains that need short steps."""
-    sum_body_loads(grains, bodies, count)
+def mark_near_bodies(grains, bodies, pair_list, clock, count, span, gas, flight_limits):
+    """Mark bodies near others, for a step as long as the last one."""
+    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
     bodies.near[:] = CLEAR
     find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, clock[STEP])
-    longest = 0.5 * flight_limits.step_fraction
-    for b in range(count[BODIES]):
-        first = bodies.member[bodies.start[b]]
-        if bodies.asleep[first] == 0 and bodies.start[b + 1] - bodies.start[b] == 1:
-            rate = squared_rates(grains, bodies, criteria, flight_limits, b)
-            if math.sqrt(rate) * flight_limits.shortest_step > longest:
-                bodies.near[first] = NEAR
     return 0

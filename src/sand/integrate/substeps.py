@@ -10,15 +10,17 @@ bodies on each other and of external forces on them, one step H is
 
 This is the impulse method of multiple time stepping (Tuckerman, Berne & Martyna 1992) with a splitting by pairs of
 bodies (Pelupessy, Jänes & Portegies Zwart 2012): each force acts on both bodies of a pair at the same time, so that
-momentum and angular momentum are conserved to rounding.  Quick are bodies that require a step shorter than H, all that
-are near these, and pairs that may touch within H.
+momentum and angular momentum are conserved to rounding.  Quick are bodies that require a step shorter than H, awake
+clusters, all that are near these, and pairs that may touch within H.  In their substeps these bodies touch, wake and
+come to rest as in any step.  Contacts at rest carry all loads: the slow ones are held as they were at the start.
 """
 
+import math
+
 from ..box import nearest_image
-from ..compiler.jit import loop
+from ..compiler.jit import formula, loop
 from ..compiler.stage import stage
-from ..numerics.quaternion import turned_back
-from ..numerics.vec import add, load, load4, norm, put, sub
+from ..numerics.vec import add, load, norm, sub
 from ..state.state import BODIES, PAIRS, STEP
 from .body_touches import reach_of_pair
 from .rigid_body import kick_bodies, move_velocities, sum_body_loads
@@ -34,13 +36,25 @@ WORTH = 0.7
 depend on the machine: the steps would."""
 
 
+@formula
+def squared_rate(bodies, first, force, energy, smallest_radius):
+    """Square of the largest rate [1/s²] at which loads change the motion of a body.
+
+    Rotation in the field of other bodies: Σ|μ B|/I; translation: 4 F/(M d), d two of the smallest radii, for forces
+    that fall with the distance like those of dipoles, r⁻⁴, or slower.
+    """
+    inertia = load(bodies.inertia, first)
+    smallest = min(inertia[0], min(inertia[1], inertia[2]))
+    return max(energy / smallest, 2.0 * norm(force) / (bodies.mass[first] * smallest_radius))
+
+
 @loop
 def mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, h):
-    """Mark the bodies that take substeps within a step of h [s]; returns the number of their grains."""
+    """Mark the bodies that take substeps in a step of h [s], awake ones included; returns how many grains they have."""
     square = (limits.step_fraction / h) ** 2
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
-        bodies.quick[first] = 1 if bodies.rate[first] > square else 0
+        bodies.quick[first] = 1 if bodies.rate[first] > square or bodies.asleep[first] == 0 else 0
     bodies.near[:] = 0  # here: whether a body takes substeps for the sake of a quick neighbour
     for p in range(count[PAIRS]):
         i, j = pair_list.pair[0, p], pair_list.pair[1, p]
@@ -88,41 +102,33 @@ def choose_shared_step(grains, bodies, pair_list, count, span, gas, limits, h, l
 
 @stage("the kicks by loads that do not act in substeps")
 def kick_by_slow_loads(grains, bodies, clock, count):
-    """Kick all bodies for half a step by the loads that do not act in substeps."""
-    sum_body_loads(grains, bodies, count)
+    """Kick all bodies at rest for half a step, the quick ones by the loads that do not act in substeps."""
+    sum_body_loads(grains, bodies, count, False)
     kick_bodies(bodies, count, 0.5 * clock[STEP])
     return 0
 
 
 @stage("the velocities of bodies")
 def place_all_velocities(grains, bodies, count):
-    """Velocities and spins of the grains of all bodies."""
+    """Velocities and spins of the grains of all bodies at rest."""
     move_velocities(grains, bodies, count)
     return 0
 
 
-@stage("the loads that do not act in substeps")
-def split_loads(grains, bodies, count, flight_limits, parameters):
-    """Prepare quick bodies for their substeps, in which they have only the loads on each other and external ones.
+@stage("the rates of loads that do not act in substeps")
+def find_slow_rate(grains, bodies, count, flight_limits, parameters):
+    """Set parameters[2][0] to the largest rate [1/s] at which slow loads change the motion of a body.
 
-    Parameters: all other loads, force (3, n) [N], torque [N m] and flux density [T], and the largest rate² [1/s²] at
-    which these change the motion of a body, which is set.  As known loads of contacts at rest, they are taken to turn
-    with the body during the step.
+    Parameters: forces (3, n) [N] and flux densities (3, n) [T] on the grains that do not act in substeps.
     """
-    forces, torques, fields, square = parameters[0], parameters[1], parameters[2], 0.0
+    forces, fields, square = parameters[0], parameters[1], 0.0
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
-        q, inertia = load4(bodies.orientation, first), load(bodies.inertia, first)
         force, energy = (0.0, 0.0, 0.0), 0.0
         for k in range(bodies.start[b], bodies.start[b + 1]):
             i = bodies.member[k]
-            own = load(forces, i)
-            force = add(force, own)
+            force = add(force, load(forces, i))
             energy += norm(load(grains.moment, i)) * norm(load(fields, i))
-            put(bodies.known_force, i, sub(load(bodies.known_force, i), turned_back(q, own)))
-            put(bodies.known_torque, i, sub(load(bodies.known_torque, i), turned_back(q, load(torques, i))))
-        smallest = min(inertia[0], min(inertia[1], inertia[2]))
-        rate = 2.0 * norm(force) / (bodies.mass[first] * flight_limits.smallest_radius)
-        square = max(square, max(rate, energy / smallest))
-    parameters[3][0] = square
+        square = max(square, squared_rate(bodies, first, force, energy, flight_limits.smallest_radius))
+    parameters[2][0] = math.sqrt(square)
     return 0

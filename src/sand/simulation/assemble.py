@@ -31,7 +31,7 @@ from ..integrate.parts import (
     StepParameters,
 )
 from ..integrate.program import Components
-from ..integrate.rigid_clusters import SAMPLES, RigidClusters, RigidLimits
+from ..integrate.rigid_clusters import RigidClusters, RigidLimits
 from ..integrate.rigid_driver import LARGEST_FLIGHT
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
@@ -41,7 +41,6 @@ from ..ramps import ramps_of
 from ..setup.from_frame import StrainedContacts
 from ..state.arrays import OVER_ALLOCATION, body_arrays
 from ..state.state import COMPARED, CUT_RADIUS
-from .body_engine import BodyEngine
 from .checks import check_system
 from .cluster_cutoff import follow_clusters
 from .driven import Driven, check_driven, driven_arrays
@@ -49,8 +48,8 @@ from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .new_state import new_state
 from .ramped import RampedForces
-from .rigid_engine import WAKE_QUICK_FROM, RigidEngine, list_gap, longest_step_awake
-from .substeps import Substeps
+from .rigid_engine import RigidEngine, list_gap, longest_step_awake
+from .substeps import SubstepEngine
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
 WIDE_FROM = 64
@@ -184,9 +183,8 @@ def build_engine(
     engine = Engine(*parts)
     if rigid:
         state.bodies = body_arrays(len(grains), in_gas=bool(by_type.gas))
-        engine = RigidEngine(*parts, inner=inner_engine(wrapped, forces, box, verlet, seed))
-        if parameters.flight_limits.substeps:
-            engine.substeps = substeps_of(engine)
+        inner = inner_engine(wrapped, forces, box, verlet, seed)
+        engine = SubstepEngine(*parts, inner=inner, part=part_engine(inner, parameters))
     if any(map(ramps_of, forces)):
         changing = functools.partial(
             _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
@@ -213,16 +211,12 @@ def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verl
     return build_engine(grains, near, box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False)
 
 
-def substeps_of(engine: RigidEngine) -> Substeps:
-    """Substeps by the loops of the engine of awake grains, with the limits of the steps of bodies."""
-    inner = engine.inner
-    assert inner is not None
-    names = (each.name for each in dataclasses.fields(Engine) if each.init)
-    settings: dict[str, Any] = {name: getattr(inner, name) for name in names}
-    limits = engine.parameters.flight_limits._replace(substeps=False, shortest_step=0.0)
-    given = {"flight_limits": limits, "criteria": engine.parameters.criteria}
-    settings["parameters"] = inner.parameters._replace(**given)
-    return Substeps(BodyEngine(**settings))
+def part_engine(inner: Engine, parameters: StepParameters) -> RigidEngine:
+    """The engine of substeps: the forces of the engine of awake grains, and the steps of bodies of these parameters."""
+    limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
+    own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
+    settings = {each.name: getattr(inner, each.name) for each in dataclasses.fields(Engine) if each.init}
+    return RigidEngine(**settings | {"parameters": own}, inner=inner)
 
 
 def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
@@ -231,25 +225,23 @@ def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grai
     In a gas a step is at most η τ, with the shortest stopping time τ of a grain, which no mode of a body falls below:
     the exact friction needs no short step, but drifts of half a step with the velocities before and after it let a free
     body diffuse too fast by h²/12τ², an error of the order of η² as that of the loads. Nor may noise alone move a grain
-    farther than `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations √(2 k_B T h/τ m).
+    farther than half of `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations √(2 k_B T h/τ m).
     """
     law, limits = (forces.contact or Contact()).contact_law, parameters.flight_limits
-    work = parameters.external_work
     longest, rate, gas = limits.longest_step, 0.0, parameters.gas.gas
     if forces.gas:
         rate = 1.0 / forces.gas[0].shortest_time(grains)
         spread = LARGEST_DEVIATE * math.sqrt(2.0 * gas.temperature_energy * rate / float(grains.mass.min()))
         longest = min(longest, limits.step_fraction / rate)
         if spread > 0.0:
-            longest = min(longest, (2.0 * LARGEST_FLIGHT * parameters.criteria.pair_gap / spread) ** (2.0 / 3.0))
+            longest = min(longest, (LARGEST_FLIGHT * parameters.criteria.pair_gap / spread) ** (2.0 / 3.0))
     awake = min(longest, longest_step_awake(law, parameters.settings, grains))
     return limits._replace(
         longest_step=longest,
         longest_awake=awake,
         smallest_radius=float(grains.radius.min()),
         friction_rate=rate,
-        shortest_step=awake / SAMPLES if len(grains) >= WAKE_QUICK_FROM else limits.shortest_step,
-        substeps=not (work.time_dependent or work.position_dependent),
+        substeps=True,
     )
 
 

@@ -27,10 +27,9 @@ from ..integrate.rigid_clusters import SAMPLES, RigidLimits
 from ..integrate.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
 from ..integrate.stages import finish_gas
 from ..integrate.step_control import INCREASE_INTERVAL
-from ..integrate.substeps import kick_by_slow_loads, place_all_velocities, split_loads
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
-from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, ContactArrays, cluster_arrays
+from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, cluster_arrays
 from ..state.state import (
     BODIES,
     BROKEN,
@@ -48,6 +47,7 @@ from ..state.state import (
     LONG_RANGE_SUMS,
     MADE,
     OUTSIDE,
+    PAIRS,
     QUIETING,
     RESTED,
     SETTLED,
@@ -70,12 +70,11 @@ from .bodies import (
     set_friction,
     sort_members,
 )
-from .body_engine import BodyEngine
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
+from .part import MOVING, MOVING_BODIES, copy_contacts, copy_grains, store_contacts, store_grains
 from .rigid_loads import may_stay_at_rest, rest_with_loads
-from .substeps import LOADS, Substeps
 
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
@@ -85,21 +84,14 @@ LIST_GAP, SHARE_OF_SPACING = 3.0, 0.3
 neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
 SLIP_LOSSES = slice(1, 4)
 """Rows of `ContactArrays.lost` that change when a contact slides, rolls or twists beyond a limit."""
-WAKE_QUICK_FROM = 2000
-"""Fewest grains with which bodies that need short steps wake, instead of shortening the steps of all bodies: a sum over
-all pairs then costs more than the contact steps of a few grains."""
 SPANS = (
     "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
     "rigid body, and takes contact steps all the time; use a larger box"
 )
-NOT_COPIED = ("pair", "constants", "every_step", "side", "start", "gather_order")
-CONTACT_COLUMNS = tuple(name for name in ContactArrays._fields if name not in NOT_COPIED)
-"""Arrays of contacts that the inner engine needs and changes; pairs are numbered anew, the others follow."""
-MOVING = ("position", "velocity", "orientation", "spin", "moment")
 
 
 @dataclass
-class RigidEngine(BodyEngine):
+class RigidEngine(Engine):
     """An engine whose clusters at rest move as rigid bodies.
 
     The state is that of all grains.  While clusters are awake, their grains are copied to a smaller state, on which
@@ -110,12 +102,9 @@ class RigidEngine(BodyEngine):
     ----------
     inner : Engine
         The engine of awake grains; its state is replaced as clusters wake and come to rest.
-    substeps : Substeps or None
-        Steps of the bodies that need shorter ones than all others.
     """
 
     inner: Engine | None = None
-    substeps: Substeps | None = None
     _inner_workers: WorkerThreads | None = field(init=False, default=None)
     _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
     _inner_grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # of the inner state
@@ -132,11 +121,7 @@ class RigidEngine(BodyEngine):
 
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
-        own = [(advance_bodies, ()), (mark_near_bodies, ())]
-        if self.substeps is not None:
-            loads = [np.zeros((3, 1)) for _ in LOADS]
-            own += [(kick_by_slow_loads, ()), (place_all_velocities, ()), (split_loads, (*loads, np.zeros(1)))]
-        return [*super()._drivers(), *own]
+        return [*super()._drivers(), (advance_bodies, ()), (mark_near_bodies, ())]
 
     def begin(self) -> None:
         """As `Engine.begin`; clusters start awake, single grains as bodies."""
@@ -178,9 +163,12 @@ class RigidEngine(BodyEngine):
 
     def _list_awake(self) -> None:
         """Lists of the grains of awake clusters, and of their contacts."""
-        contacts, used = self._state.contacts, int(self._state.count[CONTACTS])
-        self._awake = np.flatnonzero(self._state.bodies.asleep == 0)
-        self._columns = np.flatnonzero(self._state.bodies.asleep[contacts.pair[0, :used]] == 0)
+        awake = self._state.bodies.asleep == 0
+        self._awake, self._columns = np.flatnonzero(awake), self._contacts_of(awake)
+
+    def _contacts_of(self, chosen: np.ndarray) -> np.ndarray:
+        """Columns of the contacts of some clusters; `chosen` says (N,) which grains are theirs."""
+        return np.flatnonzero(chosen[self._state.contacts.pair[0, : self._state.count[CONTACTS]]])
 
     def _sum_outer_loads(self) -> None:
         """Sum the loads of all bodies on each other."""
@@ -191,6 +179,18 @@ class RigidEngine(BodyEngine):
         self._bodies_driver(-math.inf, state.steps + 1)
         state.clock[TIME], state.count[LONG_RANGE_SUMS] = before, sums
 
+    def _bodies_driver(self, until: float, last: float, shorten: bool = False) -> Stop:
+        """Call the driver of bodies; enlarges arrays that overflow."""
+        while True:
+            stop = self._run_program(advance_bodies, until, last, shorten)
+            if stop is Stop.PAIRS_FULL:
+                found, self._state.count[PAIRS] = int(self._state.count[PAIRS]), 0
+                self._state.grow_pairs(int(1.1 * found))
+            elif stop is Stop.LIST_FULL:
+                self._state.grow_rows()
+            else:
+                return stop
+
     def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """One call of the driver: of all grains before the first step, else of bodies and awake clusters."""
         state = self._state
@@ -200,7 +200,7 @@ class RigidEngine(BodyEngine):
         before: dict[str, np.ndarray] = {}
         while True:
             if self._awake.size and state.count[STAGE] == 0:
-                before = {name: array.copy() for name, array in state.to_arrays().items()}
+                before = {name: array.copy() for name, array in _moving_arrays(state).items()}
             stop = self._bodies_driver(until, last, shorten)
             if stop is Stop.TOUCH_AHEAD:
                 self._wake()
@@ -211,13 +211,6 @@ class RigidEngine(BodyEngine):
                     return failed
             elif stop is Stop.AWAKE_LOADS:
                 self._finish_step()
-            elif stop is Stop.SUBSTEPS:
-                assert self.substeps is not None
-                failed = self.substeps.take(state, self._current_table(state))
-                if failed is Stop.TOUCH_AHEAD:
-                    self._wake()
-                elif failed is not Stop.NONE:
-                    return failed
             else:
                 return stop
 
@@ -244,27 +237,12 @@ class RigidEngine(BodyEngine):
             self._inner_grains = index.copy()
             self._measures = cluster_measures(len(index))
             self._remainder = np.zeros((2, 3, len(index)))
-        for name, array in present.grains.arrays._asdict().items():
-            array[...] = getattr(state.grains.arrays, name)[..., index]
-        used = len(self._columns)
-        if present.contacts.pair.shape[1] < used:
-            present.grow_contacts(used)
-        local = np.zeros(len(state.grains), np.uint32)
-        local[index] = np.arange(len(index))
-        contacts = present.contacts
-        contacts.pair[:, :used] = local[state.contacts.pair[:, self._columns]]
-        for name in CONTACT_COLUMNS:
-            if getattr(contacts, name).shape[-1]:
-                getattr(contacts, name)[..., :used] = getattr(state.contacts, name)[..., self._columns]
-        if state.uniform_contacts:
-            contacts.constants[...] = state.contacts.constants
-        else:
-            contacts.constants[:, :used] = state.contacts.constants[:, self._columns]
-        contacts.every_step[:] = 0
         present.count[:] = 0
+        copy_grains(state, present, index)
+        copy_contacts(state, present, index, self._columns)
         present.clock[:] = 0.0
         present.lost[:] = 0.0
-        present.count[CONTACTS], present.count[COMPARED] = used, -1
+        present.count[COMPARED] = -1
         present.count[CHECKED] = present.count[STEP_INCREASES] = -INCREASE_INTERVAL
         # the kicks of the gas are counted with the steps of grains, so that no random number is used twice
         present.count[CONTACT_STEPS] = state.count[CONTACT_STEPS]
@@ -299,7 +277,7 @@ class RigidEngine(BodyEngine):
         if self.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in self.external:
-                state.lost[OUTSIDE] += self._external_energy(outer, end) - self._external_energy(outer, before)
+                state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
         present.count[STAGE] = 1
         present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
         inner._drive(-math.inf, 1)
@@ -325,7 +303,8 @@ class RigidEngine(BodyEngine):
         assert self.inner is not None
         state, awake, count = self._state, self._awake, self.inner._state.count
         limiting = [int(count[grain]) for grain in (GRAIN1, GRAIN2)]
-        state.from_arrays(before)
+        for name, array in _moving_arrays(state).items():
+            array[...] = before[name]
         self._sort_members()
         for grain, own in zip((GRAIN1, GRAIN2), limiting, strict=True):
             state.count[grain] = awake[own] if 0 <= own < len(awake) else -1
@@ -350,26 +329,45 @@ class RigidEngine(BodyEngine):
         if self.parameters.gas.gas.on:
             finish_gas.run(self._inner_table(present))
 
-    def _external_energy(self, outer: Any, time: float) -> float:
-        """Energy [J] of an external force of the awake grains where they are."""
-        assert self.inner is not None
-        shares = np.zeros(len(self._awake))
-        external_energies_for(outer.formula).run(
-            self.inner._current_table(self.inner._state), (outer.numbers(), time, shares)
-        )
-        return math.fsum(shares)
-
     def _kick_awake(self, present: State) -> None:
         """Half a kick of the awake clusters by the loads of all grains that the inner engine does not sum."""
-        assert self.inner is not None
         full = self._state.long_range
         if not full.force.size:
             return
         self._remainder[0] = full.force[:, self._awake] - present.long_range.force
         self._remainder[1] = full.torque[:, self._awake] - present.long_range.torque
+        self._kick(present, float(self._state.clock[STEP]))
+
+    def _kick(self, present: State, step: float) -> None:
+        """Half a kick of the awake clusters by the loads `_remainder`, for a step [s]."""
         table = self._inner_table(present)
-        table["scratch"][DT] = 0.5 * self._state.clock[STEP]
+        table["scratch"][DT] = 0.5 * step
         kick_clusters.run(table, (self._remainder,))
+
+    def kick_awake(self, force: np.ndarray, torque: np.ndarray, step: float) -> None:
+        """Half a kick of the awake clusters between steps.
+
+        Parameters
+        ----------
+        force : ndarray
+            (3, N) forces on the grains of the state [N].
+        torque : ndarray
+            (3, N) torques [N m].
+        step : float
+            Length of the step [s].
+        """
+        self._list_awake()
+        if not self._awake.size:
+            return
+        present = self._inner_state()
+        self._remainder[0], self._remainder[1] = force[:, self._awake], torque[:, self._awake]
+        self._kick(present, step)
+        self._store_velocities(present)
+
+    def _store_velocities(self, present: State) -> None:
+        """Copy velocities and spins of awake grains to the state of all grains."""
+        for name in ("velocity", "spin"):
+            getattr(self._state.grains.arrays, name)[..., self._awake] = getattr(present.grains.arrays, name)
 
     def _inner_table(self, present: State) -> Table:
         """The table of the inner engine with the present arrays."""
@@ -379,17 +377,10 @@ class RigidEngine(BodyEngine):
     def _copy_back(self, present: State) -> None:
         """Copy awake grains and their contacts to the state of all grains, with counts and losses."""
         state, index = self._state, self._awake
-        for name in MOVING:
-            getattr(state.grains.arrays, name)[..., index] = getattr(present.grains.arrays, name)
-        made, broken = int(present.count[MADE]), int(present.count[BROKEN])
-        used = int(present.count[CONTACTS])
-        self._note_slips(present, used)
-        if made == 0 and broken == 0:
-            for name in CONTACT_COLUMNS:
-                if getattr(state.contacts, name).shape[-1]:
-                    getattr(state.contacts, name)[..., self._columns] = getattr(present.contacts, name)[..., :used]
-        else:
-            self._replace_contacts(present, used)
+        store_grains(state, present, index)
+        changed = present.count[MADE] + present.count[BROKEN] > 0
+        self._note_slips(present, int(present.count[CONTACTS]))
+        self._columns = store_contacts(state, present, index, self._columns, changed=bool(changed))
         for number in (MADE, BROKEN, SLIPPED):
             state.count[number] += present.count[number]
         state.count[CONTACT_STEPS] += present.count[STEPS]
@@ -412,38 +403,13 @@ class RigidEngine(BodyEngine):
             if before.get(frozenset(self._awake[pair].tolist())) != now.tobytes():
                 self._slipped[pair] = True
 
-    def _replace_contacts(self, present: State, used: int) -> None:
-        """Contacts of all grains after some formed or broke: those at rest, then those of awake grains."""
-        state, contacts = self._state, self._state.contacts
-        total = int(state.count[CONTACTS])
-        kept = np.setdiff1d(np.arange(total), self._columns)
-        if contacts.pair.shape[1] < len(kept) + used:
-            state.grow_contacts(len(kept) + used)
-            contacts = state.contacts
-        first, end = len(kept), len(kept) + used
-        pairs = self._awake[present.contacts.pair[:, :used]]
-        for name in ("pair", *CONTACT_COLUMNS, "constants"):
-            array = getattr(contacts, name)
-            if not array.shape[-1]:
-                continue
-            if name == "constants" and state.uniform_contacts:
-                array[...] = present.contacts.constants
-                continue
-            array[..., :first] = array[..., kept]
-            array[..., first:end] = pairs if name == "pair" else getattr(present.contacts, name)[..., :used]
-        state.count[CONTACTS] = end
-        state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
-        resort_contacts_by_grain(state.grains.arrays, contacts, state.count)
-        self._columns = np.arange(first, end)
-
     def _finish_step(self) -> None:
         """The second half kick of awake clusters; clusters that are at rest become bodies."""
         assert self.inner is not None
         state, inner, bodies = self._state, self.inner, self._state.bodies
         present = inner._state
         self._kick_awake(present)
-        for name in ("velocity", "spin"):
-            getattr(state.grains.arrays, name)[..., self._awake] = getattr(present.grains.arrays, name)
+        self._store_velocities(present)
         measures = self._measures
         self._measure_vibrations(present)
         clusters, firsts = self._awake_clusters(), self._awake[measures.first.astype(np.int64)]
@@ -534,6 +500,20 @@ class RigidEngine(BodyEngine):
         if self.parameters.gas.gas.on:
             set_friction(state, self.parameters.gas.gas, index)
         state.count[RESTED] += 1
+
+
+def external_energy(engine: Engine, outer: Any, time: float) -> float:
+    """Energy [J] of an external force on the grains of the state of an engine, at a time [s]."""
+    shares = np.zeros(len(engine._state.grains))
+    external_energies_for(outer.formula).run(engine._current_table(engine._state), (outer.numbers(), time, shares))
+    return math.fsum(shares)
+
+
+def _moving_arrays(state: State) -> dict[str, np.ndarray]:
+    """Arrays that change in a step of bodies, but for forces and lists, before awake grains are copied back."""
+    found = {name: getattr(state.grains.arrays, name) for name in MOVING}
+    found |= {f"bodies/{name}": getattr(state.bodies, name) for name in MOVING_BODIES}
+    return found | {"clock": state.clock, "count": state.count, "lost": state.lost}
 
 
 def list_gap(grains: Grains, box: Box) -> float:

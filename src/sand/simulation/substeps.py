@@ -1,153 +1,232 @@
-"""Substeps of the bodies whose loads change fast: a smaller state, and an engine that moves them."""
+"""The engine of rigid clusters whose bodies take steps of two lengths, see `integrate.substeps`."""
 
 from __future__ import annotations
 
-import copy
 import math
-from dataclasses import fields
-from typing import Any
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
 
 import numpy as np
 
+from ..compiler.stage import Stage
+from ..contact.gather import resort_contacts_by_grain
 from ..integrate.parts import Stop
-from ..integrate.substeps import AFTER_SUBSTEPS, kick_by_slow_loads, place_all_velocities, split_loads
+from ..integrate.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
 from ..state.arrays import SAVED_BODIES, body_arrays
-from ..state.state import COMPARED, GRAIN1, GRAIN2, LARGEST_LOAD, LATE, STAGE, STEP, STEPS, SUBSTEPS, TIME, State
-from .bodies import sort_members
-from .body_engine import BodyEngine
+from ..state.state import (
+    BROKEN,
+    COMPARED,
+    CONTACT_STEPS,
+    CORRECTED,
+    GRAIN1,
+    GRAIN2,
+    GRAINS_AWAKE,
+    KICKED,
+    LARGEST_LOAD,
+    LATE,
+    MADE,
+    OUTSIDE,
+    RESTED,
+    SETTLED,
+    SLIPPED,
+    SOME_AWAKE,
+    STAGE,
+    STEP,
+    STEPS,
+    SUBSTEPS,
+    TIME,
+    WOKEN,
+    State,
+)
 from .changed_state import subset
+from .engine import Engine
 from .new_state import new_state
+from .part import copy_contacts, copy_grains, store_contacts, store_grains
+from .rigid_engine import RigidEngine, external_energy
 
-MOVED = ("position", "velocity", "orientation", "spin", "moment")
-MOVED_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
 COPIED_BODIES = (*SAVED_BODIES, "decay", "mode")
 LOADS = ("force", "torque", "field")
+COUNTED = (MADE, BROKEN, SLIPPED, WOKEN, RESTED, LATE)
 LEAST_RATE = 1e-30
 """Slowest rate of change of a load [1/s]."""
-MOST_STEPS = 2**62
-MOST_ENGINES = 64
+MOST_PARTS = 64
 """Engines of different numbers of grains that are kept for further use."""
 
+Kind = TypeVar("Kind", bound=Engine)
 
-class Substeps:
-    """Steps of the bodies that are marked as quick, within one step of all bodies.
 
-    Parameters
+@dataclass
+class SubstepEngine(RigidEngine):
+    """An engine of rigid clusters in which quick bodies and awake clusters may take substeps within a step of all.
+
+    For their substeps their grains are copied to a smaller state, which another engine advances.  A step begins and
+    ends with all grains in the state of this engine, which alone is saved.
+
+    Attributes
     ----------
-    engine : BodyEngine
-        An engine without awake clusters, whose forces act between the nearest images of all pairs of grains.
+    part : RigidEngine
+        The engine from which those of the substeps are made, with forces between nearest images of all pairs.
     """
 
-    def __init__(self, engine: BodyEngine):
-        self.engine, self._engines = engine, dict[int, BodyEngine]()
+    part: RigidEngine | None = None
+    _parts: dict[int, RigidEngine] = field(init=False, default_factory=dict)  # engines by number of grains
+    _had_substeps: bool = field(init=False, default=False)  # of the present step
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Substeps:
-        return Substeps(copy.deepcopy(self.engine, memo))
+    def _drivers(self) -> list[tuple[Stage, Any]]:
+        """As `RigidEngine._drivers`, with the stages of substeps."""
+        vectors = np.zeros((3, 1))
+        own = [(kick_by_slow_loads, ()), (place_all_velocities, ()), (find_slow_rate, (vectors, vectors, np.zeros(1)))]
+        return [*super()._drivers(), *own]
 
-    def take(self, state: State, table: Any) -> Stop:
-        """Take the first half of a step of all bodies, and the substeps of the quick ones in it.
+    def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
+        """As `RigidEngine._call_driver`, with substeps."""
+        while True:
+            stop = super()._call_driver(until, last, shorten)
+            if stop is not Stop.SUBSTEPS:
+                return stop
+            failed = self._take_substeps()
+            if failed is not Stop.NONE:
+                return failed
+
+    def _take_contact_steps(self) -> Stop:
+        """As `RigidEngine._take_contact_steps`: the present step has no substeps."""
+        self._had_substeps = False
+        return super()._take_contact_steps()
+
+    def _finish_step(self) -> None:
+        """As `RigidEngine._finish_step`; awake clusters that had substeps only get their kick."""
+        if not self._had_substeps:
+            return super()._finish_step()
+        grains, bodies = self._state.grains.arrays, self._state.bodies
+        slow = grains.force - bodies.excluded_force, grains.torque - bodies.excluded_torque
+        return self.kick_awake(*slow, float(self._state.clock[STEP]))
+
+    def _take_substeps(self) -> Stop:
+        """The first half of a step of all bodies, and the substeps of the quick ones to its end.
 
         Returns
         -------
         Stop
-            NONE if they have arrived at the end of the step, which is shorter if a touch is ahead.  Otherwise no step
-            was begun: TOUCH_AHEAD, with the bodies marked that have to wake, or why the substeps failed.
+            `NONE`, or why the substeps failed; the state then is that before the step.
         """
-        bodies, step = state.bodies, float(state.clock[STEP])
-        index = np.flatnonzero(bodies.quick[bodies.first])
-        before = bodies.momentum.copy(), bodies.angular_momentum.copy()
-        stop = Stop.NONE
-        while stop is not Stop.TIME_REACHED:
-            engine = self._copy(state, index)
-            own = engine._state
-            step = min(step, self._longest_step(state, engine, index))
-            try:
-                bodies.quick_force[:, index], bodies.quick_torque[:, index] = (
-                    own.grains.arrays.force,
-                    own.grains.arrays.torque,
-                )
-                state.clock[STEP] = step
-                kick_by_slow_loads.run(table)
-                stop = self._run(state, engine, index, state.time + step)
-            finally:
-                if stop is not Stop.TIME_REACHED:
-                    bodies.momentum[...], bodies.angular_momentum[...] = before
-            step = own.time - state.time
-            if stop not in (Stop.TIME_REACHED, Stop.TOUCH_AHEAD) or step <= 0.0:
-                self._tell(state, own, index)
-                return stop
-        self._store(state, own, index)
+        state, bodies = self._state, self._state.bodies
+        is_quick = bodies.quick[bodies.first] == 1
+        index, contacts = np.flatnonzero(is_quick), self._contacts_of(is_quick)
+        part = self._copy(index, contacts)
+        own, before = part._state, (bodies.momentum.copy(), bodies.angular_momentum.copy())
+        self._exclude_loads(part, index)
+        step, stop = float(state.clock[STEP]), Stop.NONE
+        try:
+            kick_by_slow_loads.run(self._current_table(state))
+            for name in ("momentum", "angular_momentum"):
+                getattr(bodies, name).take(index, axis=1, out=getattr(own.bodies, name))
+            place_all_velocities.run(part._current_table(own))
+            part.kick_awake(own.bodies.excluded_force, own.bodies.excluded_torque, step)
+            stop = part._drive(state.time + step, math.inf, shorten=True)
+        finally:
+            if stop is not Stop.TIME_REACHED:
+                bodies.momentum[...], bodies.angular_momentum[...] = before
+                bodies.quick[:] = 0
+        if stop is not Stop.TIME_REACHED:
+            for grain in (GRAIN1, GRAIN2):
+                number = int(own.count[grain])
+                state.count[grain] = index[number] if 0 <= number < len(index) else -1
+            return stop
+        self._store(part, index, contacts)
         return Stop.NONE
 
-    def _copy(self, state: State, index: np.ndarray) -> BodyEngine:
-        """An engine with these grains and their bodies, with the loads that they and external forces have on them."""
-        engine = self._engines.get(len(index)) or self._new_engine(state, index)
-        own = engine._state
-        for name, array in own.grains.arrays._asdict().items():
-            getattr(state.grains.arrays, name).take(index, axis=-1, out=array)
+    def _copy(self, index: np.ndarray, contacts: np.ndarray) -> RigidEngine:
+        """An engine with these grains and their bodies, and the loads that they and external forces have on them."""
+        state = self._state
+        part = self._parts.get(len(index)) or self._new_part(index)
+        own = part._state
+        own.count[:], own.clock[:], own.lost[:] = 0, 0.0, 0.0
+        copy_grains(state, own, index)
+        copy_contacts(state, own, index, contacts)
         for name in COPIED_BODIES:
             if getattr(state.bodies, name).size:
                 getattr(state.bodies, name).take(index, axis=-1, out=getattr(own.bodies, name))
         own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
-        own.count[:], own.clock[:], own.lost[:] = 0, 0.0, 0.0
-        sort_members(own)
-        own.clock[TIME], own.count[STAGE], own.count[COMPARED] = state.time, 1, -1
-        own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]
+        own.bodies.excluded_force[...] = own.bodies.excluded_torque[...] = 0.0
         own.pair_list.anchor[...] = math.inf
-        engine._bodies_driver(-math.inf, 1)
-        return engine
+        own.count[COMPARED], own.count[CONTACT_STEPS] = -1, state.count[CONTACT_STEPS]
+        # the random numbers of a gas are counted with steps and substeps
+        own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]
+        own.clock[TIME] = own.clock[KICKED] = state.time
+        own.clock[SETTLED] = state.clock[SETTLED]
+        part._sort_members()
+        if len(contacts):
+            resort_contacts_by_grain.run(part._current_table(own))
+        part._sum_outer_loads()
+        return part
 
-    def _new_engine(self, state: State, index: np.ndarray) -> BodyEngine:
-        """An engine for so many grains, which is kept: a table of other arrays is slow to fill."""
-        given = self.engine
-        own = new_state(
-            subset(state.grains, index), state.box, given.parameters, given._components, 0, over_all_pairs=True
-        )
-        own.uniform_contacts = state.uniform_contacts
-        own.bodies = body_arrays(len(index), in_gas=bool(state.bodies.decay.size))
-        names = [each.name for each in fields(given) if each.init]
-        engine = type(given)(own, *(getattr(given, name) for name in names[1:]))
-        engine._workers = None  # few grains share no work between threads
-        if len(self._engines) == MOST_ENGINES:
-            self._engines.clear()
-        self._engines[len(index)] = engine
-        return engine
+    def _new_part(self, index: np.ndarray) -> RigidEngine:
+        """An engine for so many grains, which is kept: the table of an engine is slow to fill with other arrays."""
+        given = self.part
+        assert given is not None and given.inner is not None
+        grains, components = subset(self._state.grains, index), given._components
+        state = new_state(grains, self._state.box, given.parameters, components, 0, over_all_pairs=True)
+        state.uniform_contacts = self._state.uniform_contacts
+        state.bodies = body_arrays(len(index), in_gas=bool(self._state.bodies.decay.size))
+        part = _with_state(given, state)
+        part.inner, part.warnings = _with_state(given.inner, given.inner._state), self.warnings
+        if len(self._parts) == MOST_PARTS:
+            self._parts.clear()
+        self._parts[len(index)] = part
+        return part
 
-    def _longest_step(self, state: State, engine: BodyEngine, index: np.ndarray) -> float:
-        """Longest step [s] of all bodies that the loads on the quick ones allow which do not act in substeps."""
-        split = [getattr(state.grains.arrays, name).take(index, axis=1) for name in LOADS]
-        for loads, name in zip(split, LOADS, strict=True):
-            loads -= getattr(engine._state.grains.arrays, name)
-        square = np.zeros(1)
-        split_loads.run(engine._current_table(engine._state), (*split, square))
-        return float(engine.parameters.flight_limits.step_fraction) / max(math.sqrt(square[0]), LEAST_RATE)
+    def _exclude_loads(self, part: RigidEngine, index: np.ndarray) -> None:
+        """Divide the loads on the quick bodies into those of substeps and others, which may shorten the step."""
+        state, own = self._state, part._state
+        slow = [getattr(state.grains.arrays, name).take(index, axis=1) for name in LOADS]
+        for loads, name in zip(slow, LOADS, strict=True):
+            loads -= getattr(own.grains.arrays, name)
+        rate = np.zeros(1)
+        find_slow_rate.run(part._current_table(own), (slow[0], slow[2], rate))
+        longest = self._limits.step_fraction / max(float(rate[0]), LEAST_RATE)
+        state.clock[STEP] = min(state.clock[STEP], longest)
+        for name, held in (("force", slow[0]), ("torque", slow[1])):
+            acting, excluded = getattr(own.grains.arrays, name), f"excluded_{name}"
+            getattr(state.bodies, excluded)[:, index] = acting
+            getattr(own.bodies, excluded)[...] = held
+            acting += held
 
-    def _run(self, state: State, engine: BodyEngine, index: np.ndarray, until: float) -> Stop:
-        """Take substeps until a time [s]."""
-        for name in ("momentum", "angular_momentum"):
-            getattr(state.bodies, name).take(index, axis=1, out=getattr(engine._state.bodies, name))
-        place_all_velocities.run(engine._current_table(engine._state))
-        return engine._bodies_driver(until, MOST_STEPS, shorten=True)
-
-    def _store(self, state: State, own: State, index: np.ndarray) -> None:
-        """Copy bodies and grains back, with the loads that have acted in the last substep."""
-        for name in MOVED:
-            getattr(state.grains.arrays, name)[:, index] = getattr(own.grains.arrays, name)
-        for name in MOVED_BODIES:
-            getattr(state.bodies, name)[:, index] = getattr(own.bodies, name)
-        state.bodies.quick_force[:, index] = own.grains.arrays.force
-        state.bodies.quick_torque[:, index] = own.grains.arrays.torque
+    def _store(self, part: RigidEngine, index: np.ndarray, contacts: np.ndarray) -> None:
+        """Copy grains, contacts and bodies back, the loads that acted in the last substep, and what was counted."""
+        state, own, bodies = self._state, part._state, self._state.bodies
+        store_grains(state, own, index)
+        changed = bool(own.count[MADE] + own.count[BROKEN])
+        store_contacts(state, own, index, contacts, changed=changed)
+        own.bodies.first[:] = index[own.bodies.first]
+        for name in COPIED_BODIES:
+            if getattr(bodies, name).size:
+                getattr(bodies, name)[..., index] = getattr(own.bodies, name)
+        bodies.quick[index] = 1
+        bodies.excluded_force[:, index] = own.grains.arrays.force - own.bodies.excluded_force
+        bodies.excluded_torque[:, index] = own.grains.arrays.torque - own.bodies.excluded_torque
+        if changed or own.count[WOKEN] + own.count[RESTED]:
+            self._sort_members()
+        if self.parameters.external_work.time_dependent:
+            # the drift of all other bodies will book the change of these energies once more
+            end = state.time + float(state.clock[STEP])
+            for outer in self.external:
+                state.lost[OUTSIDE] += external_energy(part, outer, end) - external_energy(part, outer, state.time)
         state.lost += own.lost
+        for number in COUNTED:
+            state.count[number] += own.count[number]
+        state.count[CONTACT_STEPS] = own.count[CONTACT_STEPS]
         state.count[SUBSTEPS] += own.count[STEPS]
-        state.count[LATE] += own.count[LATE]
+        state.clock[SOME_AWAKE] += own.clock[SOME_AWAKE]
+        state.clock[GRAINS_AWAKE] += own.clock[GRAINS_AWAKE] * len(index) / len(state.grains)
+        state.clock[CORRECTED] += own.clock[CORRECTED]
+        state.clock[SETTLED] = own.clock[SETTLED]
         state.clock[LARGEST_LOAD] = max(state.clock[LARGEST_LOAD], own.clock[LARGEST_LOAD])
-        state.count[STAGE] = AFTER_SUBSTEPS
+        state.count[STAGE], self._had_substeps = AFTER_SUBSTEPS, True
 
-    @staticmethod
-    def _tell(state: State, own: State, index: np.ndarray) -> None:
-        """Mark the bodies that have to wake, or name the grains that caused the failure."""
-        state.bodies.quick[:] = 0
-        state.bodies.near[index] = own.bodies.near
-        for grain in (GRAIN1, GRAIN2):
-            number = int(own.count[grain])
-            state.count[grain] = index[number] if 0 <= number < len(index) else -1
+
+def _with_state(engine: Kind, state: State) -> Kind:
+    """An engine with the settings of another, a state and a table of its own, and no threads."""
+    settings = {each.name: getattr(engine, each.name) for each in fields(engine) if each.init}
+    made = type(engine)(**settings | {"_state": state})
+    made._workers = None
+    return made

@@ -154,8 +154,8 @@ class BodyArrays(NamedTuple):
     near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `integrate.rigid_driver`
     rate: np.ndarray  # (N,) square of the largest rate that limits the step of a body [1/s²]
     quick: np.ndarray  # (N,) uint8: whether a body takes substeps within the present step, see `integrate.substeps`
-    quick_force: np.ndarray  # (3, N) force on a grain that acts in substeps; 0 for all others [N]
-    quick_torque: np.ndarray  # (3, N) likewise [N m]
+    excluded_force: np.ndarray  # (3, N) force on a grain that does not kick its body, see `integrate.substeps` [N]
+    excluded_torque: np.ndarray  # (3, N) likewise [N m]
 
 
 LOADS_OF_BODIES = ("rest_force", "rest_torque", "known_force", "known_torque")
@@ -301,7 +301,7 @@ def body_arrays(grains: int, *, in_gas: bool = False) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
     vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
     widths = dict.fromkeys((*vectors, *LOADS_OF_BODIES, "inner_field", "force", "torque"), 3)
-    widths |= {"quick_force": 3, "quick_torque": 3}
+    widths |= {"excluded_force": 3, "excluded_torque": 3}
     widths |= {"orientation": 4, "turn": 4, "strength": 2}
     found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
     for name, kind in {"first": np.uint32, "member": np.uint32, **dict.fromkeys(FLAGS_OF_BODIES, np.uint8)}.items():
