@@ -116,7 +116,7 @@ def test_the_bound_of_contact_loads_holds_for_every_contact_of_a_tumbling_chain(
     grains.force *= loaded
     grains.torque *= loaded
     loads = Arrays(**vars(grains))
-    sum_body_loads(loads, bodies, number)
+    sum_body_loads(loads, bodies, number, False)
     bound = contact_loads_bound(loads, bodies, 0)
     angular = axes @ bodies.angular_momentum[:, 0]
     spin = np.linalg.solve(tensor, angular)

@@ -1,0 +1,201 @@
+"""Substeps of quick bodies and awake clusters within a step of all bodies, in gases so thin that they pay."""
+
+import json
+
+import numpy as np
+import pytest
+
+import sand
+from sand.integrate.parts import Stop
+from sand.simulation.substeps import SubstepEngine
+from sand.state.state import LATE, MADE, RESTED, SOME_AWAKE, STEPS, SUBSTEPS, WOKEN
+
+SIDE = "12 um"
+COMPILED = pytest.mark.compiled("dipoles")
+
+
+def thin_gas(*forces, box=SIDE, dipoles=None, seed=1, substeps=True, fraction=0.1, **options):
+    """A thousand magnetic iron grains in (12 µm)³: a pair touches every 0.1 µs."""
+    iron = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg"}
+    extent = SIDE if box is None else None
+    grains = sand.setup.gas(1000, box, extent=extent, temperature="100 K", seed=seed, **iron)
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns")
+    stepping = sand.RigidClusters(step_fraction=fraction)
+    forces = [contact, dipoles or sand.Dipoles(), *forces]
+    sim = sand.Simulation(grains, forces, box=box, stepping=stepping, **{"frame_every": 1.0} | options)
+    if not substeps:
+        limits = sim._engine.parameters.flight_limits._replace(substeps=False)
+        sim._engine._table.set("flight_limits", limits)
+    return sim
+
+
+def counts(sim, *numbers):
+    return [int(sim.regular_state.count[k]) for k in numbers]
+
+
+def different(first, second):
+    """Names of arrays of two regular states that differ in a bit."""
+    one, other = first.regular_state.to_arrays(), second.regular_state.to_arrays()
+    return [name for name in one if one[name].tobytes() != other[name].tobytes()]
+
+
+@COMPILED
+@pytest.mark.parametrize("dipoles", [sand.Dipoles(), sand.Dipoles(periodic="ewald", accuracy=1e-4)], ids=str)
+def test_substeps_are_of_order_two_and_as_accurate_as_steps_of_all(dipoles):
+    """Positions after 0.2 µs, in which two contacts form, against steps of all bodies with an eighth of η.
+
+    Both ways err by η², so by a factor of 4 for half of η, if touches do not spoil it: 2.5 … 7.  With a fifth of the
+    steps of all bodies, substeps err by no more than twice as much.  The cut-off of dipoles in the other way lies half
+    an interval of steps later, hence the bound of 2.
+    """
+    exact = thin_gas(dipoles=dipoles, substeps=False, fraction=0.0125)
+    plain = thin_gas(dipoles=dipoles, substeps=False)
+    runs = [thin_gas(dipoles=dipoles, fraction=fraction) for fraction in (0.1, 0.05)]
+    for sim in (exact, plain, *runs):
+        sim.run(until="0.2 us")
+        assert counts(sim, MADE, LATE) == [2, 0] and sim.ledger.drift < 1e-3
+    errors = [
+        np.linalg.norm(sim.box.nearest(sim.grains.position - exact.grains.position), axis=1).max()
+        for sim in (plain, *runs)
+    ]
+    assert 2.5 < errors[1] / errors[2] < 7.0
+    assert errors[1] < 2.0 * errors[0] < 1e-9
+    assert counts(plain, SUBSTEPS) == [0] and runs[0].steps < 0.2 * plain.steps
+    assert counts(runs[0], SUBSTEPS)[0] > 5 * runs[0].steps
+
+
+@COMPILED
+def test_contacts_form_between_the_same_grains_at_the_same_times():
+    """0.6 µs with and without substeps: the same pairs, within 0.2 ns; what touches wakes and comes to rest.
+
+    Times err by η²: the largest difference is 0.7 ns with η = 0.1 (of a pair that falls slowly into each other), and a
+    sixteenth of this with the η = 0.025 used here.
+    """
+    runs = [thin_gas(substeps=substeps, fraction=0.025) for substeps in (True, False)]
+    found = []
+    for sim in runs:
+        sim.run(until="0.6 us")
+        table = sim.contacts
+        order = np.lexsort(np.sort(table["pair"], axis=1).T)
+        found.append((np.sort(table["pair"], axis=1)[order], table["formed"][order]))
+    (pairs, times), (expected, at) = found
+    assert len(pairs) > 4 and np.array_equal(pairs, expected)
+    assert np.abs(times - at).max() < 2e-10
+    assert counts(runs[0], WOKEN, RESTED, LATE) == counts(runs[1], WOKEN, RESTED, LATE)
+    share = [sim.regular_state.clock[SOME_AWAKE] / sim.time for sim in runs]
+    assert share[0] == pytest.approx(share[1], rel=0.1, abs=0.0) and share[1] > 0.01
+
+
+@COMPILED
+def test_momenta_are_conserved_to_rounding():
+    """An open gas in which contacts form: Σ m v and Σ (m x×v + I ω) stay what they were.
+
+    Every load acts on both of a pair at one time.  Each of some 1200 steps and substeps rounds every momentum once, by
+    1e-16 of it, and 2000 momenta of either sign are added: 1e-16 √1200 of Σ|m v|, 4e-15.
+    """
+    sim = thin_gas(box=None, dipoles=sand.Dipoles(cutoff=None))
+    sim.run(steps=1)
+
+    def momenta():
+        g = sim.regular_state.grains
+        p = g.mass[:, None] * g.velocity
+        return p, np.cross(g.position, p) + g.inertia[:, None] * g.spin
+
+    start = momenta()
+    sim.run(until="0.6 us")
+    assert counts(sim, MADE)[0] > 2 and counts(sim, SUBSTEPS)[0] > 2 * sim.steps
+    for before, after in zip(start, momenta(), strict=True):
+        assert np.linalg.norm((after - before).sum(axis=0)) < 4e-15 * np.linalg.norm(before, axis=1).sum()
+
+
+@COMPILED
+def test_restart_output_and_threads_change_no_bit(tmp_path):
+    """A run with many frames and three restarts, on two threads, has the bits of a whole one on one thread."""
+    whole, parts = thin_gas(), thin_gas(out=tmp_path / "run", frame_every="7 ns")
+    sand.set_threads(1)
+    whole.run(until="0.5 us")
+    sand.set_threads(2)
+    for time in ("0.11 us", "0.2345 us", "0.4 us", "0.5 us"):
+        parts.run(until=time)
+        parts = sand.resume(tmp_path / "run")
+    assert different(whole, parts) == [] and counts(whole, MADE)[0] > 3 and counts(whole, SUBSTEPS)[0] > 100
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))["rigid_clusters"]
+    assert summary["substeps_of_bodies"] == counts(parts, SUBSTEPS)[0]
+
+
+@COMPILED
+def test_numbers_of_the_noise_of_a_gas_are_used_once(monkeypatch):
+    """Noise depends on the number of the step: those of the substeps follow each other, and energy is booked.
+
+    After 4 stopping times of 0.1 µs the kinetic energy of bodies is 3/2 k_B T, to four standard errors √(3/2N) k_B T.
+    """
+    used = []
+    store = SubstepEngine._store
+
+    def record(self, part, index, contacts):
+        own = part._state.count
+        used.append((int(own[SUBSTEPS]), int(own[SUBSTEPS] + own[STEPS])))
+        store(self, part, index, contacts)
+
+    monkeypatch.setattr(SubstepEngine, "_store", record)
+    sim = thin_gas(sand.Gas("100 K", pressure="2.1 bar"))
+    assert 8e-8 < 1.0 / sim._engine.parameters.flight_limits.friction_rate < 1.2e-7
+    sim.run(until="0.4 us")
+    first, end = np.array(used).T
+    assert len(used) > 20 and (end > first).all() and (first[1:] > end[:-1]).all()
+    assert sim.ledger.drift < 1e-3
+    bodies = sim.regular_state.bodies
+    own = np.unique(bodies.first)
+    energy = 0.5 * (bodies.momentum[:, own] ** 2).sum(axis=0) / bodies.mass[own]
+    kt = 1.380649e-23 * 100.0
+    assert energy.mean() == pytest.approx(1.5 * kt, rel=0.0, abs=4.0 * np.sqrt(1.5 / len(own)) * kt)
+
+
+@COMPILED
+@pytest.mark.parametrize(
+    "force",
+    [
+        sand.Field([0, 0, 0], shape="oscillating", amplitude="20 uT", frequency="5 MHz"),
+        sand.Gravity([0, 0, "1e6 m/s^2"]),
+    ],
+    ids=["field of time", "gravity through the box"],
+)
+def test_work_of_external_forces_is_booked_once(force):
+    """A field that changes with time, and gravity with grains that leave the box on one side: the energy is conserved.
+
+    Both ways of taking steps book the same work, to the accuracy of the steps.
+    """
+    runs = [thin_gas(force, substeps=substeps) for substeps in (True, False)]
+    for sim in runs:
+        sim.run(until="0.4 us")
+        assert sim.ledger.drift < 1e-3
+    assert counts(runs[0], SUBSTEPS)[0] > 100
+    work = [sim.ledger.rows[-1]["lost_outside"] for sim in runs]
+    assert work[0] == pytest.approx(work[1], rel=1e-2, abs=0.0)
+
+
+@COMPILED
+def test_substeps_that_fail_leave_the_state_before_the_step(monkeypatch):
+    """Substeps that stop because of some of their grains: the run stops and names them, and nothing has changed."""
+    sim = thin_gas()
+    sim.run(until="50 ns")
+    before = {name: array.copy() for name, array in sim.regular_state.to_arrays().items()}
+    copy, chosen = SubstepEngine._copy, []
+
+    def failing(self, index, contacts):
+        part = copy(self, index, contacts)
+        chosen.append(index)
+
+        def stop(*arguments, **options):
+            part._state.count[8:10] = 0, 1
+            part._state.grains.arrays.position[:] += 1.0
+            return Stop.OVERCOMPRESSED
+
+        monkeypatch.setattr(part, "_drive", stop)
+        return part
+
+    monkeypatch.setattr(SubstepEngine, "_copy", failing)
+    result = sim.run(until="1 us")
+    assert result.outcome.is_physics and result.grains == tuple(chosen[-1][:2])
+    after = sim.regular_state.to_arrays()
+    assert {n for n in before if before[n].tobytes() != after[n].tobytes()} <= {"count", "clock"}
