@@ -8,7 +8,9 @@ import pytest
 import sand
 from sand.integrate.parts import Stop
 from sand.simulation.substeps import SubstepEngine
-from sand.state.state import LATE, MADE, RESTED, SOME_AWAKE, STEPS, SUBSTEPS, WOKEN
+from sand.state.state import LATE, MADE, RESTED, SOME_AWAKE, STEP, STEPS, SUBSTEPS, WOKEN
+
+from .setups import rest_distance
 
 SIDE = "12 um"
 COMPILED = pytest.mark.compiled("dipoles")
@@ -86,6 +88,86 @@ def test_contacts_form_between_the_same_grains_at_the_same_times():
     assert share[0] == pytest.approx(share[1], rel=0.1, abs=0.0) and share[1] > 0.01
 
 
+def with_more(sim, position, velocity, **options):
+    """The gas of a simulation and more grains without moments, in another simulation."""
+    g = sim.grains
+    far = np.linalg.norm(sim.box.nearest(g.position - np.mean(position, axis=0)), axis=1) > 4e-7
+    more = len(position)
+    grains = sand.Grains(
+        np.vstack([g.position[far], position]), 1e-8, "iron", velocity=np.vstack([g.velocity[far], velocity]),
+        spin=np.vstack([g.spin[far], np.zeros((more, 3))]), moment=np.vstack([g.moment[far], np.zeros((more, 3))]),
+    )  # fmt: skip
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns")
+    return sand.Simulation(
+        grains, [contact, sand.Dipoles()], box=SIDE, stepping=sand.RigidClusters(), frame_every=1.0, **options
+    )
+
+
+@COMPILED
+def test_awake_clusters_move_in_substeps():
+    """A pair in contact is awake at the start, flies at 1 m/s, far from all others, and comes to rest.
+
+    All steps but the first have substeps.  The pair has no moments: it flies on a straight line to rounding, with the
+    energy of its contact, which has its rest distance to 1e-3 of the radius, and its spin of 0.
+    """
+    pitch = rest_distance(sand.IRON, 1e-8, 1e-8)
+    start = np.array([[0.0, 0.0, 0.0], [pitch, 0.0, 0.0]])
+    sim = with_more(thin_gas(), start, [[0.0, 1.0, 0.0]] * 2)
+    for time in (3e-9, 3e-8):
+        sim.run(until=time)
+        moved = sim.box.nearest(sim.grains.position[-2:] - start)
+        assert moved == pytest.approx(np.array([[0.0, time, 0.0]] * 2), rel=0.0, abs=1e-14)
+    assert sim.regular_state.bodies.asleep[-2:].all() and counts(sim, RESTED)[0] > 0
+    assert sim.regular_state.clock[SOME_AWAKE] > 1e-9 and counts(sim, SUBSTEPS)[0] > 10
+
+
+@COMPILED
+def test_slow_grains_that_touch_within_a_step_are_seen():
+    """Two grains without moments, 0.5 … 1.5 nm apart, approach at 0.2 m/s: alone they would need no step below 10 ns.
+
+    Steps of all bodies are 3 to 6 ns long, in which they touch; this takes substeps.
+    """
+    apart = np.array([[2.0e-8 + 5e-10 * k, 0.0, 0.0] for k in (1, 2, 3)])
+    for gap in apart:
+        sim = with_more(thin_gas(), [np.zeros(3), gap], [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]])
+        sim.run(until="10 ns")
+        count = len(sim.grains)
+        own = sim.contacts["formed"][(sim.contacts["pair"] >= count - 2).all(axis=1)]
+        assert len(own) == 1 and own[0] == pytest.approx((gap[0] - 2e-8) / 0.2, rel=1e-3, abs=0.0)
+        assert counts(sim, LATE) == [0] and counts(sim, SUBSTEPS)[0] > 2
+
+
+@COMPILED
+def test_loads_besides_those_in_substeps_allow_the_step(monkeypatch):
+    """The loads on quick bodies that only act at the ends of a step H change their motion slower than η/H.
+
+    Rate² is Σ|μ B|/I or 2F/Mr, with loads of all grains less those of the quick ones on each other, here by a sum over
+    pairs of dipoles in NumPy.
+    """
+    checked, exclude = [], SubstepEngine._exclude_loads
+
+    def check(self, part, index):
+        state, own = self._state, part._state
+        total = state.grains.force[index].copy(), state.grains.field[index].copy()
+        exclude(self, part, index)
+        g, at = own.grains, own.grains.position
+        r = state.box.nearest(at[:, None] - at[None])
+        d = np.sqrt((r**2).sum(axis=-1)) + np.eye(len(at))
+        n, mu = r / d[..., None], g.moment
+        along = (n * mu[None]).sum(axis=-1)
+        field = 1e-7 * ((3.0 * along[..., None] * n - mu[None]) / d[..., None] ** 3).sum(axis=1) + 1e-7 * mu
+        slow = total[1] - field
+        first = own.bodies.first.astype(int)
+        energy = np.bincount(first, np.linalg.norm(mu, axis=1) * np.linalg.norm(slow, axis=1), len(first))
+        used = np.unique(first)
+        rate = np.sqrt((energy[used] / own.bodies.inertia[:, used].min(axis=0)).max())
+        checked.append(float(state.clock[STEP]) * rate)
+
+    monkeypatch.setattr(SubstepEngine, "_exclude_loads", check)
+    thin_gas(seed=2).run(until="0.5 us")
+    assert len(checked) > 20 and 0.02 < max(checked) < 0.1001
+
+
 @COMPILED
 def test_momenta_are_conserved_to_rounding():
     """An open gas in which contacts form: Σ m v and Σ (m x×v + I ω) stay what they were.
@@ -155,7 +237,7 @@ def test_numbers_of_the_noise_of_a_gas_are_used_once(monkeypatch):
 @pytest.mark.parametrize(
     "force",
     [
-        sand.Field([0, 0, 0], shape="oscillating", amplitude="20 uT", frequency="5 MHz"),
+        sand.Field([0, 0, 0], shape="oscillating", amplitude="20 uT", frequency="0.5 MHz"),
         sand.Gravity([0, 0, "1e6 m/s^2"]),
     ],
     ids=["field of time", "gravity through the box"],
@@ -163,7 +245,8 @@ def test_numbers_of_the_noise_of_a_gas_are_used_once(monkeypatch):
 def test_work_of_external_forces_is_booked_once(force):
     """A field that changes with time, and gravity with grains that leave the box on one side: the energy is conserved.
 
-    Both ways of taking steps book the same work, to the accuracy of the steps.
+    Both ways of taking steps book the same work, to the accuracy of the steps: 0.15 % with this field, whose work on
+    grains that take substeps is 1.2 % of it.
     """
     runs = [thin_gas(force, substeps=substeps) for substeps in (True, False)]
     for sim in runs:
@@ -171,7 +254,7 @@ def test_work_of_external_forces_is_booked_once(force):
         assert sim.ledger.drift < 1e-3
     assert counts(runs[0], SUBSTEPS)[0] > 100
     work = [sim.ledger.rows[-1]["lost_outside"] for sim in runs]
-    assert work[0] == pytest.approx(work[1], rel=1e-2, abs=0.0)
+    assert work[0] == pytest.approx(work[1], rel=4e-3, abs=0.0)
 
 
 @COMPILED
