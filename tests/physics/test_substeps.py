@@ -141,7 +141,7 @@ def test_loads_besides_those_in_substeps_allow_the_step(monkeypatch):
     """The loads on quick bodies that only act at the ends of a step H change their motion slower than η/H.
 
     Rate² is Σ|μ B|/I, with the flux density of all grains less that of the quick ones on each other, here by a sum over
-    pairs of dipoles in NumPy.  A magnetic grain of 50 nm in the gas acts on others far beyond the pairs that are listed,
+    pairs of dipoles in NumPy.  A magnetic grain of 50 nm in the gas acts on others far beyond the pairs in the list,
     but is heavy, and needs no short steps itself.
     """
     checked, exclude = [], SubstepEngine._exclude_loads
@@ -164,7 +164,7 @@ def test_loads_besides_those_in_substeps_allow_the_step(monkeypatch):
         checked.append(float(state.clock[STEP]) * rate)
 
     monkeypatch.setattr(SubstepEngine, "_exclude_loads", check)
-    with_more(thin_gas(), [np.zeros(3)], [np.zeros(3)], radius=5e-8, moment=8e-16).run(until="0.1 us")
+    with_more(thin_gas(), [np.zeros(3)], [np.zeros(3)], radius=5e-8, moment=4e-15).run(until="0.1 us")
     assert len(checked) > 10 and 0.099 < max(checked) < 0.1001
 
 
