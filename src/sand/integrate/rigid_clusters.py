@@ -38,11 +38,12 @@ class RigidLimits(NamedTuple):
 @checked
 @dataclass(frozen=True)
 class RigidClusters:
-    """Clusters at rest move as rigid bodies, all with one step; grains of awake clusters take contact steps within it.
+    """Clusters at rest move as rigid bodies with long steps; grains of awake clusters take contact steps within these.
 
     A cluster comes to rest when its vibrational energy has been low for half of its slowest period and no touch is
     ahead; it wakes before it may touch another grain, and before a load may move a contact. Single grains are bodies
-    as well. Needs damped contacts (`sand.Contact(damping="critical", settling_time=…)`), without which no cluster comes
+    as well. Bodies whose loads change fast take several steps within one of all bodies where this saves time. Needs
+    damped contacts (`sand.Contact(damping="critical", settling_time=…)`), without which no cluster comes
     to rest. In a gas (`sand.Gas`) bodies have the friction and noise of their grains. See
     docs/physics/rigid-clusters.md.
 

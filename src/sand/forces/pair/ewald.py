@@ -23,7 +23,7 @@ import numpy as np
 from ...box import Box
 from ...errors import BadInput
 from ...numerics.simd import padded_size
-from .ewald_fit import DIPOLES, Sources, fitted
+from .ewald_fit import DIPOLES, Sources, erfc, fitted
 from .ewald_loops import UNUSED, Buffers, EwaldParameters, MeshEwaldParameters, Waves
 from .loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
 from .mesh import MOST_NODES, mesh_errors, mesh_sums, new_mesh, nodes_for, widest_cells
@@ -101,8 +101,6 @@ def omitted_waves(
 
     Integrals I_n of qⁿ exp(−q²/w²) from I_0 by I_n = (w²/2) [q_max^(n−1) exp(−q_max²/w²) + (n − 1) I_(n−2)], w² = 2α².
     """
-    from scipy.special import erfc  # slow import
-
     width = math.sqrt(2.0) * alpha
     z = largest / width
     gauss, rest = np.exp(-z * z), math.sqrt(math.pi) * erfc(z)

@@ -25,6 +25,8 @@ from numpy.polynomial import chebyshev
 
 from ...constants import COULOMB, MAGNETIC
 
+erfc = np.vectorize(math.erfc, otypes=[float])
+"""Complementary error function; the one of SciPy, which is slow to import, is not faster here."""
 NODES = 128
 """Gauss–Legendre nodes in r and in v: integrands are smooth, errors below 1e-13."""
 NEAR_PAIRS = 0.1
@@ -77,8 +79,6 @@ def smeared(y: float, r: np.ndarray, order: int = 1) -> tuple[np.ndarray, ...]:
 
 def screened(y: float, r: np.ndarray, order: int = 1) -> tuple[np.ndarray, ...]:
     """A, B and C (order 0), or B, C and D (order 1) of the real part without a cut-off."""
-    from scipy.special import erfc  # slow import
-
     t = y * r
     gauss = 2.0 / math.sqrt(math.pi) * np.exp(-t * t)
     a = erfc(t)
