@@ -8,7 +8,7 @@ import math
 import operator
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -149,6 +149,13 @@ class Engine:
         other = type(self)(*(copy.deepcopy(getattr(self, name), memo) for name in names))
         other._is_sorted, other._output_time = self._is_sorted, self._output_time
         return other
+
+    def for_state(self, state: State) -> Self:
+        """An engine with the settings of this one, for another state, with a table of its own and no other threads."""
+        settings = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        made = type(self)(**settings | {"_state": state})
+        made._workers = None
+        return made
 
     @property
     def state(self) -> State:

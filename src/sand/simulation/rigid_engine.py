@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -82,12 +82,16 @@ more than ten grains n²/10 of these, about half the period of the slowest bendi
 LIST_GAP, SHARE_OF_SPACING = 3.0, 0.3
 """Largest gap of pairs that the driver of bodies looks at, in smallest radii, and, in thin gases, in mean distances of
 neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
+MOST_ENGINES = 64
+"""Engines of different numbers of grains that are kept: the table of an engine is slow to fill with other arrays."""
 SLIP_LOSSES = slice(1, 4)
 """Rows of `ContactArrays.lost` that change when a contact slides, rolls or twists beyond a limit."""
 SPANS = (
     "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
     "rigid body, and takes contact steps all the time; use a larger box"
 )
+
+Kind = TypeVar("Kind", bound=Engine)
 
 
 @dataclass
@@ -101,13 +105,13 @@ class RigidEngine(Engine):
     Attributes
     ----------
     inner : Engine
-        The engine of awake grains; its state is replaced as clusters wake and come to rest.
+        The engine of awake grains; it is replaced as clusters wake and come to rest.
     """
 
     inner: Engine | None = None
+    _inners: dict[int, Engine] = field(init=False, default_factory=dict)  # engines of awake grains by their number
     _inner_workers: WorkerThreads | None = field(init=False, default=None)
     _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
-    _inner_grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # of the inner state
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
     _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
@@ -230,13 +234,12 @@ class RigidEngine(Engine):
     def _inner_state(self) -> State:
         """The state of the awake grains, with contacts as they are and everything else as at a start."""
         assert self.inner is not None
-        state, inner, index = self._state, self.inner, self._awake
-        present = inner._state
-        if self._measures.size.size != len(index) or not np.array_equal(self._inner_grains, index):
-            inner.regular_state = present = self._new_inner_state(index)
-            self._inner_grains = index.copy()
+        state, index = self._state, self._awake
+        if self._measures.size.size != len(index):
+            self.inner = self._inners.get(len(index)) or self._new_inner(index)
             self._measures = cluster_measures(len(index))
             self._remainder = np.zeros((2, 3, len(index)))
+        present = self.inner._state
         present.count[:] = 0
         copy_grains(state, present, index)
         copy_contacts(state, present, index, self._columns)
@@ -255,25 +258,25 @@ class RigidEngine(Engine):
         resort_contacts_by_grain.run(self._inner_table(present))
         return present
 
-    def _new_inner_state(self, index: np.ndarray) -> State:
-        """Memory for these grains."""
-        assert self.inner is not None
-        grains = subset(self._state.grains, index)
-        parameters, components = self.inner.parameters, self.inner._components
-        capacity = len(self._columns)
-        made = new_state(grains, self._state.box, parameters, components, capacity, over_all_pairs=True)
+    def _new_inner(self, index: np.ndarray) -> Engine:
+        """An engine for these awake grains, which is kept for others of the same number."""
+        given = self.inner
+        assert given is not None
+        grains, capacity = subset(self._state.grains, index), len(self._columns)
+        made = new_state(grains, self._state.box, given.parameters, given._components, capacity, over_all_pairs=True)
         made.uniform_contacts = self._state.uniform_contacts
-        # few grains share no work between threads
-        self.inner._workers = self._inner_workers if uses_task_queue(len(index)) else None
         made.clusters = cluster_arrays(len(index))
-        return made
+        inner = given.for_state(made)
+        # few grains share no work between threads
+        inner._workers = self._inner_workers if uses_task_queue(len(index)) else None
+        return keep(self._inners, len(index), inner)
 
     def _take_contact_steps(self) -> Stop:
         """Contact steps of the awake grains for one step of the bodies."""
-        assert self.inner is not None
-        state, inner = self._state, self.inner
+        state, present = self._state, self._inner_state()
         before, end = state.time, state.time + float(state.clock[STEP])
-        present = self._inner_state()
+        inner = self.inner
+        assert inner is not None
         if self.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in self.external:
@@ -500,6 +503,14 @@ class RigidEngine(Engine):
         if self.parameters.gas.gas.on:
             set_friction(state, self.parameters.gas.gas, index)
         state.count[RESTED] += 1
+
+
+def keep(engines: dict[int, Kind], number: int, made: Kind) -> Kind:
+    """Keep an engine for so many grains for further use; there are at most `MOST_ENGINES`."""
+    if len(engines) == MOST_ENGINES:
+        engines.clear()
+    engines[number] = made
+    return made
 
 
 def external_energy(engine: Engine, outer: Any, time: float) -> float:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -36,23 +36,17 @@ from ..state.state import (
     SUBSTEPS,
     TIME,
     WOKEN,
-    State,
 )
 from .changed_state import subset
-from .engine import Engine
 from .new_state import new_state
 from .part import copy_contacts, copy_grains, store_contacts, store_grains
-from .rigid_engine import RigidEngine, external_energy
+from .rigid_engine import RigidEngine, external_energy, keep
 
 COPIED_BODIES = (*SAVED_BODIES, "decay", "mode")
 LOADS = ("force", "torque", "field")
 COUNTED = (MADE, BROKEN, SLIPPED, WOKEN, RESTED, LATE)
 LEAST_RATE = 1e-30
 """Slowest rate of change of a load [1/s]."""
-MOST_PARTS = 64
-"""Engines of different numbers of grains that are kept for further use."""
-
-Kind = TypeVar("Kind", bound=Engine)
 
 
 @dataclass
@@ -160,19 +154,16 @@ class SubstepEngine(RigidEngine):
         return part
 
     def _new_part(self, index: np.ndarray) -> RigidEngine:
-        """An engine for so many grains, which is kept: the table of an engine is slow to fill with other arrays."""
+        """An engine for these grains, which is kept for others of the same number."""
         given = self.part
         assert given is not None and given.inner is not None
         grains, components = subset(self._state.grains, index), given._components
         state = new_state(grains, self._state.box, given.parameters, components, 0, over_all_pairs=True)
         state.uniform_contacts = self._state.uniform_contacts
         state.bodies = body_arrays(len(index), in_gas=bool(self._state.bodies.decay.size))
-        part = _with_state(given, state)
-        part.inner, part.warnings = _with_state(given.inner, given.inner._state), self.warnings
-        if len(self._parts) == MOST_PARTS:
-            self._parts.clear()
-        self._parts[len(index)] = part
-        return part
+        part = given.for_state(state)
+        part.inner, part.warnings = given.inner.for_state(given.inner._state), self.warnings
+        return keep(self._parts, len(index), part)
 
     def _exclude_loads(self, part: RigidEngine, index: np.ndarray) -> None:
         """Divide the loads on the quick bodies into those of substeps and others, which may shorten the step."""
@@ -221,11 +212,3 @@ class SubstepEngine(RigidEngine):
         state.clock[SETTLED] = own.clock[SETTLED]
         state.clock[LARGEST_LOAD] = max(state.clock[LARGEST_LOAD], own.clock[LARGEST_LOAD])
         state.count[STAGE], self._had_substeps = AFTER_SUBSTEPS, True
-
-
-def _with_state(engine: Kind, state: State) -> Kind:
-    """An engine with the settings of another, a state and a table of its own, and no threads."""
-    settings = {each.name: getattr(engine, each.name) for each in fields(engine) if each.init}
-    made = type(engine)(**settings | {"_state": state})
-    made._workers = None
-    return made
