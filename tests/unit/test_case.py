@@ -79,6 +79,10 @@ def problems_of(content):
         ({"grains__radus": "10 nm"}, ["grains.radus", "no such key", "did you mean 'radius'?"]),
         ({"forces__dipoles__cutof": "1 nm"}, ["forces.dipoles.cutof", "did you mean 'cutoff'?"]),
         ({"stepping__stp": "auto"}, ["stepping.stp", "did you mean 'step'?"]),
+        (
+            {"stepping__method": "rigid-clusters", "stepping__steps_per_period": 30},
+            ["stepping.steps_per_period", "it is a key of [stepping.contact_stepping]"],
+        ),
         ({"grain": {"number": 3}}, ["grain:", "did you mean 'grains'?"]),
         ({"forces__dipole": {}}, ["forces.dipole:", "did you mean 'dipoles'?"]),
         ({"grains__material": "irn"}, ["grains.material", "unknown material 'irn'", "did you mean 'iron'?"]),

@@ -55,6 +55,9 @@ def _messages(slip: Any, model: type, table: str) -> list[str]:
         allowed = _keys_at(model, path[:-1])
         renamed = RENAMED.get(str(path[-1]))
         advice = f"it is now called '{renamed}'" if renamed in allowed else did_you_mean(str(path[-1]), allowed)
+        for key in allowed:
+            if str(path[-1]) in _keys_at(model, (*path[:-1], key)):
+                advice = f"it is a key of [{place.removesuffix(parts[-1])}{key}]"
         return [f"{place}: there is no such key; {advice}"]
     if kind == "missing":
         return [f"{place} is missing; add it"]
