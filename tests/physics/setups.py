@@ -18,6 +18,19 @@ def rest_distance(a: sand.Material, r1: float, r2: float, b: sand.Material | Non
     return r1 + r2 - rest_overlap(rest_radius(p.surface_energy, reduced, p.modulus), reduced)
 
 
+def different(first: sand.Simulation, second: sand.Simulation) -> list[str]:
+    """Names of arrays of two regular states that differ in a bit."""
+    one, other = first.regular_state.to_arrays(), second.regular_state.to_arrays()
+    return [name for name in one if one[name].tobytes() != other[name].tobytes()]
+
+
+def momenta(sim: sand.Simulation) -> tuple[np.ndarray, np.ndarray]:
+    """Momenta m v and angular momenta m x×v + I ω of the grains of the regular state, both (N, 3)."""
+    g = sim.regular_state.grains
+    p = g.mass[:, None] * g.velocity
+    return p, np.cross(g.position, p) + g.inertia[:, None] * g.spin
+
+
 def struck_chain(
     material: sand.Material = sand.IRON,
     radius: float = 1e-8,

@@ -19,7 +19,7 @@ from sand.io.frame import code_of
 from sand.simulation.ledger import kinetic_energies
 from sand.state.state import BODIES, CONTACT_STEPS, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 
-from .setups import rest_distance
+from .setups import different, momenta, rest_distance
 
 KT = BOLTZMANN * 100.0
 PITCH = rest_distance(sand.IRON, 1e-8, 1e-8)
@@ -53,12 +53,6 @@ class Resting(sand.Observer):
     def see(self, simulation, row):
         states = simulation.state, simulation.regular_state
         self.both.append(tuple(state.at_rest.tolist() for state in states))
-
-
-def different(first, second):
-    """Names of arrays of two regular states that differ in a bit."""
-    one, other = first.regular_state.to_arrays(), second.regular_state.to_arrays()
-    return [name for name in one if one[name].tobytes() != other[name].tobytes()]
 
 
 def two_chains(**options):
@@ -513,17 +507,11 @@ def test_momenta_over_many_mixed_steps(steps, bound):
     """
     sim = gas(box=None, number=30, forces=[contact(), sand.Dipoles(cutoff=None)])
     sim.run(steps=1)
-
-    def momenta():
-        g = sim.regular_state.grains
-        p = g.mass[:, None] * g.velocity
-        return p, np.cross(g.position, p) + g.inertia[:, None] * g.spin
-
-    start = momenta()
+    start = momenta(sim)
     while sim.steps + sim.regular_state.count[CONTACT_STEPS] < steps:
         sim.run(steps=1000)
     assert sim.regular_state.count[MADE] > 10 and sim.regular_state.count[CONTACT_STEPS] > 50_000
-    for before, after in zip(start, momenta(), strict=True):
+    for before, after in zip(start, momenta(sim), strict=True):
         size = np.linalg.norm(before, axis=1).sum() + np.linalg.norm(after, axis=1).sum()
         assert np.linalg.norm((after - before).sum(axis=0)) < bound * size
 

@@ -16,7 +16,7 @@ from sand.integrate.body_friction import friction_modes, kick_body
 from sand.state.arrays import body_arrays
 from sand.state.state import KICKED, LATE, MADE, RESTED, SOME_AWAKE, TIME, WOKEN
 
-from .setups import rest_distance
+from .setups import different, rest_distance
 
 KT = BOLTZMANN * 100.0
 PITCH = rest_distance(sand.IRON, 1e-8, 1e-8)
@@ -406,12 +406,6 @@ def magnetic(number=30, box="0.5 um", seed=2, tau=5e-8, forces=None, **options):
     forces = [contact(), sand.Dipoles(), gas(tau)] if forces is None else forces
     options = {"frame_every": 1.0, "box": box, "seed": 7, "stepping": sand.RigidClusters()} | options
     return sand.Simulation(grains, forces, **options)
-
-
-def different(first, second):
-    """Names of arrays of two regular states that differ in a bit."""
-    one, other = first.regular_state.to_arrays(), second.regular_state.to_arrays()
-    return [name for name in one if one[name].tobytes() != other[name].tobytes()]
 
 
 @pytest.mark.compiled("dipoles")

@@ -10,7 +10,7 @@ from sand.integrate.parts import Stop
 from sand.simulation.substeps import SubstepEngine
 from sand.state.state import LATE, MADE, RESTED, SOME_AWAKE, STEP, STEPS, SUBSTEPS, WOKEN
 
-from .setups import rest_distance
+from .setups import different, momenta, rest_distance
 
 SIDE = "12 um"
 COMPILED = pytest.mark.compiled("dipoles")
@@ -33,12 +33,6 @@ def thin_gas(*forces, box=SIDE, dipoles=None, seed=1, substeps=True, fraction=0.
 
 def counts(sim, *numbers):
     return [int(sim.regular_state.count[k]) for k in numbers]
-
-
-def different(first, second):
-    """Names of arrays of two regular states that differ in a bit."""
-    one, other = first.regular_state.to_arrays(), second.regular_state.to_arrays()
-    return [name for name in one if one[name].tobytes() != other[name].tobytes()]
 
 
 @COMPILED
@@ -177,16 +171,10 @@ def test_momenta_are_conserved_to_rounding():
     """
     sim = thin_gas(box=None, dipoles=sand.Dipoles(cutoff=None))
     sim.run(steps=1)
-
-    def momenta():
-        g = sim.regular_state.grains
-        p = g.mass[:, None] * g.velocity
-        return p, np.cross(g.position, p) + g.inertia[:, None] * g.spin
-
-    start = momenta()
+    start = momenta(sim)
     sim.run(until="0.6 us")
     assert counts(sim, MADE)[0] > 2 and counts(sim, SUBSTEPS)[0] > 2 * sim.steps
-    for before, after in zip(start, momenta(), strict=True):
+    for before, after in zip(start, momenta(sim), strict=True):
         assert np.linalg.norm((after - before).sum(axis=0)) < 4e-15 * np.linalg.norm(before, axis=1).sum()
 
 
