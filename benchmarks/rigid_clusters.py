@@ -123,7 +123,7 @@ def compared(lines: list[dict[str, Any]], reference: str = "grains") -> list[dic
     return rows
 
 
-def write(seeds: int = 32, out: Path = Path("rigid-clusters.jsonl"), table: Path = TABLE) -> Path:
+def write(seeds: int = 96, out: Path = Path("rigid-clusters.jsonl"), table: Path = TABLE) -> Path:
     """Write the table of all variants."""
     write_table(table, compared(runs(list(VARIANTS), seeds, out)))
     return table
