@@ -87,11 +87,12 @@ def choose_shared_step(grains, bodies, pair_list, count, span, gas, limits, h, l
     whole = GRAIN_COST * grains.mass.size
     least, best, tried = WORTH * whole / h, h, 2.0 * h
     while tried <= longest:
-        number = mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, tried)
-        each = SUBSTEP_COST + number * (SUBSTEP_GRAIN_COST + number * SUBSTEP_PAIR_COST)
-        cost = (whole + CALL_COST + each * tried / h) / tried
-        if cost < least:
-            least, best = cost, tried
+        if whole + CALL_COST < least * tried:  # else it cannot cost less
+            number = mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, tried)
+            each = SUBSTEP_COST + number * (SUBSTEP_GRAIN_COST + number * SUBSTEP_PAIR_COST)
+            cost = (whole + CALL_COST + each * tried / h) / tried
+            if cost < least:
+                least, best = cost, tried
         tried *= 2.0
     if best > h:
         mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, best)
