@@ -8,7 +8,7 @@ import pytest
 import sand
 from sand.integrate.parts import Stop
 from sand.simulation.substeps import SubstepEngine
-from sand.state.state import LATE, MADE, RESTED, SOME_AWAKE, STEP, STEPS, SUBSTEPS, WOKEN
+from sand.state.state import LATE, MADE, PAIRS, RESTED, SOME_AWAKE, STEP, STEPS, SUBSTEPS, WOKEN
 
 from .setups import different, momenta, rest_distance
 
@@ -191,6 +191,23 @@ def test_restart_output_and_threads_change_no_bit(tmp_path):
     assert different(whole, parts) == [] and counts(whole, MADE)[0] > 3 and counts(whole, SUBSTEPS)[0] > 100
     summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))["rigid_clusters"]
     assert summary["substeps_of_bodies"] == counts(parts, SUBSTEPS)[0]
+
+
+@COMPILED
+def test_a_list_of_pairs_that_overflows_within_a_step_changes_no_bit():
+    """Memory for just the pairs that there are: more of them stop the driver after the substeps, and it goes on."""
+    whole, tight = thin_gas(), thin_gas()
+    for _ in range(150):
+        whole.run(steps=1)
+        tight.run(steps=1)
+        state = tight.regular_state
+        used, columns = int(state.count[PAIRS]), state.pair_list.pair.shape[1]
+        state.pair_list = state.pair_list._replace(
+            **{name: np.ascontiguousarray(array[..., :used]) for name, array in state.pair_list._asdict().items()
+               if array.shape[-1] == columns}
+        )  # fmt: skip
+    assert different(whole, tight) == []
+    assert whole.regular_state.clock[SOME_AWAKE] > 0.0 and counts(whole, SUBSTEPS)[0] > 300
 
 
 @COMPILED

@@ -46,7 +46,7 @@ from .respa import add_long_range_loads
 from .rigid_body import contact_loads_bound, drift_bodies, kick_bodies, move_velocities, spin_of, sum_body_loads
 from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
 from .step_control import is_close, is_past
-from .substeps import AFTER_SUBSTEPS, choose_shared_step, squared_rate
+from .substeps import AFTER_ALL, AFTER_SUBSTEPS, choose_shared_step, squared_rate
 from .task_queue import join_workers
 
 LARGEST_TURN = 1.0
@@ -218,21 +218,20 @@ def first_half(
     bodies.quick[:] = 0
     sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
     h, longest = longest_step(grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake)
-    shared = h
-    if flight_limits.substeps:
-        shared = choose_shared_step(grains, bodies, pair_list, count, span, gas, flight_limits, h, longest)
     if not h > 0.0:
         call_stage(program, EXPLAIN, table, Stop.NOT_FINITE.value)
         return Stop.NOT_FINITE.value
     if clock[TIME] + h == clock[TIME]:
         return Stop.NO_STEP.value
-    takes_substeps = shared > h
-    if is_past(clock[TIME] + shared, until):
+    takes_substeps = False
+    if flight_limits.substeps:
+        shared = choose_shared_step(grains, bodies, pair_list, count, span, gas, flight_limits, h, longest)
+        h, takes_substeps = shared, shared > h
+    if is_past(clock[TIME] + h, until):
         if not shorten:
             bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
-        shared = until - clock[TIME]
-    h = shared
+        h = until - clock[TIME]
     if not takes_substeps:
         find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, h)
     find_loaded_bodies(grains, bodies, clock, count)
@@ -284,7 +283,7 @@ def body_steps_until(
     awake = awake_grains(bodies)
     invalidate_speeds(pair_list)
     while True:
-        stop, had_substeps = Stop.NONE.value, count[STAGE] == AFTER_SUBSTEPS
+        stop = Stop.NONE.value
         if count[STAGE] == 0:
             if count[COMPARED] >= 0 and count[COMPARED] != count[MADE] + count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
@@ -296,16 +295,16 @@ def body_steps_until(
                 grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria,
                 forces, flight_limits, program, table, until, shorten, awake > 0
             )  # fmt: skip
-        elif had_substeps:
+        elif count[STAGE] == AFTER_SUBSTEPS:
             drift_with_work(
                 clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table,
                 clock[STEP]
             )  # fmt: skip
-            count[STAGE] = 1
+            count[STAGE] = AFTER_ALL
         if stop == Stop.NONE.value:
             stop = second_half(
                 grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces,
-                flight_limits, queue, program, table, awake, had_substeps
+                flight_limits, queue, program, table, awake, count[STAGE] == AFTER_ALL
             )  # fmt: skip
         if stop != Stop.NONE.value:
             return stop
