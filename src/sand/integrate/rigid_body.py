@@ -5,7 +5,8 @@ The kinetic energy of a rotor with angular momentum L in its own frame is that o
     |L|²/2I₂ + ½ (1/I₁ − 1/I₂) L₁² + ½ (1/I₃ − 1/I₂) L₃².
 
 Each alone generates an exact rotation.  That of the sphere commutes with the others, so that it is applied once, Φ₀(t);
-the others are applied in n pieces (splitting by symmetric tops: Fassò 2003, with quaternions as Miller et al. 2002):
+the others are applied in n pieces (a symmetric top and one more axis, as Touma & Wisdom 1994, with quaternions as
+Miller et al. 2002; both cited from memory):
 
     Φ₀(t) [Φ₁(t/2n) Φ₃(t/n) Φ₁(t/2n)]ⁿ,   Φ_k(t): q → q exp(a e_k/2), L → Rot(e_k, −a) L, a = t (1/I_k − 1/I₂) L_k
 
@@ -24,7 +25,8 @@ from ..numerics.vec import accrue, add, axpy, cross, dot, load, load4, norm, put
 from ..state.state import BODIES
 
 LARGEST_PIECE = 0.1
-"""Free rotation is computed in pieces of at most this angle [rad], and of at most η, so that its error falls as η²."""
+"""Free rotation is computed in pieces t with t |L| √(…) at most this, see `parting_rate`, and at most η, so that its
+error falls as η²."""
 
 
 @formula
@@ -60,7 +62,7 @@ def _about_third(q, angular, angle):
 
 @formula
 def asymmetric_rotation(q, angular, inertia, t):
-    """A step of a free rotor without the rotation of a sphere: Φ₁(t/2) Φ₃(t) Φ₁(t/2), with which `free_sphere` commutes.
+    """A step of a free rotor but for the rotation of a sphere with I₂, which commutes with it: Φ₁(t/2) Φ₃(t) Φ₁(t/2).
 
     Parameters
     ----------
@@ -83,6 +85,16 @@ def asymmetric_rotation(q, angular, inertia, t):
     q, angular = _about_third(q, angular, third * angular[2])
     q, angular = _about_first(q, angular, 0.5 * first * angular[0])
     return normalised(q), angular
+
+
+@formula
+def parting_rate(inertia):
+    """√((1/I₁ − 1/I₂)(1/I₂ − 1/I₃)) [1/(kg m²)]: times |L|, the rate at which motions about the second axis part.
+
+    It is 0 for symmetric bodies, for which a step of any length is exact.  A piece t of `asymmetric_rotation` errs by
+    about t³|L|³ (1/I₁ − 1/I₂)(1/I₂ − 1/I₃) times the larger of the two differences.
+    """
+    return math.sqrt((1.0 / inertia[0] - 1.0 / inertia[1]) * (1.0 / inertia[1] - 1.0 / inertia[2]))
 
 
 @formula
@@ -151,7 +163,10 @@ def place_velocities(grains, bodies, b):
 
 @loop
 def move_body(bodies, b, span, dt, piece):
-    """Move and turn body b by a step of dt [s], in pieces of at most `piece` [rad]; its grains stay where they are."""
+    """Move and turn body b by a step of dt [s]; its grains stay where they are.
+
+    Pieces of the rotation are at most `piece`, in units of the time in which motions about the second axis part.
+    """
     first = bodies.member[bodies.start[b]]
     momentum, mass = load(bodies.momentum, first), bodies.mass[first]
     centre = nearest_image(axpy(dt / mass, momentum, load(bodies.centre, first)), span)
@@ -161,7 +176,8 @@ def move_body(bodies, b, span, dt, piece):
         load(bodies.inertia, first),
     )
     if bodies.start[b + 1] - bodies.start[b] > 1:
-        pieces = int(dt * norm(spin_of(bodies, first)) / piece) + 1
+        # a number that free rotation keeps: pieces of changing length would change the energy
+        pieces = int(dt * norm(angular) * parting_rate(inertia) / piece) + 1
         for _ in range(pieces):
             q, angular = asymmetric_rotation(q, angular, inertia, dt / pieces)
     q = free_sphere(q, angular, inertia[1], dt)

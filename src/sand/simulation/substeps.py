@@ -69,9 +69,8 @@ class SubstepEngine(RigidEngine):
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """As `RigidEngine._drivers`, with the stages of substeps."""
         vectors = np.zeros((3, 1))
-        own = [(kick_by_slow_loads, ()), (place_all_velocities, ())]
-        own += [(find_slow_rate, (vectors, vectors, np.zeros(1)))]
-        return [*super()._drivers(), *own]
+        plain = [(each, ()) for each in (kick_by_slow_loads, place_all_velocities)]
+        return [*super()._drivers(), *plain, (find_slow_rate, (vectors, vectors, np.zeros(1)))]
 
     def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """As `RigidEngine._call_driver`, with substeps."""
