@@ -138,6 +138,8 @@ def test_the_largest_overlap_is_that_of_all_steps(tmp_path):
         apart = np.linalg.norm(np.diff(state.grains.position, axis=0))
         largest = max(largest, (1.4e-6 - apart) / 4e-7)
         assert state.clock[LARGEST_OVERLAP] == pytest.approx(largest, rel=1e-12, abs=1e-15)
+    kept = [text for text in sim.warnings if text.startswith(OVERLAP)]
+    assert kept == [extreme_warnings(state.clock)["grains overlap too deeply for a contact law"]]  # not the first one
     assert largest > DEEPEST_OVERLAP and sim.regular_state.count[BROKEN] == 1  # it has rebounded
     whole = sim.regular_state.clock[LARGEST_OVERLAP : IMPACT_SPEED + 1].tobytes()
     pieces = pair(120.0, r1=4e-7, frame_every="0.05 ns", out=tmp_path / "run")
@@ -147,6 +149,16 @@ def test_the_largest_overlap_is_that_of_all_steps(tmp_path):
     found, again = run_texts(lambda: sand.resume(tmp_path / "run"), steps=160)
     assert again.regular_state.clock[LARGEST_OVERLAP : IMPACT_SPEED + 1].tobytes() == whole
     assert any(one.startswith(OVERLAP) for one in text) and not any(one.startswith(OVERLAP) for one in found)
+
+
+@pytest.mark.compiled("contacts")
+def test_columns_that_pad_a_vector_do_not_count():
+    """Five contacts of a chain at rest, computed as eight: the overlap is that of the contacts."""
+    chain = sand.setup.aggregates.chain(6, radius="0.1 um", material="silica")
+    sim = sand.Simulation(chain, [sand.Contact()])
+    sim.run(steps=10)
+    rest = sand.theory.contact("silica", "0.1 um").rest_overlap / 1e-7
+    assert sim.regular_state.clock[LARGEST_OVERLAP] == pytest.approx(rest, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.compiled("contacts")
@@ -279,14 +291,15 @@ def test_fields_beyond_emission(sign, limit, emitted):
 @pytest.mark.compiled("small")
 @pytest.mark.filterwarnings("ignore:an electric field is switched on")
 def test_charges_and_spins_that_change_are_warned_of_at_the_next_row():
-    """A charge given by a change: one warning, though later rows would have it as well."""
+    """Charges given by changes: one warning, though a later one has another number."""
     grains = sand.Grains([[0, 0, 0]], 1e-8, "iron")
     sim = sand.Simulation(grains, [sand.ElectricField("1 V/m")], row_every="1 ns", frame_every="10 ns")
     sim.run(until="1 ns")
-    with sim.change() as change:
-        change.charge[:] = -1e-16
     with pytest.warns(UserWarning, match="surface of grains is too strong") as caught:
-        sim.run(until="5 ns")
+        for k in (1, 2):
+            with sim.change() as change:
+                change.charge[:] = -k * 1e-16
+            sim.run(until=2 * k * 1e-9)
     assert sum("too strong" in str(one.message) for one in caught) == 1
     assert set(grain_warnings(sim.grains, sim.forces)) == {"the electric field at the surface of grains is too strong"}
 

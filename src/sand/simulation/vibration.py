@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..constants import BOLTZMANN
-from ..contact.model import DEFAULT_DAMPING_RATIO
+from ..contact.model import DAMPED_SPEED_GAIN, DEFAULT_DAMPING_RATIO
 from ..units import format_quantity
 
 HOT = 100.0
 """Internal kinetic energy per grain, in k_B T of the grains at the start, from which a run says so."""
-SPEED_GAIN = 3.4
-"""Largest sticking speed with the default damping ratio over that without damping (docs/physics/contact-options.md)."""
 GROWN = 3
 """Grains of the largest cluster from which on aggregates grow; two grains that touch are a collision."""
 
@@ -49,7 +47,7 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
     hot = [row for row in grown if row["internal"] > HOT * share]
     advice = (
         "; damping = 'critical' in [forces.contact] (sand.Contact) removes the vibrations that every touch leaves, but "
-        f"grains then stick up to {SPEED_GAIN:g} times the speed (damping_ratio = {DEFAULT_DAMPING_RATIO:g})"
+        f"grains then stick up to {DAMPED_SPEED_GAIN:g} times the speed (damping_ratio = {DEFAULT_DAMPING_RATIO:g})"
     )
     if damped:
         advice = "; contacts are damped already: fast impacts cause this, or the damping is too weak"
