@@ -183,7 +183,7 @@ def fast_settling(grains: Grains, contact: Contact) -> list[str]:
     if min(times) >= period:
         return []
     normal = max(period for period, mode, *_ in found if mode == "normal")
-    rebound = ", nor rebound from each other" if min(times) < normal else ""
+    rebound = " and grains hardly rebound" if min(times) < normal else ""
     return [
         f"contact: settling_time = {format_quantity(min(times), 's')} is below the period of {mode} of two grains of "
         f"radius {' and '.join(format_quantity(float(grains.radius[g]), 'm') for g in dict.fromkeys((i, j)))}, "
