@@ -8,7 +8,21 @@ import pytest
 import sand
 from sand.integrate.parts import Stop
 from sand.simulation.substeps import SubstepEngine
-from sand.state.state import LATE, MADE, PAIRS, RESTED, SOME_AWAKE, STEP, STEPS, SUBSTEPS, WOKEN
+from sand.state.state import (
+    IMPACT_SPEED,
+    LARGEST_IMPACT,
+    LARGEST_OVERLAP,
+    LATE,
+    MADE,
+    PAIRS,
+    RESTED,
+    SOME_AWAKE,
+    STEP,
+    STEPS,
+    SUBSTEPS,
+    WOKEN,
+    State,
+)
 
 from .setups import different, momenta, rest_distance
 
@@ -244,6 +258,27 @@ def test_a_list_of_pairs_that_overflows_within_a_step_changes_no_bit():
         )  # fmt: skip
     assert different(whole, tight) == []
     assert whole.regular_state.clock[SOME_AWAKE] > 0.0 and counts(whole, SUBSTEPS)[0] > 300
+
+
+@COMPILED
+def test_the_largest_overlap_and_impact_are_those_of_awake_grains(monkeypatch):
+    """Extremes of the engines of awake grains and of substeps reach the clock of all grains: the largest of each.
+
+    Grains of 100 K touch with the speed that their dipoles give them, and ring about δ₀, 0.05 of their radius.
+    """
+    seen, take = [], State.take_extremes
+
+    def record(self, part):
+        take(self, part)
+        seen.append([part.clock[k] for k in (LARGEST_OVERLAP, LARGEST_IMPACT, IMPACT_SPEED)])
+
+    monkeypatch.setattr(State, "take_extremes", record)
+    sim = thin_gas()
+    sim.run(until="0.2 us")
+    assert counts(sim, MADE) == [2] and counts(sim, SUBSTEPS)[0] > 100
+    found = sim.regular_state.clock[[LARGEST_OVERLAP, LARGEST_IMPACT, IMPACT_SPEED]]
+    assert found.tolist() == np.max(seen, axis=0).tolist()
+    assert 0.05 < found[0] < 0.1 and 0.1 < found[2] < 20.0
 
 
 @COMPILED

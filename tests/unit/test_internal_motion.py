@@ -1,5 +1,8 @@
 """Kinetic energy of clusters beyond their rigid motion, and the notes of a run on vibrating contacts."""
 
+import warnings
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,7 @@ import sand
 from sand.analysis.internal_motion import internal_kinetic_energy
 from sand.box import Box
 from sand.constants import BOLTZMANN
+from sand.contact.model import DEFAULT_DAMPING_RATIO
 from sand.simulation.vibration import vibration_notes
 
 SIZES = (1, 2, 3, 9)
@@ -72,8 +76,9 @@ def test_grains_without_contacts_have_none():
     assert not energy.any() and not degrees.any()
 
 
-def row(internal=0.0, broken=0, clusters=10, time=0.0):
-    return {"internal": internal, "broken": broken, "clusters": clusters, "time": time}
+def row(internal=0.0, broken=0, clusters=10, time=0.0, largest=3):
+    counts = {"broken": broken, "clusters": clusters, "largest_cluster": largest}
+    return {"internal": internal, "time": time, **counts}
 
 
 def notes(rows, temperature=100.0, damped=False):
@@ -81,7 +86,7 @@ def notes(rows, temperature=100.0, damped=False):
 
 
 def test_notes_on_vibration_and_breaking():
-    """Above 100 k_B T₀ per grain; a broken contact of a run that began with free grains; nothing otherwise."""
+    """Above 100 k_B T₀ per grain; contacts that broke in a run that began with free grains; nothing otherwise."""
     share = 10 * BOLTZMANN * 100.0
     assert notes([]) == {}
     assert notes([row(), row(99.0 * share, time=1e-9)]) == {}
@@ -89,19 +94,44 @@ def test_notes_on_vibration_and_breaking():
     text = notes([row(), row(101.0 * share, time=2e-9), row(500.0 * share, time=3e-9)])["vibration"]
     assert "from 2 ns on" in text and "500 at most" in text and "damping = 'critical'" in text
     assert "damped already" in notes([row(), row(101.0 * share)], damped=True)["vibration"]
-    text = notes([row(), row(broken=2, clusters=4)])["breaking"]
-    assert text.startswith("2 contacts of growing aggregates broke")
+    cold = notes([row(), row(broken=2, clusters=4)])
+    assert cold == {"breaking": "2 contacts broke while aggregates grew"}
+    assert "damped already" in notes([row(), row(broken=2)], damped=True)["breaking"]
+    hot = notes([row(), row(101.0 * share, broken=1)])
+    assert hot["breaking"].startswith("1 contact broke while aggregates grew; damping = 'critical'")
     collision = [row(clusters=3), row(500.0 * share, broken=2, clusters=4)]
     assert notes(collision) == {}
 
 
+def test_damping_is_advised_with_its_cost_and_only_where_aggregates_have_grown():
+    """From three grains in one cluster on, all at once with the vibration; the speed is that of the page on options."""
+    share = 10 * BOLTZMANN * 100.0
+    assert notes([row(largest=1), row(1e6 * share, broken=1, largest=2)]) == {}  # a rebound, or a pair
+    assert notes([row(largest=1), row(1e6 * share, largest=2), row(share, largest=9)]) == {}
+    text = notes([row(largest=1), row(1e6 * share, largest=3)])["vibration"]
+    page = (Path(sand.__file__).parents[2] / "docs/physics/contact-options.md").read_text("utf-8")
+    header, speeds = (
+        next(line for line in page.splitlines() if line.startswith(f"| {words}")).strip("| ").split(" | ")[1:]
+        for words in ("$\\zeta$ | 0 | 0.05", "largest sticking speed")
+    )
+    factor = float(speeds[header.index(f"{DEFAULT_DAMPING_RATIO:g}")])
+    assert f"grains then stick up to {factor:.2g} times the speed (damping_ratio = 0.2)" in text
+
+
 @pytest.mark.compiled("contacts")
-def test_an_undamped_pair_is_noted_once(tmp_path):
-    """Two cold grains that touch: ringing far above 100 k_B T₀; one warning, one note in the summary."""
-    grains = sand.Grains([[0, 0, 0], [2.05e-8, 0, 0]], 1e-8, "iron", velocity=[[0.05, 0, 0], [-0.05, 0, 0]])
-    with pytest.warns(UserWarning) as caught:
-        sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run", frame_every="0.1 ns")
-        sim.run(until="8 ns")
-    assert sim.ledger["made"][-1] == 1
-    assert sum("grains in contact vibrate" in str(one.message) for one in caught) == 1
-    assert sand.open(tmp_path / "run").summary["notes"] == sim.notes() and len(sim.notes()) == 1
+def test_a_pair_has_no_note_and_three_grains_have_one(tmp_path):
+    """Cold grains ring far above 100 k_B T₀: a pair, or its rebound, is a collision; three grains have grown."""
+    for number, speed in ((2, 0.1), (2, 100.0), (3, 0.1)):
+        away = 2.05e-8 * np.arange(number)[:, None] * np.array([1.0, 0.0, 0.0])
+        velocity = -speed * (np.arange(number) - (number - 1) / 2)[:, None] * np.array([1.0, 0.0, 0.0])
+        grains = sand.Grains(away, 1e-8, "iron", velocity=velocity)
+        folder = tmp_path / f"{number} at {speed}"
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            sim = sand.Simulation(grains, [sand.Contact()], out=folder, frame_every="0.1 ns")
+            sim.writer.draws = False
+            sim.run(until="8 ns")
+        assert sim.ledger["made"][-1] == number - 1
+        assert sim.ledger["broken"][-1] == (speed > 1.0)
+        assert sum("grains in contact vibrate" in str(one.message) for one in caught) == (number > 2)
+        assert sand.open(folder).summary["notes"] == sim.notes() and len(sim.notes()) == (number > 2)

@@ -113,8 +113,8 @@ def test_a_fresh_contact_rings():
     assert energy / (BOLTZMANN * 100) == pytest.approx(24100, rel=2e-3, abs=0.0)
     row = limit_rows(thermal("10 nm", "iron", "100 K"), FORCES, BOX)["fresh contact"]
     assert (
-        "3.33e-17 J (2.4e+06 K, 2.41e+04 kT at 100 K) in vibration; nothing removes it: for growth choose a damping"
-        in row
+        "3.33e-17 J (2.4e+06 K, 2.41e+04 kT at 100 K) in vibration; nothing removes it: for growth choose a damping, "
+        "'critical' lets grains stick up to 3.4 times the speed" in row
     )
     damped = sand.Contact(damping="viscoelastic", viscous_time="1 ps")
     row = limit_rows(thermal("10 nm", "iron", "0 K"), [damped], BOX)["fresh contact"]

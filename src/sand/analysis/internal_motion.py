@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,38 @@ from ..box import Box
 from .clusters import cluster_labels, unwrapped
 
 __all__ = ["internal_kinetic_energy"]
+
+
+class RigidMotion(NamedTuple):
+    """The rigid motion of each cluster, and of its grains relative to it."""
+
+    label: np.ndarray  # (N,) cluster of each grain
+    spin: np.ndarray  # (K, 3) Ω = J⁻¹ L of each cluster [rad/s]
+    offset: np.ndarray  # (N, 3) s, from the centre of mass of the cluster [m]
+    velocity: np.ndarray  # (N, 3) relative to that of the centre of mass [m/s]
+
+
+def rigid_motion(grains: Any, pairs: np.ndarray, box: Box) -> RigidMotion:
+    """The rigid motion of each cluster; arguments as for `internal_kinetic_energy`."""
+    labels = cluster_labels(len(grains), pairs)
+    count = int(labels.max()) + 1
+    mass, inertia = np.asarray(grains.mass), np.asarray(grains.inertia)
+    velocity, spin = np.asarray(grains.velocity), np.asarray(grains.spin)
+    position = unwrapped(np.asarray(grains.position), pairs, box)
+    total = _summed(mass, labels, count)[:, None]
+    s = position - (_summed(mass[:, None] * position, labels, count) / total)[labels]
+    u = velocity - (_summed(mass[:, None] * velocity, labels, count) / total)[labels]
+    angular = _summed(mass[:, None] * np.cross(s, u) + inertia[:, None] * spin, labels, count)
+    own = (mass * (s * s).sum(axis=1) + inertia)[:, None, None] * np.eye(3)
+    tensor = _summed(own - mass[:, None, None] * s[:, :, None] * s[:, None, :], labels, count)
+    return RigidMotion(labels, np.linalg.solve(tensor, angular[:, :, None])[:, :, 0], s, u)
+
+
+def _summed(values: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
+    """Sum of the values of the grains of each of `count` clusters."""
+    total = np.zeros((count, *values.shape[1:]))
+    np.add.at(total, labels, values)
+    return total
 
 
 @checked
@@ -43,24 +75,10 @@ def internal_kinetic_energy(grains: Any, pairs: np.ndarray, box: Box) -> tuple[n
     degrees = np.where(members > 1, 6 * members - 6, 0)
     if count == len(labels):
         return np.zeros(count), degrees
-    mass, inertia = np.asarray(grains.mass), np.asarray(grains.inertia)
-    velocity, spin = np.asarray(grains.velocity), np.asarray(grains.spin)
-
-    def summed(values: np.ndarray) -> np.ndarray:
-        total = np.zeros((count, *values.shape[1:]))
-        np.add.at(total, labels, values)
-        return total
-
-    position = unwrapped(np.asarray(grains.position), pairs, box)
-    total = summed(mass)[:, None]
-    s = position - (summed(mass[:, None] * position) / total)[labels]
-    u = velocity - (summed(mass[:, None] * velocity) / total)[labels]
-    angular = summed(mass[:, None] * np.cross(s, u) + inertia[:, None] * spin)
-    own = (mass * (s * s).sum(axis=1) + inertia)[:, None, None] * np.eye(3)
-    tensor = summed(own - mass[:, None, None] * s[:, :, None] * s[:, None, :])
-    rotation = np.linalg.solve(tensor, angular[:, :, None])[:, :, 0]
+    motion = rigid_motion(grains, pairs, box)
     # as the energy of velocities relative to the rigid motion, which has no differences of large numbers
-    turning = rotation[labels]
-    v, w = u - np.cross(turning, s), spin - turning
-    energy = summed(0.5 * mass * (v * v).sum(axis=1) + 0.5 * inertia * (w * w).sum(axis=1))
+    turning = motion.spin[labels]
+    v, w = motion.velocity - np.cross(turning, motion.offset), np.asarray(grains.spin) - turning
+    kinetic = 0.5 * np.asarray(grains.mass) * (v * v).sum(axis=1)
+    energy = _summed(kinetic + 0.5 * np.asarray(grains.inertia) * (w * w).sum(axis=1), labels, count)
     return np.where(members > 1, energy, 0.0), degrees

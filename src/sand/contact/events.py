@@ -17,6 +17,7 @@ from ..state.state import (
     FORMING,
     INNER_COUNT,
     INNER_SKIN,
+    LARGEST_OVERLAP,
     MADE,
     PAIRS,
     SLIPPED,
@@ -24,9 +25,10 @@ from ..state.state import (
     TIME,
 )
 from . import tangential
-from .columns import column_loops, uniform_contacts
+from .columns import column_loops, load_pairing, uniform_contacts
 from .damping import NONE, VARIANTS
 from .gather import sort_contacts_by_grain
+from .impact import note_impact
 from .law import ContactLaw
 from .losses import FORMING_ROW, add_slip_energies, add_slip_losses
 from .mechanics import (
@@ -41,6 +43,7 @@ from .update import (
     BROKEN_FLAG,
     PENDING_FLAG,
     displacements_before,
+    overlap_share,
     pose_at,
     single_contact_loop,
     slipped_pose,
@@ -277,9 +280,14 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             impulse = damping_of_touch(
                 grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, count[STEPS], dt
             )
+            share = overlap_share(radii - distance, grains.radius[i], grains.radius[j])
+            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], share)
             reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
             # the step of 0 s at the start of a run finds grains that overlap already
-            gain = speed_gain(radii - distance, closing, reduced, constants_at(contacts, c), dt) if dt > 0.0 else 0.0
+            gain = speed_gain(radii - distance, closing, reduced, constants, dt) if dt > 0.0 else 0.0
+            if dt > 0.0:
+                pairing = load_pairing(settings.pairings, grains.material[i], grains.material[j])
+                note_impact(clock, closing, reduced, constants.reduced_radius, pairing.modulus)
             impulse -= reduced * gain + 0.5 * dt * dot(load(contacts.force, c), n)
             apply_pair_impulse(grains, i, j, n, impulse)
             lost[FORMING] -= at_touch(constants)

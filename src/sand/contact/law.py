@@ -108,6 +108,8 @@ class ContactConstants(NamedTuple):
     normal: Any  # `ContactLaw.constants_type`: constants that only this law has
 
 
+PULLS = 200
+"""Overlaps at which `largest_pull` looks for the largest force."""
 DAMPING_FACTOR = 2.0
 """A dashpot counts as a mode of frequency 2 c/m̄: with 25 steps per period c dt/m̄ ≤ 1/8, and the damping of `damping` is
 accurate to (c dt/m̄)².  Up to a quarter of critical damping the step is that of the undamped contact."""
@@ -208,3 +210,43 @@ def ringing_energy(law: ContactLaw, pairing: Pairing, r1: float, r2: float) -> f
     c = contact_constants(law)(pairing, r1, r2, 1.0, 1.0)
     rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
     return float(law.at_touch(c) - law.energy(rest, law.radius_root(rest, c), c))
+
+
+def contact_periods(law: ContactLaw, pairing: Pairing, r1: float, r2: float, m1: float, m2: float) -> dict[str, float]:
+    """Periods 2π/ω [s] of the four modes of a free pair at rest; infinite for a mode without stiffness.
+
+    ω² is k_n/m̄, 7k_s/2m̄, k_r R²/Ī and k_t/Ī, with 1/m̄ = 1/m1 + 1/m2 and 1/Ī = 1/I1 + 1/I2.
+
+    Parameters
+    ----------
+    r1, r2, m1, m2 : float
+        Radii [m] and masses [kg].
+
+    Returns
+    -------
+    dict of str to float
+        By mode: normal, sliding, rolling, twisting.
+    """
+    c = contact_constants(law)(pairing, r1, r2, m1, m2)
+    rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
+    normal = float(law.stiffness(rest, law.radius_root(rest, c), c)) if c.rest_radius > 0.0 else 0.0
+    inverse_mass, inverse_inertia = 1.0 / m1 + 1.0 / m2, 2.5 / (m1 * r1 * r1) + 2.5 / (m2 * r2 * r2)
+    squares = {
+        "normal": normal * inverse_mass,
+        "sliding": 3.5 * c.slide_stiffness * inverse_mass,
+        "rolling": c.roll_stiffness * c.reduced_radius**2 * inverse_inertia,
+        "twisting": c.twist_stiffness * inverse_inertia,
+    }
+    return {mode: 2.0 * math.pi / math.sqrt(w) if w > 0.0 else math.inf for mode, w in squares.items()}
+
+
+def largest_pull(law: ContactLaw, pairing: Pairing, r1: float, r2: float) -> float:
+    """Largest force [N] with which a contact holds two spheres of radii r1 and r2 [m] along n: 3πγR for JKR.
+
+    The least force between breaking and rest, at `PULLS` overlaps: within 1e-4 of it where the force is smooth.
+    """
+    c = contact_constants(law)(pairing, r1, r2, 1.0, 1.0)
+    rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
+    shares = [k / (PULLS - 1) for k in range(PULLS)]
+    overlaps = [rest * share - c.break_overlap * (1.0 - share) for share in shares]
+    return -min(float(law.force(overlap, law.radius_root(overlap, c), c)) for overlap in overlaps)

@@ -27,6 +27,8 @@ DAMPING = ("none", "critical", "constant", "viscoelastic")
 DAMPING_KEYS = {"damping_ratio": "critical", "damping_constant": "constant", "viscous_time": "viscoelastic"}
 """Parameters of the kinds of damping, and the kind that each belongs to."""
 DEFAULT_DAMPING_RATIO = 0.2
+DAMPED_SPEED_GAIN = 3.4
+"""Largest sticking speed with the default damping ratio over that without damping (docs/physics/contact-options.md)."""
 MAX_DAMPING_RATIO = 5.0
 FACTORS = ("slide_factor", "roll_factor", "twist_factor", "surface_energy_factor")
 """Settings that multiply a constant of all contacts."""
@@ -63,8 +65,9 @@ class Contact:
     damping : str, optional
         "none", for collisions, whose thresholds damping would move. "critical": dashpots on all four modes, each with a
         share ζ of its critical damping, c_q = 2ζ √(k_q m_q), for growth, where nothing else removes the vibrations that
-        every touch leaves. Damping of the normal motion alone: "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al.
-        2013: F = (2 T_vis E*/ν²) a dδ/dt, with ν1 ν2 in place of ν² for unequal materials).
+        every touch leaves; with the default ζ grains stick up to 3.4 times the speed. Damping of the normal motion
+        alone: "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013: F = (2 T_vis E*/ν²) a dδ/dt, with ν1 ν2
+        in place of ν² for unequal materials).
     damping_ratio : float, optional
         ζ, above 0, at most 5; for "critical", whose default is 0.2. Steps are shorter above 0.25.
     damping_constant : float or str, optional

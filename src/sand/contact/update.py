@@ -21,7 +21,7 @@ import numpy as np
 from ..box import nearest_image
 from ..compiler.jit import COMPILED, formula, loop, rare
 from ..numerics.quaternion import turned, turned_back, turned_by
-from ..numerics.simd import round_up_to_simd_width
+from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
 from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
 from ..state.arrays import BLOCK as CONTACTS_PER_BLOCK
 from ..state.state import (
@@ -58,7 +58,7 @@ the pass over contacts.
 
 
 class ContactSums(NamedTuple):
-    """Counts and energy losses of a pass over contacts."""
+    """Counts, energy losses and the largest overlap of a pass over contacts."""
 
     pending: float  # contacts to be handled one by one
     slipped: float  # contacts that slipped
@@ -69,6 +69,13 @@ class ContactSums(NamedTuple):
     damped_sliding: float
     damped_rolling: float
     damped_twisting: float
+    deepest: float  # largest overlap, in radii of the smaller grain; 0 if no grains overlap
+
+
+@formula
+def overlap_share(overlap, r1, r2):
+    """Overlap in radii of the smaller grain; 0 or less for separated surfaces."""
+    return overlap / (r1 if r1 < r2 else r2)
 
 
 @loop
@@ -216,6 +223,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
         pending = slipped = 0
         slid = rolled = twisted = 0.0
         damped1 = damped2 = damped3 = damped4 = 0.0
+        deepest = float_bits(0.0)  # the bits of a negative number are below 0
         for k in range(last - first):
             c = first + k
             i, j = contacts.pair[0, c], contacts.pair[1, c]
@@ -247,10 +255,14 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
             contacts.flag[c] = flag
             pending += 1 if (flag == PENDING_FLAG) & (c < used) else 0
             slipped += 1 if flag == SLIPPED_FLAG else 0
+            deepest = max(deepest, float_bits(overlap_share(overlap, r1, r2) if c < used else 0.0))
             slid += lost[0]
             rolled += lost[1]
             twisted += lost[2]
-        return ContactSums(float(pending), float(slipped), slid, rolled, twisted, damped1, damped2, damped3, damped4)
+        return ContactSums(
+            float(pending), float(slipped), slid, rolled, twisted, damped1, damped2, damped3, damped4,
+            float_from_bits(deepest),
+        )  # fmt: skip
 
     return update_contacts
 
@@ -278,7 +290,7 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
         With stiffnesses that follow a(δ) all contacts beyond a limit stay flagged: the work of the stiffness change
         must be logged before they slip.
         """
-        pending = slipped = slid = rolled = twisted = 0.0
+        pending = slipped = slid = rolled = twisted = deepest = 0.0
         damped1 = damped2 = damped3 = damped4 = 0.0
         for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
             begin = first + b * BLOCK
@@ -301,7 +313,8 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
             damped2 += part.damped_sliding
             damped3 += part.damped_rolling
             damped4 += part.damped_twisting
-        return ContactSums(pending, slipped, slid, rolled, twisted, damped1, damped2, damped3, damped4)
+            deepest = max(deepest, part.deepest)
+        return ContactSums(pending, slipped, slid, rolled, twisted, damped1, damped2, damped3, damped4, deepest)
 
     return contact_pass
 
@@ -316,7 +329,7 @@ def log_contact_sums(count, lost, sums):
 
 @loop
 def store_contact_sums(rows, b, sums):
-    """Store the sums of a pass in row b of a (B, ≥ 9) array."""
+    """Store the sums of a pass in row b of a (B, ≥ 10) array."""
     rows[b, 0] = sums.pending
     rows[b, 1] = sums.slipped
     rows[b, 2] = sums.slid
@@ -326,14 +339,16 @@ def store_contact_sums(rows, b, sums):
     rows[b, 6] = sums.damped_sliding
     rows[b, 7] = sums.damped_rolling
     rows[b, 8] = sums.damped_twisting
+    rows[b, 9] = sums.deepest
 
 
 @loop
 def load_contact_sums(rows, b):
     """Sums stored in row b by `store_contact_sums`."""
     return ContactSums(
-        rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4], rows[b, 5], rows[b, 6], rows[b, 7], rows[b, 8]
-    )
+        rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4], rows[b, 5], rows[b, 6], rows[b, 7], rows[b, 8],
+        rows[b, 9],
+    )  # fmt: skip
 
 
 @functools.cache

@@ -17,7 +17,7 @@ from ..box import nearest_image
 from ..compiler.jit import loop, rare
 from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, scale, sub
-from ..state.state import BREAKING, FORMING, STEP, STEPS, STIFFNESS, TIME, WALL_CONTACTS
+from ..state.state import BREAKING, FORMING, LARGEST_OVERLAP, STEP, STEPS, STIFFNESS, TIME, WALL_CONTACTS
 from .columns import FASTEST_MODE, column_loops, load_pairing
 from .damping import (
     FORCE,
@@ -42,6 +42,7 @@ from .damping import (
     unit_deviates,
 )
 from .events import compact_contacts
+from .impact import note_impact
 from .law import ContactLaw, wall_constants
 from .losses import DAMPING_ROW, FORMING_ROW, STIFFNESS_ROW, add_damping_energies, add_slip_energies, add_slip_losses
 from .mechanics import (
@@ -183,6 +184,15 @@ def count_new_wall_contacts(grains, walls, contacts, count, numbers, dt):
             near = dot(sub(load(grains.position, g), at), n) <= grains.radius[g]
             found += 1 if near and walls.touching[w, g] == 0 else 0
     return found
+
+
+@loop
+def _note_overlaps(grains, walls, contacts, clock, count):
+    """Keep the largest overlap with a wall, in radii of the grain, in `State.clock` if it is the largest so far."""
+    for c in range(count[WALL_CONTACTS]):
+        g = contacts.pair[0, c]
+        overlap = grains.radius[g] - wall_height(grains, walls, g, contacts.pair[1, c])
+        clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], overlap / grains.radius[g])
 
 
 @functools.cache
@@ -327,6 +337,8 @@ def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
         write_loads(grains, contacts, c, pose, ZERO, force, end, scaled_stiffness(constants, y, settings.follow))
         if dt > 0.0:
             reduced = 1.0 / (1.0 / grains.mass[g] + 1.0 / numbers.mass[w])
+            pairing = load_pairing(numbers.pairings, grains.material[g], w)
+            note_impact(clock, closing, reduced, constants.reduced_radius, pairing.modulus)
             drop = at_touch(constants) - normal_energy(overlap, y, constants)
             gain = contact_speed_gain(drop, force, stiffness(overlap, y, constants), closing, reduced, dt)
             impulse -= reduced * gain + 0.5 * dt * dot(load(contacts.force, c), n)
@@ -351,6 +363,7 @@ def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
                 if touches and count[WALL_CONTACTS] < contacts.pair.shape[1]:
                     form_contact(grains, walls, contacts, clock, count, lost, settings, numbers, g, w, dt)
         _finish_walls(walls, contacts, count, numbers, dt)
+        _note_overlaps(grains, walls, contacts, clock, count)
         if broken > 0:
             count[WALL_CONTACTS] = compact_contacts(contacts, count[WALL_CONTACTS])
         return count[WALL_CONTACTS]

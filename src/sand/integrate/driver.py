@@ -28,6 +28,7 @@ from ..state.state import (
     CYCLE,
     GRAIN1,
     INNER_SKIN,
+    LARGEST_OVERLAP,
     LEFT,
     LONG_RANGE_SKIN,
     LONG_RANGE_SUMS,
@@ -301,7 +302,7 @@ def update_lists(grains, pair_list, long_range, span, settings, search, criteria
 
 
 @caller
-def update_contacts(count, lost, settings, queue, program, table):
+def update_contacts(clock, count, lost, settings, queue, program, table):
     """Update all contacts, and slip or break those beyond a limit; returns whether any contact broke."""
     blocks = blocks_of(count[CONTACTS], CONTACTS_PER_BLOCK)
     for_each_block(program, CONTACT_PASS, table, queue.words, blocks)
@@ -309,6 +310,7 @@ def update_contacts(count, lost, settings, queue, program, table):
     for b in range(blocks):
         passed = load_contact_sums(queue.passed, b)
         pending |= passed.pending > 0.0
+        clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], passed.deepest)
         if settings.damped or passed.slipped > 0.0:
             log_contact_sums(count, lost, passed)
     if settings.follow:
@@ -339,7 +341,7 @@ def second_half(
             if driven:
                 call_stage(program, DRIVE, table, RELEASE_FROM_EVENTS)
             return stop
-    broken = update_contacts(count, lost, settings, queue, program, table)
+    broken = update_contacts(clock, count, lost, settings, queue, program, table)
     if formed > 0:
         call_stage(program, FORM, table, 0)
         call_stage(program, SORT, table, 0)

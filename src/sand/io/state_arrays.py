@@ -21,6 +21,7 @@ from ..state.state import (
     CUTOFF,
     GRAIN1,
     GRAIN2,
+    LEAST_CLOCK,
     LOST,
     PAIRS,
     STAGE,
@@ -42,7 +43,7 @@ class ArraySpec(NamedTuple):
 
 CONTACT_VECTORS = ("pointer1", "pointer2", "force", "torque1", "torque2")
 STORED = {
-    "clock": ArraySpec("f8", (len(CLOCK),), "no nan"),
+    "clock": ArraySpec("f8", (tuple(range(LEAST_CLOCK, len(CLOCK) + 1)),), "no nan"),
     "count": ArraySpec("i8", (len(COUNT),), "any"),
     "lost": ArraySpec("f8", (len(LOST),)),
     "cutoff": ArraySpec("f8", (len(CUTOFF),), "not below 0"),

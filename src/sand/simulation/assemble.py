@@ -49,6 +49,7 @@ from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refu
 from .new_state import new_state
 from .ramped import RampedForces
 from .rigid_engine import RigidEngine, list_gap, longest_step_awake
+from .solid_limits import torn_clusters
 from .substeps import SubstepEngine
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
@@ -128,6 +129,9 @@ def build_engine(
         wrapped.arrays.velocity[:, held.grain], wrapped.arrays.spin[:, held.grain] = held.velocity, held.spin
         neighbours = dataclasses.replace(neighbours, order="as given")
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
+    if by_type.contact is not None and fresh:
+        touching = start.pair if contacts is None else np.unique(np.sort([*start.pair, *contacts.pair], axis=1), axis=0)
+        warnings += torn_clusters(wrapped, by_type.contact, touching, box)
     follower = follow_clusters(by_type.long_range, grains, box, start.pair, contacts, cutoff)
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
     if follower is not None:

@@ -13,6 +13,7 @@ from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
 from ..units import format_quantity
 from .limits import limit_warnings
+from .solid_limits import fast_settling, grain_warnings
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
@@ -62,8 +63,9 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
 
 def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
     """Warnings about limits of the model, very large grains, and overlaps without a contact law."""
-    warnings = limit_warnings(grains, forces, box)
+    warnings = [*limit_warnings(grains, forces, box), *grain_warnings(grains, forces).values()]
     contact = any(isinstance(force, Contact) for force in forces)
+    warnings += [text for force in forces if isinstance(force, Contact) for text in fast_settling(grains, force)]
     largest = int(np.argmax(grains.radius))
     if contact and grains.radius[largest] > LARGEST_RADIUS:
         size = format_quantity(float(grains.radius[largest]), "m")

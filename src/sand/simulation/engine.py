@@ -247,6 +247,11 @@ class Engine:
         """Number of steps taken so far."""
         return self._state.steps
 
+    @property
+    def clock(self) -> np.ndarray:
+        """Times and extremes of the regular state, `State.clock`."""
+        return self._state.clock
+
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
         if not self._state.order.size or self.steps >= self._state.count[ORDERED] + SORT_INTERVAL:

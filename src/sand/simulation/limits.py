@@ -11,7 +11,7 @@ import numpy as np
 from ..box import Box
 from ..constants import BOLTZMANN
 from ..contact.law import contact_constants, ringing_energy
-from ..contact.model import Contact
+from ..contact.model import DAMPED_SPEED_GAIN, Contact
 from ..forces.base import Force
 from ..forces.gas.model import Gas
 from ..forces.pair.dipoles import Dipoles, kinetic_temperature
@@ -85,7 +85,10 @@ def _ringing(contact: Contact, grains: Grains, kind: int, kelvin: float) -> str:
     thermal = f", {energy / (BOLTZMANN * kelvin):.3g} kT at {kelvin:.4g} K" if kelvin > 0.0 else ""
     kept = f"damping: {contact.damping}"
     if contact.damping == "none":
-        kept = "nothing removes it: for growth choose a damping"
+        kept = (
+            "nothing removes it: for growth choose a damping, 'critical' lets grains stick up to "
+            f"{DAMPED_SPEED_GAIN:g} times the speed"
+        )
         if contact.settling_time is not None:
             kept = f"settling time: {format_quantity(contact.settling_time, 's')}"
     hot = f"{energy / BOLTZMANN:.2g} K"

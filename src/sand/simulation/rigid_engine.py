@@ -391,6 +391,7 @@ class RigidEngine(Engine):
         present.lost[:] = 0.0
         state.clock[SETTLED] = present.clock[SETTLED]
         state.clock[CORRECTED] += present.clock[CORRECTED]
+        state.take_extremes(present)
         present.count[MADE] = present.count[BROKEN] = present.count[SLIPPED] = 0
 
     def _note_slips(self, present: State, used: int) -> None:

@@ -41,6 +41,7 @@ from .run_loop import run_loop
 from .run_writer import RunWriter, is_mostly_awake
 from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
+from .solid_limits import extreme_warnings, grain_warnings
 from .stop import StopCriteria, stop_criteria
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
@@ -492,14 +493,19 @@ class Simulation(ReadOnlySettings):
         return list(self._warned)
 
     def _warn(self, text: str, about: str = "") -> None:
-        """Warn once of each text, and of one text that begins with `about`."""
-        if text not in self._warned and not (about and any(one.startswith(about) for one in self._warned)):
-            self._warned.append(text)
-            warn(text)
+        """Warn once of each text, and of one text that begins with `about`; of these the latest is kept."""
+        earlier = [k for k, one in enumerate(self._warned) if one == text or (about and one.startswith(about))]
+        if earlier:
+            self._warned[earlier[0]] = text
+            return
+        self._warned.append(text)
+        warn(text)
 
     def _warn_of_engine(self) -> None:
         while self._engine.warnings:
             self._warn(self._engine.warnings.pop(0))
+        for about, text in extreme_warnings(self._engine.clock).items():
+            self._warn(text, about)
 
     def _notes(self, rows: Sequence[dict[str, float]]) -> dict[str, str]:
         damped = any(isinstance(force, Contact) and force.damping != "none" for force in self.forces)
@@ -523,6 +529,9 @@ class Simulation(ReadOnlySettings):
             return
         if with_frame:
             self._frame_times.append(row["time"])
+        for about, text in grain_warnings(self.grains, self.forces).items():
+            if not any(one.startswith(about) for one in self._warned):
+                self._warn(text)
         for kind, text in self._notes([self.ledger.rows[0], row]).items():
             if kind not in self._notes_shown:
                 self._warn(text)
@@ -539,6 +548,7 @@ class Simulation(ReadOnlySettings):
         if outcome.is_physics:
             self._record_output()
         ledger = self.ledger.with_row(self._log_row())
+        self._warn_of_engine()
         if is_mostly_awake(self):
             self._warn("clusters were awake most of the time: clusters = 'grains' (sand.Verlet) costs no more")
         if self.regular_state.count[LATE]:

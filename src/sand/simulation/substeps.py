@@ -212,5 +212,6 @@ class SubstepEngine(RigidEngine):
         state.clock[GRAINS_AWAKE] += own.clock[GRAINS_AWAKE] * len(index) / len(state.grains)
         state.clock[CORRECTED] += own.clock[CORRECTED]
         state.clock[SETTLED] = own.clock[SETTLED]
+        state.take_extremes(own)
         state.clock[LARGEST_LOAD] = max(state.clock[LARGEST_LOAD], own.clock[LARGEST_LOAD])
         state.count[STAGE], self._had_substeps = AFTER_SUBSTEPS, True

@@ -6,16 +6,21 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..constants import BOLTZMANN
+from ..contact.model import DAMPED_SPEED_GAIN, DEFAULT_DAMPING_RATIO
 from ..units import format_quantity
 
 HOT = 100.0
 """Internal kinetic energy per grain, in k_B T of the grains at the start, from which a run says so."""
+GROWN = 3
+"""Grains of the largest cluster from which on aggregates grow; two grains that touch are a collision."""
 
 
 def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: int, *, damped: bool) -> dict[str, str]:
-    """What the ledger says about vibrations of contacts in a run that began with free grains, by the kind of finding.
+    """What the ledger says about vibrations of contacts where aggregates have grown from free grains, by the finding.
 
-    Collisions of aggregates, in which contacts are meant to vibrate and to break, have no notes.
+    Collisions of two grains or of aggregates, in which contacts are meant to vibrate and to break, have no notes: their
+    thresholds are those of the undamped contact, and damping would move them. So damping is advised only where a
+    cluster of `GROWN` grains or more has formed in the run and contacts vibrate.
 
     Parameters
     ----------
@@ -31,21 +36,28 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
     Returns
     -------
     dict of str to str
-        "vibration": internal kinetic energy above 100 k_B T₀ per grain; "breaking": contacts that broke.
+        "vibration": internal kinetic energy above 100 k_B T₀ per grain; "breaking": contacts that broke, with advice
+        where contacts vibrate or are damped.
     """
     notes: dict[str, str] = {}
     if not rows or rows[0]["clusters"] < grains:
         return notes
+    grown = [row for row in rows if row["largest_cluster"] >= GROWN]
     share = grains * BOLTZMANN * temperature
-    advice = "damping = 'critical' in [forces.contact] (sand.Contact) removes the vibrations that every touch leaves"
+    hot = [row for row in grown if row["internal"] > HOT * share]
+    advice = (
+        "; damping = 'critical' in [forces.contact] (sand.Contact) removes the vibrations that every touch leaves, but "
+        f"grains then stick up to {DAMPED_SPEED_GAIN:g} times the speed (damping_ratio = {DEFAULT_DAMPING_RATIO:g})"
+    )
     if damped:
-        advice = "contacts are damped already: fast impacts cause this, or the damping is too weak"
-    if share > 0.0 and (hot := next((row for row in rows if row["internal"] > HOT * share), None)) is not None:
-        most = max(row["internal"] for row in rows) / share
+        advice = "; contacts are damped already: fast impacts cause this, or the damping is too weak"
+    if hot and share > 0.0:
+        most = max(row["internal"] for row in grown) / share
         notes["vibration"] = (
-            f"grains in contact vibrate: from {format_quantity(hot['time'], 's')} on their internal kinetic energy "
-            f"exceeds {HOT:g} k_B T₀ per grain, {most:.3g} at most; {advice}"
+            f"grains in contact vibrate: from {format_quantity(hot[0]['time'], 's')} on their internal kinetic energy "
+            f"exceeds {HOT:g} k_B T₀ per grain, {most:.3g} at most{advice}"
         )
-    if broken := rows[-1]["broken"]:
-        notes["breaking"] = f"{broken} contact{'s' * (broken > 1)} of growing aggregates broke; {advice}"
+    if grown and (broken := rows[-1]["broken"]):
+        cause = advice if damped or hot else ""
+        notes["breaking"] = f"{broken} contact{'s' * (broken > 1)} broke while aggregates grew{cause}"
     return notes

@@ -52,10 +52,16 @@ WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
 SOME_AWAKE = 13  # time with any cluster awake [s], of rigid clusters
 GRAINS_AWAKE = 14  # mean time awake of a grain [s]
 LARGEST_LOAD = 15  # largest change of the loads of the contacts of a cluster at rest, in units of their limits
+LARGEST_OVERLAP = 16  # largest overlap at the end of a step, in radii of the smaller grain
+LARGEST_IMPACT = 17  # largest speed of an impact in units of `contact.impact.impact_share`
+IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
     *("corrected", "settled", "wall_step", "some_awake", "grains_awake", "largest_load"),
+    *("largest_overlap", "largest_impact", "impact_speed"),
 )
+LEAST_CLOCK = LARGEST_OVERLAP
+"""Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0."""
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
@@ -167,6 +173,13 @@ class State:
         """Which grains (N,) belong to clusters at rest, single grains included; None without rigid clusters."""
         return self.bodies.asleep == 1 if self.bodies.asleep.size else None
 
+    def take_extremes(self, part: State) -> None:
+        """Take over the largest overlap and the largest impact of a part of the grains that took steps of its own."""
+        own, other = self.clock, part.clock
+        own[LARGEST_OVERLAP] = max(own[LARGEST_OVERLAP], other[LARGEST_OVERLAP])
+        if other[LARGEST_IMPACT] > own[LARGEST_IMPACT]:
+            own[LARGEST_IMPACT], own[IMPACT_SPEED] = other[LARGEST_IMPACT], other[IMPACT_SPEED]
+
     def copy(self) -> State:
         """Independent copy (snapshot)."""
         copied = {name: type(group)(*(a.copy() for a in group)) for name in GROUPS for group in [getattr(self, name)]}
@@ -225,6 +238,8 @@ class State:
         BadInput
             If an array is missing or has another shape.
         """
+        if "clock" in saved and LEAST_CLOCK <= saved["clock"].size < len(CLOCK):
+            saved = saved | {"clock": np.pad(saved["clock"], (0, len(CLOCK) - saved["clock"].size))}
         for name in ("clock", "count", "lost", "cutoff"):
             _copy_into(getattr(self, name), saved, name)
         if "order" in saved:

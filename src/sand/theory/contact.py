@@ -9,7 +9,7 @@ from typing import Any
 from ..arguments import checked
 from ..contact import jkr
 from ..contact.dmt import tabor_parameter
-from ..contact.law import contact_constants
+from ..contact.law import contact_constants, contact_periods
 from ..contact.mixing import MIXING, pairing_between
 from ..errors import BadInput, did_you_mean
 from ..material import Material, as_material
@@ -161,16 +161,9 @@ def contact(
     at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
     cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
     inverse_mass = 1.0 / m1 + 1.0 / m2
-    inverse_inertia = 2.5 / (m1 * r1 * r1) + 2.5 / (m2 * r2 * r2)
-    inverse_slide = inverse_mass + (2.5 / m1 + 2.5 / m2)
     k_n = jkr.normal_stiffness(c.rest_radius, pairing.modulus)
     rolled = c.roll_stiffness * c.roll_limit * math.pi * c.reduced_radius
-    squared_frequencies = {
-        "normal_period": k_n * inverse_mass,
-        "slide_period": c.slide_stiffness * inverse_slide,
-        "roll_period": c.roll_stiffness * c.reduced_radius**2 * inverse_inertia,
-        "twist_period": c.twist_stiffness * inverse_inertia,
-    }
+    periods = contact_periods(jkr.LAW, pairing, r1, r2, m1, m2)
     constants = c._asdict() | c.normal._asdict()
     constants = {name: value for name, value in constants.items() if name in ContactNumbers.__dataclass_fields__}
     return ContactNumbers(
@@ -187,6 +180,9 @@ def contact(
         twist_moment=c.twist_stiffness * c.twist_limit,
         roll_energy_clamped=rolled,
         roll_energy_released=0.5 * rolled,
-        **{name: 2.0 * math.pi / math.sqrt(w) for name, w in squared_frequencies.items()},
+        normal_period=periods["normal"],
+        slide_period=periods["sliding"],
+        roll_period=periods["rolling"],
+        twist_period=periods["twisting"],
         sticking_speed=math.sqrt(2.0 * cycle * inverse_mass),
     )

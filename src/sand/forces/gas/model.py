@@ -20,6 +20,8 @@ from .loops import GasParameters, shortest_stopping_time
 
 MIN_KNUDSEN = 10.0
 """Least mean free path in radii for free molecular flow."""
+HYDROGEN = 2e-19
+"""Collision cross-section of two H2 molecules [m²] (recalled); those of other gases but helium are larger."""
 LARGEST_SPEED = 0.5
 """Speed relative to the gas, in mean molecular speeds, up to which Epstein's linear law is accurate: at this speed it
 underestimates drag by 6 % (specular reflection) or 4 % (diffuse reflection)."""
@@ -56,7 +58,7 @@ class Gas:
         u, three components of the velocity of the gas [m/s]; at rest by default.
     cross_section : float or str, optional
         Collision cross-section of two molecules [m^2] > 0, about "2e-19 m^2" for H2. If given, a mean free path below
-        ten radii is reported.
+        ten radii is reported; without it, a path below one radius that follows from the value of H2.
 
     Raises
     ------
@@ -139,13 +141,15 @@ class Gas:
                 f"{format_quantity(numbers.mean_speed, 'm/s')}; Epstein's law holds for much smaller speeds "
                 "and underestimates the drag"
             )
-        if self.cross_section is not None:
-            path = law.mean_free_path(numbers.density, self.molecule_mass, self.cross_section)
-            largest = float(grains.radius.max())
-            if path < MIN_KNUDSEN * largest:
-                warnings.append(
-                    f"gas: the mean free path is {format_quantity(path, 'm')}, the largest radius "
-                    f"{format_quantity(largest, 'm')}; Epstein's law holds above {MIN_KNUDSEN:g} radii "
-                    "and overestimates the drag"
-                )
+        # without a cross-section the path is known to a factor of a few: only a path below one radius is reported
+        given = self.cross_section is not None
+        path = law.mean_free_path(numbers.density, self.molecule_mass, self.cross_section if given else HYDROGEN)
+        largest = float(grains.radius.max())
+        if path < (MIN_KNUDSEN if given else 1.0) * largest:
+            estimate = "" if given else f" (for a cross_section of {HYDROGEN:g} m^2, that of H2; give that of the gas)"
+            warnings.append(
+                f"gas: the mean free path is {format_quantity(path, 'm')}{estimate}, the largest radius "
+                f"{format_quantity(largest, 'm')}; Epstein's law holds above {MIN_KNUDSEN:g} radii "
+                "and overestimates the drag; use a thinner gas or smaller grains"
+            )
         return warnings
