@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from ..version import __version__
-from . import options, report
+from . import options, parsing, report
 
 #: topic, and the reference
 REFERENCES = (
@@ -32,7 +32,7 @@ REFERENCES = (
 )
 
 
-@click.command("cite", short_help="What to cite.")
+@parsing.command("cite", short_help="What to cite.")
 @options.output
 def command(as_json: bool) -> None:
     """What to cite when SAND was of use."""

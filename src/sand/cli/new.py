@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 
 from ..errors import BadInput
-from . import options, report
+from . import options, parsing, report
 
 
-@click.command("new", short_help="Write a case file with every key.")
+@parsing.command("new", short_help="Write a case file with every key.")
 @click.argument("name", metavar="NAME", type=options.PATH)
 @options.output
 def command(name: str, as_json: bool) -> None:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from .run_figure import DPI
 from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_prefix
 
 COLOURS = (RED, BLUE, GREEN, PURPLE)
@@ -30,7 +31,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
         `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain.
     """
     with plot_style():
-        figure = Figure(figsize=(9.6, 3.3), layout="constrained")
+        figure = Figure(figsize=(9.6, 3.3), dpi=DPI, layout="constrained")
         left, middle, right = figure.subplots(1, 3)
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):

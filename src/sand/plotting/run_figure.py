@@ -167,7 +167,7 @@ def _pixels(height: float) -> tuple[int, int]:
     return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
 
 
-def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -> bytes:
+def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False, dpi: float = 0.0) -> bytes:
     """Encode a figure as a file, without time stamps: equal figures give equal bytes.
 
     Parameters
@@ -178,10 +178,12 @@ def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -
         "png", "pdf" or "svg".
     transparent : bool, optional
         Transparent background.
+    dpi : float, optional
+        Pixels per inch, which a PNG states; by default those of the figure.
     """
     colour = "none" if transparent else "auto"  # "auto" is the colour of the figure, also with a dark background
     with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
-        figure.savefig(content := io.BytesIO(), format=form, dpi=DPI, facecolor=colour, metadata=_METADATA[form])
+        figure.savefig(content := io.BytesIO(), format=form, dpi=dpi or figure.dpi, facecolor=colour, metadata=_METADATA[form])
     return content.getvalue()
 
 
