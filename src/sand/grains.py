@@ -188,7 +188,11 @@ class Grains:
             raise NoSuchAttribute(
                 f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}), "
                 "and build a new Simulation from them"
-                + (f"; or in a simulation: with sim.change() as change: change.{name}[…] = …" if name in CHANGEABLE else "")
+                + (
+                    f"; or in a simulation: with sim.change() as change: change.{name}[…] = …"
+                    if name in CHANGEABLE
+                    else ""
+                )
             )
         elif type(self).__module__.startswith("sand."):
             raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")

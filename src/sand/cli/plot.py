@@ -91,7 +91,9 @@ def _bonds(given: str | None) -> str | None:
 
 @parsing.command("plot", short_help="Draw figures of a run, and a still picture of a frame.", check=_check)
 @click.argument("source", metavar="DIR", type=options.PATH)
-@click.option("--what", metavar="WHAT,…", callback=_what, help="What to draw (default: all figures over time, and still).")
+@click.option(
+    "--what", metavar="WHAT,…", callback=_what, help="What to draw (default: all figures over time, and still)."
+)
 @click.option("--out", metavar="FOLDER", type=options.PATH, help="Folder for the files (default: 'plots' in DIR).")
 @click.option("--format", "form", type=click.Choice(FORMATS), default="png", show_default=True, help="File format.")
 @click.option(

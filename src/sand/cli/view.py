@@ -30,7 +30,9 @@ YOUNG = 5.0
 )
 @click.option("--every", metavar="K", type=options.WholeNumber(min=1), default=1, help="Only every K-th frame.")
 @options.frames
-@click.option("--port", metavar="N", type=options.WholeNumber(0, 65535), default=0, help="Port (default: any free one).")
+@click.option(
+    "--port", metavar="N", type=options.WholeNumber(0, 65535), default=0, help="Port (default: any free one)."
+)
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 @click.option("--overwrite", is_flag=True, help="Replace FILE if it exists.")
 @options.output

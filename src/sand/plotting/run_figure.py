@@ -183,7 +183,9 @@ def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False, d
     """
     colour = "none" if transparent else "auto"  # "auto" is the colour of the figure, also with a dark background
     with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
-        figure.savefig(content := io.BytesIO(), format=form, dpi=dpi or figure.dpi, facecolor=colour, metadata=_METADATA[form])
+        figure.savefig(
+            content := io.BytesIO(), format=form, dpi=dpi or figure.dpi, facecolor=colour, metadata=_METADATA[form]
+        )
     return content.getvalue()
 
 
