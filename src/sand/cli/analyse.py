@@ -23,11 +23,11 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 
 
 @parsing.command("analyse", short_help="Measure growth, moments and fractal dimension of runs.", check=_check)
-@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=options.PATH)
+@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=options.RUN)
 @click.option(
     "--out",
     metavar="FOLDER",
-    type=options.PATH,
+    type=options.FOLDER,
     help="Folder for analysis.json, growth.csv, aggregates.csv and growth.png.",
 )
 @click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S in which z is fitted.")

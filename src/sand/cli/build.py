@@ -81,10 +81,15 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @click.option("--dimension", metavar="D", callback=_number, help="Fractal dimension of KIND fractal (default 1.8).")
 @click.option("--prefactor", metavar="K", callback=_number, help="Fractal prefactor of KIND fractal (default 1.3).")
 @click.option(
-    "--seed", type=options.SEED, default=0, show_default=True, help="Seed; the same seed gives the same grains."
+    "--seed",
+    type=options.SEED,
+    metavar="N",
+    default=0,
+    show_default=True,
+    help="Seed; the same seed gives the same grains.",
 )
 @click.option(
-    "--out", required=True, metavar="FILE", type=options.PATH, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
+    "--out", required=True, metavar="FILE", type=options.FILE, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 @options.output

@@ -17,8 +17,8 @@ SHOWN = 12
 
 
 @parsing.command("collide", short_help="Collide two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml", type=options.PATH)
-@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
+@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
 @options.imports

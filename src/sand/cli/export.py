@@ -14,9 +14,9 @@ SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vt
 
 
 @parsing.command("export", short_help="Export the frames of a run to other programs.")
-@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.argument("folder", metavar="DIR", type=options.RUN)
 @click.option("--to", "form", required=True, type=click.Choice(list(SUFFIXES)), help="Format of the files.")
-@click.option("--out", metavar="PATH", type=options.PATH, help="Path without suffix (default: 'trajectory' in DIR).")
+@click.option("--out", metavar="PATH", type=options.FILE, help="Path without suffix (default: 'trajectory' in DIR).")
 @options.frames
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.output

@@ -16,10 +16,10 @@ DEFAULT_SEEDS = list(range(1, 9))
 
 
 @parsing.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
-@click.argument("case", metavar="CASE.toml", type=options.PATH)
+@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
 @options.seeds("Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
 @click.option(
-    "--out", metavar="DIR", type=options.PATH, help="Folder for the folders of the boxes (default: the case's name)."
+    "--out", metavar="DIR", type=options.FOLDER, help="Folder for the folders of the boxes (default: the case's name)."
 )
 @options.workers
 @options.scheduler

@@ -31,7 +31,7 @@ JOBS = {
 
 
 @parsing.command("info", short_help="Describe a run or one of its files.")
-@click.argument("path", metavar="DIR|FILE", type=options.PATH)
+@click.argument("path", metavar="DIR|FILE", type=options.RUN_OR_CASE)
 @options.imports
 @options.output
 def command(path: str, **output: bool) -> None:

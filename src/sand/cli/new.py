@@ -15,7 +15,7 @@ COMMANDS = ("run", "collide", "scatter", "grow")
 
 
 @parsing.command("new", short_help="Write a case file with every key.")
-@click.argument("name", metavar="NAME", type=options.PATH)
+@click.argument("name", metavar="NAME", type=options.FILE)
 @click.option(
     "--for",
     "reader",

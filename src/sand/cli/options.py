@@ -13,9 +13,24 @@ from ..io.run_folder import checked_name
 
 
 class PathName(click.ParamType):
-    """The name of a file or folder: not empty, and not longer than systems allow."""
+    """The name of a file or folder: not empty, and not longer than systems allow.
+
+    Parameters
+    ----------
+    wanted : str
+        What a shell completes, see `completion.path_items`.
+    """
 
     name = "path"
+
+    def __init__(self, wanted: str):
+        self.wanted = wanted
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+        """Completions of the beginning of a path."""
+        from .completion import path_items
+
+        return path_items(incomplete, self.wanted)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Check the name.  Raises BadInput."""
@@ -29,7 +44,7 @@ class WholeNumber(click.IntRange):
     name = "whole number"
 
 
-PATH = PathName()
+FILE, FOLDER, RUN, CASE_FILE, RUN_OR_CASE = map(PathName, ("file", "folder", "run", "case", "run or case"))
 SEED = WholeNumber(0, MOST_SEED)
 FRAME = WholeNumber(-(2**31), 2**31 - 1)
 COUNT = WholeNumber(1, MOST_GRAINS)
@@ -44,7 +59,7 @@ workers = click.option(
 
 scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://host:port.")
 
-_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 
 _quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only, neither results nor progress.")
 
@@ -53,8 +68,8 @@ debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the
 
 
 def output(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options --json, --quiet and --debug, which every command has; their values are `as_json` and `quiet`."""
-    return _as_json(_quiet(debug(command)))
+    """The options --json, --quiet and --debug of every command with results; values `as_json` and `quiet`."""
+    return as_json(_quiet(debug(command)))
 
 
 threads = click.option(

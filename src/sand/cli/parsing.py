@@ -117,8 +117,10 @@ class Command(click.Command):
                 k = next((k for k, word in enumerate(words) if _is_use(word, error.option_name)), None)
                 if k is None:
                     return problems, names, ({}, [])
-                after += [word for word in words[k + 1 : k + 2] if not word.startswith("-")]
-                del words[k]
+                if isinstance(error, click.NoSuchOption):
+                    after += [word for word in words[k + 1 : k + 2] if not word.startswith("-")]
+                # an option with too few values is the last one
+                del words[k : k + 1 if isinstance(error, click.NoSuchOption) or "=" in words[k] else None]
                 continue
             if not rest or ctx.allow_extra_args or isinstance(self, click.Group):
                 return problems, names, (found, rest)

@@ -90,11 +90,11 @@ def _bonds(given: str | None) -> str | None:
 
 
 @parsing.command("plot", short_help="Draw figures of a run, and a still picture of a frame.", check=_check)
-@click.argument("source", metavar="DIR", type=options.PATH)
+@click.argument("source", metavar="DIR", type=options.RUN)
 @click.option(
     "--what", metavar="WHAT,…", callback=_what, help="What to draw (default: all figures over time, and still)."
 )
-@click.option("--out", metavar="FOLDER", type=options.PATH, help="Folder for the files (default: 'plots' in DIR).")
+@click.option("--out", metavar="FOLDER", type=options.FOLDER, help="Folder for the files (default: 'plots' in DIR).")
 @click.option("--format", "form", type=click.Choice(FORMATS), default="png", show_default=True, help="File format.")
 @click.option(
     "--frame", metavar="K", type=options.FRAME, default=-1, help="Frame, numbered as in Python (default: the last)."

@@ -15,6 +15,7 @@ from . import (
     build,
     cite,
     collide,
+    completion,
     export,
     grow,
     info,
@@ -30,7 +31,7 @@ from . import (
 )
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
-COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
+COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite, completion)
 """One module per command, with a click command named `command`."""
 
 
@@ -66,6 +67,8 @@ def run_command(words: list[str], interrupted: Callable[[], bool]) -> int:
     int
         The exit code.
     """
+    if (code := completion.answer_shell(sand)) is not None:
+        return code
     try:
         with sand.make_context("sand", list(words)) as context, report.notes():
             return sand.invoke(context) or DONE

@@ -22,7 +22,7 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 
 
 @parsing.command("resume", short_help="Continue an interrupted run or job of any command.")
-@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.argument("folder", metavar="DIR", type=options.RUN)
 @options.end_of_run('For a run: a new end instead of the planned one, such as "10 us".')
 @options.imports
 @options.workers

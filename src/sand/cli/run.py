@@ -24,13 +24,13 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 
 
 @parsing.command("run", short_help="Run the simulation that a case file describes.", check=_check)
-@click.argument("case", metavar="CASE.toml", required=False, type=options.PATH)
-@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+@click.argument("case", metavar="CASE.toml", required=False, type=options.CASE_FILE)
+@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @click.option(
     "--from",
     "source",
     metavar="FILE",
-    type=options.PATH,
+    type=options.RUN,
     help="Trajectory, or folder of a run, to take grains and contacts from.",
 )
 @click.option("--frame", type=options.FRAME, metavar="K", help="Frame of --from, from 0 (default: −1, the last).")

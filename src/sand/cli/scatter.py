@@ -22,8 +22,8 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @parsing.command(
     "scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.", check=_check
 )
-@click.argument("case", metavar="CASE.toml", type=options.PATH)
-@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
+@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @options.workers
 @options.scheduler
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")

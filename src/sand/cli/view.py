@@ -24,9 +24,9 @@ YOUNG = 5.0
 
 
 @parsing.command("view", short_help="Show the grains of a run in the browser.")
-@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.argument("folder", metavar="DIR", type=options.RUN)
 @click.option(
-    "--html", "html", metavar="FILE", type=options.PATH, help="Write one self-contained page instead, to keep or send."
+    "--html", "html", metavar="FILE", type=options.FILE, help="Write one self-contained page instead, to keep or send."
 )
 @click.option("--every", metavar="K", type=options.WholeNumber(min=1), default=1, help="Only every K-th frame.")
 @options.frames
