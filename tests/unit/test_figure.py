@@ -42,6 +42,7 @@ def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.
         ledger=ledger,
         temperature=temperature,
         notes=list,
+        title="",
         time=ledger.rows[-1]["time"] if rows else 0.0,
     )
 

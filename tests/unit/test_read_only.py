@@ -57,7 +57,11 @@ def test_the_code_in_the_messages_runs():
 
 def test_what_cannot_change_says_so(sim):
     """The contact model and the positions: a new simulation is built."""
-    for name, part in (("contact", "the contact model"), ("position", "position of the grains"), ("radius", "radius of")):
+    for name, part in (
+        ("contact", "the contact model"),
+        ("position", "position of the grains"),
+        ("radius", "radius of"),
+    ):
         with pytest.raises(sand.BadInput, match=rf"^{part}.*build a new one"):
             setattr(sim, name, 0)
     with pytest.raises(sand.BadInput, match=r"in a simulation: with sim\.change\(\) as change: change\.velocity"):

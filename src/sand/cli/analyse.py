@@ -31,10 +31,16 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     help="Folder for analysis.json, growth.csv, aggregates.csv and growth.png.",
 )
 @click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S in which z is fitted.")
+@click.option("--guides", is_flag=True, help="Draw the power laws of the paper in growth.png, too.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
 @options.output
 def command(
-    folders: tuple[str, ...], out: str | None, window: tuple[float, float] | None, overwrite: bool, **output: bool
+    folders: tuple[str, ...],
+    out: str | None,
+    window: tuple[float, float] | None,
+    guides: bool,
+    overwrite: bool,
+    **output: bool,
 ) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 
@@ -51,7 +57,7 @@ def command(
         ensembles.append(read_ensemble(folder, window))
     content = {"ensembles": [ensemble_summary(one) for one in ensembles], "comparison": compare_growth(ensembles)}
     if target is not None:
-        write_analysis(target, ensembles, content)
+        write_analysis(target, ensembles, content, guides)
     if output["as_json"]:
         report.emit(content)
     elif not output["quiet"]:

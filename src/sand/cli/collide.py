@@ -89,7 +89,8 @@ def collision_rows(results: list[dict[str, Any]]) -> report.Rows:
 
 
 def _collision(r: dict[str, Any]) -> str:
-    pieces = f"{len(r['fragments'])} bodies, largest {r['largest_remnant']:.0%} of the mass"
+    bodies = len(r["fragments"])
+    pieces = f"{bodies} bod{'ies' if bodies > 1 else 'y'}, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
     unfinished = "" if r["quiet"] else " (stopped before it came to rest)"

@@ -99,7 +99,7 @@ class ReadOnlySettings:
         "observers": read_observers,
         "updaters": read_updaters,
     }
-    INTERNAL = ("recipe", "origin", "planned")
+    INTERNAL = ("recipe", "origin", "planned", "title")
     """Attributes that SAND itself assigns later."""
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -142,7 +142,7 @@ def still_picture(
     keys = [each for each in (key, contact_key) if each is not None]
     with plot_style():
         figure = Still(figsize=(size[0] / dpi, size[1] / dpi), dpi=dpi)
-        figure.scene, figure.rotation = scene, rotation
+        figure.scene, figure.rotation, figure.pixels_per_inch = scene, rotation, dpi
         _draw(figure, contacts, size, dark, perspective)
         _draw_background(figure, dark, transparent)
         _annotate(figure, frame, keys, flux_density, dark)
