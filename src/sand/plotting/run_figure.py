@@ -47,6 +47,8 @@ _METADATA: dict[str, dict[str, Any]] = {
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
 _TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
 _MARGIN = 0.012
+_HEIGHTS = (1.0, 1.35, 1.1, 0.5)
+"""Heights of the panels over time, relative to each other."""
 
 
 class RunFigure(Figure):
@@ -135,9 +137,7 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    gap = 4 * _GAP / (_TOP - _BOTTOM - 3 * _GAP)  # relative to the mean height of the four panels
-    place = {"left": _LEFT[0], "right": _LEFT[1], "bottom": _BOTTOM, "top": _TOP, "hspace": gap}
-    panels = list(figure.subplots(4, 1, height_ratios=(1.0, 1.35, 1.1, 0.5), gridspec_kw=place))
+    panels = [figure.add_axes((_LEFT[0], 0.1 * k, _LEFT[1] - _LEFT[0], 0.1)) for k in range(len(_HEIGHTS))]
     (draw_contacts if has_few_bodies(ledger) else draw_clusters)(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
@@ -146,6 +146,20 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     for name, axes in zip("abcd", panels, strict=True):
         axes.yaxis.set_label_coords(-0.155, 0.5)
         panel_letter(axes, name, -0.185)
+    _place_panels(figure, panels)
+
+
+def _place_panels(figure: Figure, panels: list[Axes]) -> None:
+    """Place the panels one below the other, with space for the rows of their legends."""
+    legends = [axes.get_legend() for axes in panels]
+    rows = [0.0 if one is None else one.get_window_extent().height / figure.bbox.height for one in legends]
+    gaps = [max(_GAP, row + 0.4 * _GAP) for row in rows]
+    height = (_TOP + _GAP - _BOTTOM - sum(gaps)) / sum(_HEIGHTS)
+    top = _TOP + _GAP
+    for axes, share, gap in zip(panels, _HEIGHTS, gaps, strict=True):
+        top -= gap + share * height
+        for one in axes.get_shared_x_axes().get_siblings(axes):  # with the axis on the right
+            one.set_position((_LEFT[0], top, _LEFT[1] - _LEFT[0], share * height))
 
 
 def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
