@@ -18,7 +18,7 @@ class PathName(click.ParamType):
     Parameters
     ----------
     wanted : str
-        What a shell completes, see `completion.path_items`.
+        What a shell completes, see `path_completion.path_items`.
     """
 
     name = "path"
@@ -28,7 +28,7 @@ class PathName(click.ParamType):
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         """Completions of the beginning of a path."""
-        from .completion import path_items
+        from .path_completion import path_items
 
         return path_items(incomplete, self.wanted)
 
