@@ -27,7 +27,7 @@ def empty_folder(tmp_path, monkeypatch):
     [
         (
             "run a.toml --foo 3 --seed x --until 1kg --threads",
-            ["No such option '--foo'", "'--threads' requires an argument", "'--seed'", "--until = '1kg'"],
+            ["--foo", "'--threads' requires an argument", "'--seed'", "--until = '1kg'"],
         ),
         ("build bpco --out --overwrite", ["'--out' requires an argument", "'KIND'"]),
         (
@@ -36,9 +36,9 @@ def empty_folder(tmp_path, monkeypatch):
         ),
         ("info a b --quiet=3", ["'--quiet' does not take a value", "unexpected extra argument (b)"]),
         ("info", ["Missing argument 'DIR|FILE'"]),
-        ("info --foo", ["No such option '--foo'", "Missing argument"]),
-        ("info --foo=3 -x a", ["No such option '--foo'", "No such option '-x'"]),
-        ("info --foo a b", ["No such option '--foo'"]),  # a may be the value of --foo
+        ("info --foo", ["--foo", "Missing argument"]),
+        ("info --foo=3 -x a", ["--foo", "-x"]),
+        ("info --foo a b", ["--foo"]),  # a may be the value of --foo
         ("analyse --window 3 2 a a", ["--window 3 2", "the same folder"]),
         ("analyse --window 3", ["'--window' requires 2 arguments", "Missing argument"]),
         ("export a --to gif --frames x", ["'--to'", "--frames 'x'"]),
@@ -48,8 +48,8 @@ def empty_folder(tmp_path, monkeypatch):
         ("run --frame 3", ["give --from, too", "give a case file"]),
         ("new", ["Missing argument 'NAME'"]),
         ("view a --port 70000 --every 0", ["'--port'", "'--every'"]),
-        ("--foo", ["No such option '--foo'"]),
-        ("fly", ["No such command 'fly'"]),
+        ("--foo", ["--foo"]),
+        ("fly", ["No such command"]),
     ],
 )
 def test_every_error_of_a_command_line_is_a_line(words, parts, capsys):
