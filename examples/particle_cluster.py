@@ -32,7 +32,7 @@ from sand.constants import BOLTZMANN
 from sand.experiments import scattering
 from sand.io.table import write_table
 from sand.plotting.run_figure import save
-from sand.plotting.style import BLUE, RED, panel_letter, plot_style
+from sand.plotting.style import BLUE, RED, legend_above, panel_letter, plot_style
 from sand.theory import magnetic
 
 RADIUS = 1e-8
@@ -245,8 +245,8 @@ def figure(found: dict[tuple[str, str], Ensemble], single: float):
                 right.add_patch(Circle((one, two), 1.0, fc=colours[way], ec="white", lw=0.3))
         right.autoscale_view()
         right.set(aspect="equal", xlabel="$x/r$", yticks=[])
-        left.legend(loc="upper left", fontsize="x-small")
-        middle.legend(loc="upper left")
+        legend_above(left)
+        legend_above(middle)
         for axes, letter in zip((left, middle, right), "abc", strict=True):
             panel_letter(axes, letter, -0.12)
     return drawn

@@ -21,7 +21,7 @@ import sand
 from sand.analysis.clusters import cluster_labels
 from sand.io.table import write_table
 from sand.plotting.run_figure import save
-from sand.plotting.style import BLUE, GREEN, RED, panel_letter, plot_style
+from sand.plotting.style import BLUE, GREEN, RED, legend_above, panel_letter, plot_style
 from sand.theory import kinetics
 from sand.units import si
 
@@ -32,8 +32,6 @@ TEMPERATURE = "100 K"
 SPECIFIC_MOMENT = 200.0
 ROWS = 20
 """Number of times at which a box is measured."""
-LEGEND_ROW = 0.1
-"""Height of a row of a legend, relative to the range of the data."""
 
 
 class Sample(NamedTuple):
@@ -96,7 +94,7 @@ def figure(time: np.ndarray, mean: Sample, error: Sample, expected: np.ndarray):
     from matplotlib.figure import Figure
 
     with plot_style():
-        drawn = Figure(figsize=(9.6, 3.0), layout="constrained")
+        drawn = Figure(figsize=(9.6, 3.3), layout="constrained")
         panels = drawn.subplots(1, 3)
         curves = (
             (("share_magnetic", "magnetic", RED), ("share_plain", "without moment", BLUE)),
@@ -118,10 +116,7 @@ def figure(time: np.ndarray, mean: Sample, error: Sample, expected: np.ndarray):
         panels[2].plot(time * 1e6, expected, color=BLUE, ls=":", label="kinetic theory, without moments")
         panels[2].plot(time * 1e6, 2.0 * expected, color=GREEN, ls=":", label="the same, mixed")
         for axes in panels:
-            low, high = axes.get_ylim()
-            entries = len(axes.get_legend_handles_labels()[0])
-            axes.set_ylim(low, high + LEGEND_ROW * entries * (high - low))  # space for the legend
-            axes.legend(loc="upper left")
+            legend_above(axes)
     return drawn
 
 

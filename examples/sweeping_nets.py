@@ -27,7 +27,7 @@ from sand.analysis.clusters import cluster_labels, unwrapped
 from sand.analysis.shape import projected_area
 from sand.io.table import write_table
 from sand.plotting.run_figure import save
-from sand.plotting.style import BLUE, RED, panel_letter, plot_style
+from sand.plotting.style import BLUE, RED, legend_above, panel_letter, plot_style
 from sand.setup.encounters import combined
 from sand.units import si
 
@@ -117,7 +117,7 @@ def figure(time: np.ndarray, samples: np.ndarray, picture: sand.Grains):
         right.plot(time * 1e6, mean[:, 2], color=RED, label=r"net, kinetic theory $n\langle\sigma v\rangle$")
         right.plot(time * 1e6, sphere * mean[:, 2], color=BLUE, label="sphere of equal mass, kinetic theory")
         right.set(xlabel="time [µs]", ylabel="single grains collected per box")
-        right.legend(loc="upper left")
+        legend_above(right)
         panel_letter(left, "a", -0.2)
         panel_letter(right, "b", -0.12)
     return drawn

@@ -13,7 +13,7 @@ from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
-from .schema import BY_NAME, FIELDS, OWN, public, stored
+from .schema import BY_NAME, CHANGEABLE, FIELDS, OWN, public, stored
 from .units import format_quantity, in_unit
 
 ROUNDING = 1e-7
@@ -188,6 +188,11 @@ class Grains:
             raise NoSuchAttribute(
                 f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}), "
                 "and build a new Simulation from them"
+                + (
+                    f"; or in a simulation: with sim.change() as change: change.{name}[…] = …"
+                    if name in CHANGEABLE
+                    else ""
+                )
             )
         elif type(self).__module__.startswith("sand."):
             raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")

@@ -43,6 +43,8 @@ FIELDS = (
 )
 
 BY_NAME = {field.name: field for field in FIELDS}
+CHANGEABLE = ("velocity", "spin", "moment", "charge")
+"""Quantities that `Simulation.change` can change."""
 OWN = tuple(field.name for field in FIELDS if field.kind == "own")
 """Quantities of `Grains(own=…)`: carried along, stored in checkpoints and frames, and shown."""
 

@@ -36,6 +36,40 @@ def test_chosen_figures_and_formats(run_in_field, tmp_path, capsys):
 
 
 @pytest.mark.compiled("fields")
+@pytest.mark.parametrize(
+    ("words", "pixels"),
+    [
+        ("", (1600, 1000)),
+        ("--dpi 600 --size 1x0.5in", (600, 300)),
+        ("--dpi 300 --size 5.08x2.54cm", (600, 300)),
+        ("--dpi 300 --size 50.8x25.4mm", (600, 300)),
+        ("--dpi 300 --size 400x300", (400, 300)),
+    ],
+)
+def test_pixels_of_a_still(run_in_field, tmp_path, words, pixels):
+    """Pixels are a printed size times the pixels per inch, which the file states, or those of --size.
+
+    A PNG states whole pixels per metre: ± 0.5 of them are ± 0.0127 per inch.
+    """
+    assert main(["plot", str(run_in_field), "--what", "still", "--out", str(tmp_path / "there"), *words.split()]) == 0
+    picture = Image.open(tmp_path / "there" / "still.png")
+    dpi = int(words.split()[1]) if words else 160
+    assert picture.size == pixels
+    assert picture.info["dpi"] == pytest.approx((dpi, dpi), rel=0.0, abs=0.0128)
+
+
+@pytest.mark.compiled("fields")
+def test_pixels_of_figures(run_in_field, tmp_path, capsys):
+    """--dpi 600: 5.6 × 3.5 inches are 3360 × 2100 pixels; a still beyond the largest size is refused; --quiet."""
+    words = ["plot", str(run_in_field), "--out", str(tmp_path / "there"), "--quiet", "--dpi"]
+    assert main([*words, "600", "--what", "size"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert Image.open(tmp_path / "there" / "size.png").size == (3360, 2100)
+    assert main([*words, "1200", "--what", "still"]) == 2
+    assert "size 12000x7500: width and height must be from 200 to 8000 pixels" in capsys.readouterr().err
+
+
+@pytest.mark.compiled("fields")
 def test_a_trajectory_alone(run_in_field, tmp_path, capsys):
     """A .gsd file has no ledger: a still picture by default, beside it."""
     alone = tmp_path / "alone.gsd"

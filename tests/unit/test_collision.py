@@ -9,8 +9,9 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.experiments.collision import collide, collide_many
+from sand.experiments.collision import approach, collide, collide_many
 from sand.experiments.collision_case import read_collision, run_seeds
+from sand.experiments.collision_outcome import collision_title
 from sand.io.bodies import read_body
 from sand.setup import chain, grain, pca
 from sand.theory import contact
@@ -213,3 +214,20 @@ def test_a_negative_seed_of_the_orientations_is_refused():
     """`collide(seed=-1)` raises BadInput that names the seed, before anything runs."""
     with pytest.raises(sand.BadInput, match="seed = -1"):
         collide(*two(0), speed=1.0, seed=-1)
+
+
+def test_the_title_of_a_figure():
+    """Bodies, speed, impact parameter and outcome of one collision; numbers and ranges of several."""
+    bodies = [sand.setup.chain(n, radius="0.1 um", material=m) for n, m in ((3, "silica"), (1, "iron"), (2, "silica"))]
+    one = [{"impact_parameter": 2e-6, "speed": 1.5, "outcome": "fragment"}]
+    two = [*one, {"impact_parameter": 1e-6, "speed": 1.5, "outcome": "stick"}]
+    given = {"speed": 1.5, "impact_parameter": "0.15 um", "along": "y", "seed": None}
+    start = approach(bodies[0], bodies[1], **given)
+    assert start.impact_parameter == pytest.approx(1.5e-7, rel=1e-12, abs=0.0)
+    assert start.bodies() == "3 grains of silica + 1 grain of iron"
+    assert approach(bodies[0], bodies[2], **given).bodies() == "3 + 2 grains of silica"
+    text = "at 1.5 m/s, impact parameter"
+    assert collision_title(one, "X") == f"Collision of X {text} 2 µm: they break up"
+    assert collision_title(two, "X") == f"2 collisions of X {text} 1 µm to 2 µm"
+    head_on = [one[0] | {"impact_parameter": 1e-25, "outcome": "stick"}]
+    assert collision_title(head_on, "X") == "Collision of X at 1.5 m/s, head-on: they stick"

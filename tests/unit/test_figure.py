@@ -42,6 +42,7 @@ def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.
         ledger=ledger,
         temperature=temperature,
         notes=list,
+        title="",
         time=ledger.rows[-1]["time"] if rows else 0.0,
     )
 
@@ -161,6 +162,38 @@ def test_units_are_natural():
     assert energy_unit(ledger, 0.0, 5).name == "aJ"
     assert energy_unit(ledger, 0.0, 5).size == 1e-18
     assert energy_unit(ledger, 50.0, 5).size == pytest.approx(5 * BOLTZMANN * 50.0, rel=1e-6, abs=0.0)
+
+
+def collision_rows(clusters=2):
+    """A ledger of bodies that fly at 1 pJ and have lost half of that in the end."""
+    return [
+        {"time": 0.0, "translation": 0.9e-12, "rotation": 0.1e-12, "clusters": clusters, "contacts": 2},
+        {"time": 1e-6, "translation": 0.5e-12, "lost_rolling": 0.5e-12, "clusters": 1, "contacts": 3, "made": 1},
+    ]
+
+
+@pytest.mark.parametrize("temperature", [0.0, 1.8e6])
+def test_energies_of_two_bodies_are_in_units_of_their_motion(temperature):
+    """Up to two bodies: E₀ = E_trans + E_rot at the start, whose value is stated; a temperature is not."""
+    unit = energy_unit(ledger_of(collision_rows()), temperature, 128)
+    assert unit.size == pytest.approx(1e-12, rel=1e-12, abs=0.0)
+    assert unit.name == "$E_0$" and "= 1 pJ" in unit.value
+    several = energy_unit(ledger_of(collision_rows(3)), temperature, 128)
+    assert several.name == (r"$N k_\mathrm{B}T_0$" if temperature else "pJ")
+
+
+@pytest.mark.draws
+def test_figure_of_a_collision():
+    """The title of the collision, contacts in place of clusters, curves from 1 to the share that is left, no T₀."""
+    run = run_of(np.eye(4, 3) * 1e-7, rows=collision_rows(), temperature=1.8e6)
+    run.title = "Collision of 3 + 1 grains of silica at 1 m/s, head-on: they stick"
+    figure = run_figure(run)
+    shown = texts(figure)
+    assert run.title in shown and "1 body" in shown and "$E_0$ = 1 pJ" in shown
+    assert "T_0" not in shown and "open space" not in shown
+    assert all("T_0" not in axes.get_ylabel() for axes in figure.axes)
+    assert set(lines(figure.axes[0])) == {"contacts", "formed so far", "broken so far"}
+    np.testing.assert_allclose(lines(figure.axes[1])["kinetic"][1], [1.0, 0.5], rtol=1e-12)
 
 
 # --- grains ------------------------------------------------------------------------------------------
@@ -285,7 +318,7 @@ def test_box_has_twelve_edges(figure):
     edges = [line for line in figure.axes[5].get_lines() if line.get_gid() == "box"]
     assert len(edges) == 12
     alone = run_figure(run_of([[0.0, 0.0, 0.0]]))
-    assert not [line for line in alone.axes[5].get_lines() if line.get_gid() == "box"]
+    assert not [line for line in alone.axes[-1].get_lines() if line.get_gid() == "box"]
 
 
 # --- unusual runs ------------------------------------------------------------------------------------
@@ -332,7 +365,7 @@ def test_grains_with_nan_positions_are_omitted():
     figure = run_figure(run)
     assert "left out: 1" in texts(figure)
     run.grains.arrays.position[0, 0] = np.inf
-    assert len(run_figure(run).axes) == 5
+    assert len(run_figure(run).axes) == 4  # the panels over time
 
 
 @pytest.mark.slow

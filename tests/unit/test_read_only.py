@@ -1,9 +1,10 @@
-"""Attributes that cannot change after construction are refused in one line; others are checked. Nothing is compiled."""
+"""Attributes that cannot change after construction are refused in one line; others are checked."""
 
 import pytest
 
 import sand
-from sand.schema import FIELDS
+from sand.forces.registry import FORCES
+from sand.schema import CHANGEABLE, FIELDS
 
 
 @pytest.fixture
@@ -12,7 +13,7 @@ def sim():
     return sand.Simulation(grains, [sand.Contact()])
 
 
-ARGUMENTS = ("forces", "box", "stepping", "neighbours", "seed", "contacts", "grains", "out")
+ARGUMENTS = ("stepping", "neighbours", "seed", "contacts", "walls", "driven", "out")
 RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound")
 
 
@@ -21,6 +22,50 @@ def test_arguments_cannot_be_assigned(sim, name):
     """An assigned argument would be written to files while the dynamics use the old one: build a new simulation."""
     with pytest.raises(sand.BadInput, match=rf"^{name} of a simulation .*build a new one: sand\.Simulation\("):
         setattr(sim, name, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("forces", "change.replace(sand.Field("),
+        ("box", "change.box = "),
+        ("grains", "change.velocity"),
+        *((name, f"change.{name}[…] = …") for name in CHANGEABLE),
+        *((name, f"change.replace(sand.{kind.__name__}(…))") for name, kind in FORCES.items() if name != "contact"),
+    ],
+)
+def test_what_can_change_names_the_code(sim, name, code):
+    """Whatever `change` can change is refused with the line to write, also under the name of a force or a quantity."""
+    with pytest.raises(sand.BadInput) as refused:
+        setattr(sim, name, 0)
+    (line,) = refused.value.problems
+    assert line.startswith(f"{name} of a simulation cannot be assigned; write: with sim.change() as change: {code}")
+
+
+@pytest.mark.compiled("fields")
+def test_the_code_in_the_messages_runs():
+    """Box, forces and quantities are changed by what the messages say."""
+    grains = sand.Grains([[0, 0, 0], [3e-8, 0, 0]], 1e-8, "silica", moment="1e-18 A m^2")
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Field("1 mT")], box="1 um")
+    with sim.change() as change:
+        change.replace(sand.Field("2 mT"))
+        change.box = "3 um"
+        change.velocity[...] = 1.0
+    assert sim.forces[1] == sand.Field("2 mT") and sim.box == sand.Box.periodic("3 um")
+    assert (sim.grains.velocity == 1.0).all()
+
+
+def test_what_cannot_change_says_so(sim):
+    """The contact model and the positions: a new simulation is built."""
+    for name, part in (
+        ("contact", "the contact model"),
+        ("position", "position of the grains"),
+        ("radius", "radius of"),
+    ):
+        with pytest.raises(sand.BadInput, match=rf"^{part}.*build a new one"):
+            setattr(sim, name, 0)
+    with pytest.raises(sand.BadInput, match=r"in a simulation: with sim\.change\(\) as change: change\.velocity"):
+        sim.grains.velocity = 0.0
 
 
 @pytest.mark.parametrize("name", RESULTS)
@@ -78,7 +123,7 @@ def test_assignable_attributes_are_checked(sim):
 
 def test_a_single_force_is_accepted_as_a_list():
     """A force without brackets is a list of one."""
-    grains = sand.Grains([[0, 0, 0]], 1e-8, "silica")
+    grains = sand.Grains([[0, 0, 0]], 1e-8, "silica", moment="1e-18 A m^2")
     assert list(sand.Simulation(grains, sand.Contact()).forces) == [sand.Contact()]
 
 

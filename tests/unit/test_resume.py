@@ -61,7 +61,7 @@ def workdir(tmp_path, monkeypatch):
 def _empty_figures(monkeypatch):
     """Figures are empty files: drawing takes longer than everything else."""
     monkeypatch.setattr("sand.plotting.run_figure.run_figure", lambda simulation: None)
-    monkeypatch.setattr("sand.plotting.collisions.collision_figure", lambda results: None)
+    monkeypatch.setattr("sand.plotting.collisions.collision_figure", lambda *_: None)
     monkeypatch.setattr("sand.plotting.run_figure.save", lambda figure, path: path.write_bytes(b""))
 
 

@@ -144,6 +144,18 @@ def test_backgrounds(dark):
 
 
 @pytest.mark.slow
+def test_pixels_per_inch_change_the_print_alone():
+    """At another number of pixels per inch the grains have the same pixels, and texts the same share of the picture."""
+    frame = frame_of([[0, 0, 0], [3e-8, 0, 0]])
+    usual, fine = (still_picture(frame, size=(400, 300), dpi=dpi) for dpi in (160, 600))
+    assert (usual.grains_only == fine.grains_only).all()
+    assert fine.image().size == (400, 300) and fine.image().info["dpi"][0] == pytest.approx(600, rel=0.0, abs=0.02)
+    difference = np.abs(np.asarray(usual.image(), float) - np.asarray(fine.image(), float))[..., :3].max(axis=2)
+    assert (difference > 64).mean() < 0.02  # edges of letters
+    with pytest.raises(sand.BadInput, match="pixels per inch must be from 50 to 1200"):
+        still_picture(frame, dpi=10)
+
+
 def test_pictures_are_reproducible():
     """Two pictures of a frame are equal byte for byte, as PNG, PDF and SVG."""
     from sand.plotting.run_figure import figure_bytes

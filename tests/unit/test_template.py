@@ -1,5 +1,6 @@
 """`sand new`: a case file with every key, made from the classes that read the keys."""
 
+import json
 import tomllib
 
 import pytest
@@ -7,8 +8,22 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.config.build import simulation_of
-from sand.config.case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection, check_case, read_case
+from sand.config.case import (
+    BoxSection,
+    Case,
+    GrainsSection,
+    MaterialSection,
+    RunSection,
+    WallSection,
+    check_case,
+    read_case,
+)
+from sand.config.errors import _keys_at
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
+from sand.experiments.collision_case import CollisionCase
+from sand.experiments.growth_case import GrowSection
+from sand.experiments.scattering.case import ScatterCase
+from sand.experiments.templates import TEMPLATES
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
 from sand.neighbours.settings import Neighbours
@@ -96,3 +111,87 @@ def test_parts_of_a_class_are_documented():
     meaning = {key.name: key.meaning for key in keys_of(GrainClass)}
     assert meaning["dimension"] == meaning["prefactor"] != ""
     assert {key.name: key.default for key in keys_of(sand.Gas)}["temperature"] is REQUIRED
+
+
+MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case}
+
+
+@pytest.mark.parametrize("command", list(TEMPLATES))
+def test_each_command_has_a_case_with_all_its_keys(command):
+    """Keys of each table are those that the reader of the command accepts, by its model; each has a meaning."""
+    text, model = TEMPLATES[command]("a.toml"), MODEL[command]
+    ignored = {"run": {"stop", "seed", "out"}} if command == "grow" else {}  # of sand run alone
+    found = {}
+    for head, lines in tables_of(text):
+        found.setdefault(head.strip("[]"), set()).update(line.lstrip("#").split(" =")[0] for line in lines)
+    if command == "grow":
+        assert found.pop("grow") == set(GrowSection.model_fields)
+    tables = set(_keys_at(model, ())) - {"materials", "forces", "stepping"}
+    expected = {name: set(_keys_at(model, (name,))) - ignored.get(name, set()) for name in tables}
+    if "grains" in expected:
+        expected["grains"] -= {"classes"}
+        expected["grains.classes"] = set(_keys_at(model, ("grains", "classes")))
+        expected["walls"], expected["driven"] = set(WallSection.model_fields), {key.name for key in keys_of(Driven)}
+    expected["materials.NAME"] = set(MaterialSection.model_fields)
+    if "forces" in model.model_fields:
+        expected |= {f"forces.{name}": set(_keys_at(model, ("forces", name))) for name in FORCES}
+        expected["stepping"] = {"method"}.union(*({key.name for key in keys_of(kind)} for kind in INTEGRATORS.values()))
+    assert found == expected
+    before = ""
+    for line in text.splitlines():
+        if " =" in line and not line.startswith("# ") and not before.startswith("#["):
+            assert before.startswith("# "), line
+        before = line
+    assert max(map(len, text.splitlines())) <= 120
+    assert f"sand {command} a.toml" in text.splitlines()[0]
+
+
+@pytest.mark.parametrize("command", list(TEMPLATES))
+def test_each_key_is_read(command, tmp_path, capsys):
+    """A key with its default, or with a value of a wrong type, is never "no such key", and a misspelt one is."""
+    text, path = TEMPLATES[command]("a.toml"), tmp_path / "a.toml"
+    lines = text.splitlines()
+    heads = [k for k, line in enumerate(lines) if line.lstrip("#").startswith("[")]
+    for first, end in zip(heads, [*heads[1:], len(lines)], strict=True):
+        name = lines[first].lstrip("#")
+        others = [
+            line for line in lines if not line.startswith("#") and not (name == "[stepping]" and "stepping" in line)
+        ]
+        body = [line.lstrip("#") for line in lines[first + 1 : end] if line and not line.startswith("# ")]
+        whole = [line if not line.endswith("=") else f"{line} {{}}" for line in body]
+        k = others.index(name) if name in others else None
+        used = {line.split(" =")[0] for line in (others[k + 1 :] if k is not None else [])}
+        added = [line for line in whole if k is None or line.split(" =")[0] not in used]
+        case = [*others, name, *added] if k is None else [*others[: k + 1], *added, *others[k + 1 :]]
+        for wrong in (False, True):
+            more = ["not_a_key = 1"] if wrong else []
+            place = case.index(name) + 1
+            path.write_text("\n".join([*case[:place], *more, *case[place:]]), "utf-8")
+            main(["info", str(path)])
+            unknown = [line for line in capsys.readouterr().err.splitlines() if "there is no such key" in line]
+            assert len(unknown) == len(more), (name, unknown)
+
+
+@pytest.mark.parametrize("command", list(TEMPLATES))
+def test_info_describes_each_case(command, tmp_path, monkeypatch, capsys):
+    """`sand new NAME --for COMMAND` writes a case that `sand info` accepts for that command."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "my case", "--for", command, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"file": "my case.toml", "command": command}
+    assert main(["info", "my case.toml"]) == 0
+    out = capsys.readouterr().out
+    assert "a valid" in out
+    assert (f"sand {command} 'my case.toml'" in out) is (command != "run")
+    assert tomllib.loads((tmp_path / "my case.toml").read_text("utf-8")) == tomllib.loads(TEMPLATES[command]("x"))
+
+
+@pytest.mark.compiled("scattering", "contacts")
+@pytest.mark.parametrize("command", ["collide", "scatter", "grow"])
+def test_each_case_runs(command, tmp_path, monkeypatch, capsys):
+    """As it is written, but for a lower accuracy and an earlier end, which shorten this test."""
+    monkeypatch.chdir(tmp_path)
+    text = TEMPLATES[command]("a.toml").replace("relative_error = 0.05", "relative_error = 0.3")
+    text = text.replace('until = "20 us"', 'until = "20 ns"').replace("grains = 16", "grains = 3")
+    (tmp_path / "a.toml").write_text(text.replace("seeds = [1, 2, 3, 4]", "seeds = [1]"), "utf-8")
+    assert main([command, "a.toml", "--quiet"]) == 0, capsys.readouterr().err
+    assert capsys.readouterr().out == ""

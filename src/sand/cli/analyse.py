@@ -3,29 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..errors import BadInput
-from . import options, report
+from . import options, parsing, report
 
 
-@click.command("analyse", short_help="Measure growth, moments and fractal dimension of runs.")
-@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=options.PATH)
+def _check(values: Mapping[str, Any]) -> Iterator[str]:
+    """Errors of the values of options."""
+    window, folders = values["window"], values["folders"] or ()
+    if window is not None and not 1.0 <= window[0] < window[1]:
+        yield f"--window {window[0]:g} {window[1]:g}: the first must be at least 1, the second above it"
+    if len({Path(folder).absolute() for folder in folders}) < len(folders):
+        yield "the same folder is given twice"
+
+
+@parsing.command("analyse", short_help="Measure growth, moments and fractal dimension of runs.", check=_check)
+@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=options.RUN)
 @click.option(
     "--out",
     metavar="FOLDER",
-    type=options.PATH,
+    type=options.FOLDER,
     help="Folder for analysis.json, growth.csv, aggregates.csv and growth.png.",
 )
 @click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S in which z is fitted.")
+@click.option("--guides", is_flag=True, help="Draw the power laws of the paper in growth.png, too.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
 @options.output
 def command(
-    folders: tuple[str, ...], out: str | None, window: tuple[float, float] | None, overwrite: bool, as_json: bool
+    folders: tuple[str, ...],
+    out: str | None,
+    window: tuple[float, float] | None,
+    guides: bool,
+    overwrite: bool,
+    **output: bool,
 ) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 
@@ -34,21 +49,18 @@ def command(
     """
     from ..experiments.growth_report import NAMES, compare_growth, ensemble_summary, read_ensemble, write_analysis
 
-    if window is not None and not 1.0 <= window[0] < window[1]:
-        raise BadInput(f"--window {window[0]:g} {window[1]:g}: the first must be at least 1, the second above it")
-    if len({Path(folder).absolute() for folder in folders}) < len(folders):
-        raise BadInput("the same folder is given twice")
     target = None if out is None else _output_folder(Path(out), NAMES, overwrite)
     ensembles = []
     for folder in folders:
-        report.reading(folder)
+        if not output["quiet"]:
+            report.reading(folder)
         ensembles.append(read_ensemble(folder, window))
     content = {"ensembles": [ensemble_summary(one) for one in ensembles], "comparison": compare_growth(ensembles)}
     if target is not None:
-        write_analysis(target, ensembles, content)
-    if as_json:
+        write_analysis(target, ensembles, content, guides)
+    if output["as_json"]:
         report.emit(content)
-    else:
+    elif not output["quiet"]:
         _show(content, target)
 
 

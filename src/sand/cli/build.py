@@ -2,21 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..errors import BadInput
-from . import options, report
+from . import options, parsing, report
 
 KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")
 
 
-@click.command("build", short_help="Build an aggregate and write it to a file.")
+def _shape(_context: click.Context, _option: click.Parameter, text: str | None) -> list[int] | None:
+    """Read '5,5,5'.  Raises BadInput."""
+    try:
+        return None if text is None else [int(word) for word in text.split(",")]
+    except ValueError:
+        raise BadInput(f"--shape {str(text)[:40]!r} must be three whole numbers above 0, such as 5,5,5") from None
+
+
+def _number(_context: click.Context, option: click.Parameter, text: str | None) -> float | None:
+    """Read a number.  Raises BadInput."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        raise BadInput(f"{option.opts[0]} {text!r} is not a number") from None
+
+
+def _material(_context: click.Context, _option: click.Parameter, text: str) -> str | dict[str, float]:
+    """Read 'silica', or parts as in 'silica:0.7,iron:0.3'.  Raises BadInput."""
+    if ":" not in text:
+        return text
+    parts: dict[str, float] = {}
+    for word in text.split(","):
+        name, _, part = word.partition(":")
+        if name.strip() in parts:
+            raise BadInput(f"--material {text!r} names {name.strip()} twice")
+        try:
+            parts[name.strip()] = float(part)
+        except ValueError:
+            raise BadInput(f"--material {text!r} must be a name, or parts such as 'silica:0.7,iron:0.3'") from None
+    return parts
+
+
+def _check(values: Mapping[str, Any]) -> Iterator[str]:
+    """Errors of options that exclude each other."""
+    if values["shape"] is not None and values["grains"] is not None:
+        yield "--shape sets the number of grains; leave --grains out"
+
+
+@parsing.command("build", short_help="Build an aggregate and write it to a file.", check=_check)
 @click.argument("kind", metavar="KIND", type=click.Choice((*KINDS, "pca")))
 @click.option("--grains", type=options.COUNT, metavar="N", help="Number of grains.")
-@click.option("--shape", metavar="NX,NY,NZ", help="Grains along the sides of a lattice, instead of --grains.")
+@click.option(
+    "--shape", metavar="NX,NY,NZ", callback=_shape, help="Grains along the sides of a lattice, instead of --grains."
+)
 @click.option(
     "--radius",
     default="0.1 um",
@@ -25,22 +66,34 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
     help="A length, 'lognormal(MEDIAN, SIGMA, LEAST, MOST)' or 'power law(EXPONENT, LEAST, MOST)'.",
 )
 @click.option(
-    "--material", default="silica", show_default=True, metavar="M", help="A preset, or parts: 'silica:0.7,iron:0.3'."
+    "--material",
+    default="silica",
+    show_default=True,
+    metavar="M",
+    callback=_material,
+    help="A preset, or parts: 'silica:0.7,iron:0.3'.",
 )
 @click.option("--moment", metavar="SIZE", help="Moment of each grain: '6.6e-18 A m^2', '200 A m^2/kg' or 'material'.")
 @click.option("--moments", type=click.Choice(("random", "aligned", "relaxed")), help="Directions of the moments.")
-@click.option("--magnetic", metavar="FRACTION", help="Fraction of the grains that have a moment, 0 to 1.")
-@click.option("--dimension", metavar="D", help="Fractal dimension of KIND fractal (default 1.8).")
-@click.option("--prefactor", metavar="K", help="Fractal prefactor of KIND fractal (default 1.3).")
 @click.option(
-    "--seed", type=options.SEED, default=0, show_default=True, help="Seed; the same seed gives the same grains."
+    "--magnetic", metavar="FRACTION", callback=_number, help="Fraction of the grains that have a moment, 0 to 1."
+)
+@click.option("--dimension", metavar="D", callback=_number, help="Fractal dimension of KIND fractal (default 1.8).")
+@click.option("--prefactor", metavar="K", callback=_number, help="Fractal prefactor of KIND fractal (default 1.3).")
+@click.option(
+    "--seed",
+    type=options.SEED,
+    metavar="N",
+    default=0,
+    show_default=True,
+    help="Seed; the same seed gives the same grains.",
 )
 @click.option(
-    "--out", required=True, metavar="FILE", type=options.PATH, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
+    "--out", required=True, metavar="FILE", type=options.FILE, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 @options.output
-def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> None:
+def command(kind: str, out: str, overwrite: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     """Build an aggregate with all contacts at rest and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
 
     \b
@@ -57,51 +110,11 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -
     refuse_target(target, overwrite=overwrite)
     from ..setup.aggregates import build
 
-    with report.compiling(as_json):
-        body = build(kind, **_arguments(given))
+    with report.compiling(quiet or as_json):
+        body = build(kind, **given)
     write_body(target, body, overwrite=overwrite)
     content = {"kind": kind, "file": str(target), "seed": given["seed"], **_properties(body)}
-    report.answer(content, f"build {kind}", _rows(content), as_json=as_json)
-
-
-def _arguments(given: dict[str, Any]) -> dict[str, Any]:
-    """Convert options to arguments of `setup.aggregates.build`.  Raises BadInput."""
-    found = dict(given)
-    shape = found.pop("shape")
-    if shape is not None:
-        try:
-            found["shape"] = [int(word) for word in shape.split(",")]
-        except ValueError:
-            raise BadInput(f"--shape {shape[:40]!r} must be three whole numbers above 0, such as 5,5,5") from None
-        if found["grains"] is not None:
-            raise BadInput("--shape sets the number of grains; leave --grains out")
-    for name in ("dimension", "prefactor", "magnetic"):
-        found[name] = None if found[name] is None else _number(found[name], name)
-    found["material"] = _material(found["material"])
-    return found
-
-
-def _number(text: str, name: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise BadInput(f"--{name} {text!r} is not a number") from None
-
-
-def _material(text: str) -> str | dict[str, float]:
-    """Read 'silica', or parts as in 'silica:0.7,iron:0.3'.  Raises BadInput."""
-    if ":" not in text:
-        return text
-    parts: dict[str, float] = {}
-    for word in text.split(","):
-        name, _, part = word.partition(":")
-        if name.strip() in parts:
-            raise BadInput(f"--material {text!r} names {name.strip()} twice")
-        try:
-            parts[name.strip()] = float(part)
-        except ValueError:
-            raise BadInput(f"--material {text!r} must be a name, or parts such as 'silica:0.7,iron:0.3'") from None
-    return parts
+    report.answer(content, f"build {kind}", _rows(content), as_json=as_json, quiet=quiet)
 
 
 def _properties(body: Any) -> dict[str, Any]:

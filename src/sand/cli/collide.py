@@ -10,15 +10,15 @@ from typing import Any
 import click
 
 from ..threads import set_threads
-from . import options, report
+from . import options, parsing, report
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""
 
 
-@click.command("collide", short_help="Collide two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml", type=options.PATH)
-@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+@parsing.command("collide", short_help="Collide two bodies that a case file describes.")
+@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
+@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
 @options.imports
@@ -32,7 +32,7 @@ def command(
     workers: int,
     threads: int | None,
     overwrite: bool,
-    as_json: bool,
+    **output: bool,
 ) -> None:
     """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 
@@ -45,10 +45,10 @@ def command(
 
     job = CollisionJob(case, None if out is None else Path(out), seeds, overwrite=overwrite)
     refuse_folder(job.folder, Path(case), overwrite=overwrite)
-    collide(job, f"collide {case}", workers, threads, as_json)
+    collide(job, f"collide {case}", workers, threads, **output)
 
 
-def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> None:
+def collide(job: Any, heading: str, workers: int, threads: int | None, *, as_json: bool, quiet: bool) -> None:
     """Run a `CollisionJob` and print the results.
 
     Raises
@@ -89,7 +89,8 @@ def collision_rows(results: list[dict[str, Any]]) -> report.Rows:
 
 
 def _collision(r: dict[str, Any]) -> str:
-    pieces = f"{len(r['fragments'])} bodies, largest {r['largest_remnant']:.0%} of the mass"
+    bodies = len(r["fragments"])
+    pieces = f"{bodies} bod{'ies' if bodies > 1 else 'y'}, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
     unfinished = "" if r["quiet"] else " (stopped before it came to rest)"

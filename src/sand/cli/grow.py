@@ -10,22 +10,22 @@ import click
 
 from ..errors import BadInput
 from ..threads import set_threads
-from . import options, report
+from . import options, parsing, report
 
 DEFAULT_SEEDS = list(range(1, 9))
 
 
-@click.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
-@click.argument("case", metavar="CASE.toml", type=options.PATH)
+@parsing.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
+@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
 @options.seeds("Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
 @click.option(
-    "--out", metavar="DIR", type=options.PATH, help="Folder for the folders of the boxes (default: the case's name)."
+    "--out", metavar="DIR", type=options.FOLDER, help="Folder for the folders of the boxes (default: the case's name)."
 )
 @options.workers
 @options.scheduler
 @options.imports
 @options.threads
-@options.quiet_output
+@options.output
 def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 

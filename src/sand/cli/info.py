@@ -14,7 +14,7 @@ from ..config.commands import command_for
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_ledger
-from . import options, report
+from . import options, parsing, report
 from .collide import collision_rows
 from .scatter import result_rows
 
@@ -30,11 +30,11 @@ JOBS = {
 """Names of jobs by command: for people, and the `kind` for machines."""
 
 
-@click.command("info", short_help="Describe a run or one of its files.")
-@click.argument("path", metavar="DIR|FILE", type=options.PATH)
+@parsing.command("info", short_help="Describe a run or one of its files.")
+@click.argument("path", metavar="DIR|FILE", type=options.RUN_OR_CASE)
 @options.imports
 @options.output
-def command(path: str, as_json: bool) -> None:
+def command(path: str, **output: bool) -> None:
     """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
 
     Also describes cases, folders and results of `sand scatter`, `sand collide` and `sand grow`.
@@ -42,7 +42,7 @@ def command(path: str, as_json: bool) -> None:
     A case file is checked as by `sand run`, but not run.
     """
     heading, rows, content = _describe(Path(path))
-    report.answer(content, f"{path}: {heading}", rows, as_json=as_json)
+    report.answer(content, f"{path}: {heading}", rows, **output)
 
 
 def _describe(path: Path) -> Description:

@@ -8,27 +8,44 @@ from pathlib import Path
 import click
 
 from ..errors import BadInput
-from . import options, report
+from . import options, parsing, report
+
+COMMANDS = ("run", "collide", "scatter", "grow")
+"""Commands that read a case file; as `experiments.templates.TEMPLATES`, which takes long to import."""
 
 
-@click.command("new", short_help="Write a case file with every key.")
-@click.argument("name", metavar="NAME", type=options.PATH)
+@parsing.command("new", short_help="Write a case file with every key.")
+@click.argument("name", metavar="NAME", type=options.FILE)
+@click.option(
+    "--for",
+    "reader",
+    type=click.Choice(COMMANDS),
+    default="run",
+    show_default=True,
+    help="The command that reads the file.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 @options.output
-def command(name: str, as_json: bool) -> None:
-    """Write NAME.toml, a case file of `sand run` with every key, its meaning, unit, default and allowed values.
+def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
+    """Write NAME.toml, a case file with every key, its meaning, unit, default and allowed values.
 
-    The file describes a gas of silica grains; keys that are not in use are comments. An existing file is not replaced.
+    \b
+    run      a gas of silica grains
+    collide  two fluffy aggregates of silica
+    scatter  cross-sections of two magnetic grains of iron
+    grow     the gas, for several seeds
+
+    It can be run as it is; keys that are not in use are comments.
     """
-    from ..config.template import template
+    from ..experiments.templates import TEMPLATES
     from ..io.run_folder import replace_file
 
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
-    if path.exists():
-        raise BadInput(f"{path} exists; give another name, or remove it")
+    if path.exists() and not overwrite:
+        raise BadInput(f"{path} exists; give another name, or --overwrite")
     if not path.parent.is_dir():
         raise BadInput(f"there is no folder {path.parent}; make it first")
-    replace_file(path, template(str(path)).encode())
-    rows = [("file", str(path)), ("check with", f"sand info {shlex.quote(str(path))}")]
-    report.answer(
-        {"file": str(path)}, f"new {path}", [*rows, ("run with", f"sand run {shlex.quote(str(path))}")], as_json=as_json
-    )
+    replace_file(path, TEMPLATES[reader](str(path)).encode())
+    quoted = shlex.quote(str(path))
+    rows = [("file", str(path)), ("check with", f"sand info {quoted}"), ("run with", f"sand {reader} {quoted}")]
+    report.answer({"file": str(path), "command": reader}, f"new {path}", rows, **output)

@@ -13,9 +13,24 @@ from ..io.run_folder import checked_name
 
 
 class PathName(click.ParamType):
-    """The name of a file or folder: not empty, and not longer than systems allow."""
+    """The name of a file or folder: not empty, and not longer than systems allow.
+
+    Parameters
+    ----------
+    wanted : str
+        What a shell completes, see `path_completion.path_items`.
+    """
 
     name = "path"
+
+    def __init__(self, wanted: str):
+        self.wanted = wanted
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+        """Completions of the beginning of a path."""
+        from .path_completion import path_items
+
+        return path_items(incomplete, self.wanted)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Check the name.  Raises BadInput."""
@@ -23,14 +38,20 @@ class PathName(click.ParamType):
         return checked_name(str(value), name)
 
 
-PATH = PathName()
-SEED = click.IntRange(0, MOST_SEED)
-FRAME = click.IntRange(-(2**31), 2**31 - 1)
-COUNT = click.IntRange(1, MOST_GRAINS)
+class WholeNumber(click.IntRange):
+    """A whole number in a range, named so in error messages."""
+
+    name = "whole number"
+
+
+FILE, FOLDER, RUN, CASE_FILE, RUN_OR_CASE = map(PathName, ("file", "folder", "run", "case", "run or case"))
+SEED = WholeNumber(0, MOST_SEED)
+FRAME = WholeNumber(-(2**31), 2**31 - 1)
+COUNT = WholeNumber(1, MOST_GRAINS)
 
 workers = click.option(
     "--workers",
-    type=click.IntRange(1, MOST_PROCESSES),
+    type=WholeNumber(1, MOST_PROCESSES),
     default=1,
     metavar="N",
     help="Number of worker processes (default 1).",
@@ -38,34 +59,29 @@ workers = click.option(
 
 scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://host:port.")
 
-_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 
-_quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
+_quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only, neither results nor progress.")
 
 # read from the command line by `program`, because errors may occur before options are parsed
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
 
 def output(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options --json and --debug."""
-    return _as_json(debug(command))
-
-
-def quiet_output(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options --json, --quiet and --debug."""
-    return _as_json(_quiet(debug(command)))
+    """The options --json, --quiet and --debug of every command with results; values `as_json` and `quiet`."""
+    return as_json(_quiet(debug(command)))
 
 
 threads = click.option(
     "--threads",
-    type=click.IntRange(1, MOST_PROCESSES),
+    type=WholeNumber(1, MOST_PROCESSES),
     metavar="N",
     help="Threads for a large simulation (default: one per core, or $SAND_THREADS); results do not depend on it.",
 )
 
 
-def _import(_context: click.Context, _option: click.Parameter, names: tuple[str, ...]) -> None:
-    if names:
+def _import(context: click.Context, _option: click.Parameter, names: tuple[str, ...]) -> None:
+    if names and not context.resilient_parsing:  # not while a shell completes a word
         from ..forces.own import import_modules
 
         import_modules(names)
@@ -86,9 +102,9 @@ def end_of_run(text: str) -> Any:
     return click.option("--until", metavar="TIME", callback=_seconds, help=text)
 
 
-def _seconds(_context: click.Context, _option: click.Parameter, text: str | None) -> float | None:
+def _seconds(context: click.Context, _option: click.Parameter, text: str | None) -> float | None:
     """Convert a time to seconds, checked as in a case file; a bare number is SI.  Raises BadInput."""
-    if text is None:
+    if text is None or context.resilient_parsing:
         return None
     from ..simulation.cadence import duration
 
@@ -120,3 +136,23 @@ def _seeds(_context: click.Context, _option: click.Parameter, text: str | None) 
     if not found:
         raise BadInput(f"--seeds {text!r} names no seed: the first number must not be above the last")
     return list(dict.fromkeys(found))
+
+
+def _frames(_context: click.Context, _option: click.Parameter, text: str) -> slice:
+    """Read '-1', '3', '10:' or '::5' as a slice.  Raises BadInput."""
+    parts = text.split(":")
+    try:
+        numbers = [int(part) if part.strip() else None for part in parts]
+        if len(numbers) == 1 and numbers[0] is not None:
+            first = numbers[0]
+            return slice(first, first + 1 if first != -1 else None)
+        if not 2 <= len(numbers) <= 3:
+            raise ValueError
+        return slice(*numbers)
+    except ValueError:
+        raise BadInput(f"--frames {text!r} must be a frame or a slice such as '-1', '10:', '0:100:5'") from None
+
+
+frames = click.option(
+    "--frames", metavar="SLICE", default=":", callback=_frames, help="Frames, as in Python: '-1', '10:', '::5'."
+)

@@ -2,17 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
 from ..errors import BadInput, did_you_mean
-from . import options, report
+from . import options, parsing, report
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
 FOLDER = "plots"
+
+
+class PrintSize(NamedTuple):
+    """Size of a picture, in pixels (unit "") or lengths."""
+
+    width: float
+    height: float
+    unit: str
+
+    def pixels(self, dpi: int) -> tuple[int, int]:
+        """Width and height in pixels at this number of pixels per inch."""
+        scale = 1.0 if self.unit == "" else dpi / UNITS[self.unit]
+        return round(self.width * scale), round(self.height * scale)
+
+
+DPI = 160
+"""Pixels per inch without --dpi; as `plotting.run_figure.DPI`, which takes long to import."""
+UNITS = {"": 0.0, "in": 1.0, "cm": 2.54, "mm": 25.4}
+"""Units of --size, per inch; "" are pixels."""
+DEFAULT_SIZE = PrintSize(10.0, 6.25, "in")
+"""1600 × 1000 pixels at 160 pixels per inch."""
 
 
 class Source(NamedTuple):
@@ -23,10 +45,56 @@ class Source(NamedTuple):
     run: Any  # None for a trajectory
 
 
-@click.command("plot", short_help="Draw figures of a run, and a still picture of a frame.")
-@click.argument("source", metavar="DIR", type=options.PATH)
-@click.option("--what", metavar="WHAT,…", help="What to draw (default: all figures over time, and still).")
-@click.option("--out", metavar="FOLDER", type=options.PATH, help="Folder for the files (default: 'plots' in DIR).")
+def _size(_context: click.Context, _option: click.Parameter, text: str) -> PrintSize:
+    """Read '1600x1000' or '17x10.6 cm'.  Raises BadInput."""
+    numbers = text.lower().replace("×", "x").rstrip("cmin ")
+    unit = text.lower().replace("×", "x")[len(numbers) :].strip()
+    try:
+        width, height = map(float, numbers.split("x"))
+        if unit not in UNITS or (unit == "" and (width % 1.0 or height % 1.0)):
+            raise ValueError
+    except ValueError:
+        raise BadInput(
+            f"--size {text!r} must be width x height in pixels, such as 1600x1000, or with a unit, such as 17x10.6cm"
+        ) from None
+    return PrintSize(width, height, unit)
+
+
+def _what(_context: click.Context, _option: click.Parameter, text: str | None) -> list[str] | None:
+    """Read names of what to draw."""
+    return None if text is None else list(dict.fromkeys(part.strip() for part in text.split(",")))
+
+
+def _check(values: Mapping[str, Any]) -> Iterator[str]:
+    """Errors of the values of options."""
+    if all(values[name] is None for name in ("what", "colour", "bonds", "view", "size")):
+        return
+    from ..analysis.quantities import GRAIN_NAMES
+    from ..plotting.plots import HISTORY
+    from ..plotting.render.still import check_picture_options
+
+    allowed, names = (*HISTORY, STILL, *GRAIN_NAMES), values["what"] or []
+    yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
+    if values["cluster"] is not None and (others := [name for name in names if name != STILL]):
+        yield f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
+    size = DEFAULT_SIZE if values["size"] is None else values["size"]
+    shown = values["colour"] or "cluster", _bonds(values["bonds"]), values["view"] or "iso"
+    try:
+        check_picture_options(*shown, size.pixels(values["dpi"] or DPI))
+    except BadInput as error:
+        yield from error.problems
+
+
+def _bonds(given: str | None) -> str | None:
+    return None if given == "none" else given
+
+
+@parsing.command("plot", short_help="Draw figures of a run, and a still picture of a frame.", check=_check)
+@click.argument("source", metavar="DIR", type=options.RUN)
+@click.option(
+    "--what", metavar="WHAT,…", callback=_what, help="What to draw (default: all figures over time, and still)."
+)
+@click.option("--out", metavar="FOLDER", type=options.FOLDER, help="Folder for the files (default: 'plots' in DIR).")
 @click.option("--format", "form", type=click.Choice(FORMATS), default="png", show_default=True, help="File format.")
 @click.option(
     "--frame", metavar="K", type=options.FRAME, default=-1, help="Frame, numbered as in Python (default: the last)."
@@ -38,19 +106,42 @@ class Source(NamedTuple):
     "--bonds", type=click.Choice(["load", "mode", "none"]), default="none", help="Quantity shown by contacts."
 )
 @click.option("--arrows/--no-arrows", default=True, help="Draw moments as arrows (default) or not.")
-@click.option("--cluster", metavar="K", type=int, help="Draw one cluster only; the largest is 1.")
+@click.option("--cluster", metavar="K", type=options.COUNT, help="Draw one cluster only; the largest is 1.")
 @click.option("--cut", is_flag=True, help="Draw clusters cut by the faces of the box, not whole.")
 @click.option(
     "--view", metavar="VIEW", default="iso", help="iso, front, top, side, or the direction to the eye: 'x,y,z'."
 )
 @click.option("--perspective", is_flag=True, help="Perspective instead of parallel projection.")
-@click.option("--size", metavar="WxH", default="1600x1000", show_default=True, help="Size of the picture in pixels.")
+@click.option(
+    "--size",
+    metavar="WxH",
+    default="10x6.25in",
+    show_default=True,
+    callback=_size,
+    help="Size of the still picture, in pixels (1600x1000) or printed (17x10.6cm, also mm, in).",
+)
+@click.option(
+    "--dpi",
+    type=options.WholeNumber(50, 1200),
+    default=DPI,
+    show_default=True,
+    metavar="N",
+    help="Pixels per inch of all figures, such as 600 for print; also saved in the file.",
+)
 @click.option("--transparent", is_flag=True, help="Transparent background.")
 @click.option("--dark", is_flag=True, help="Dark background.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.output
 def command(
-    source: str, what: str | None, out: str | None, form: str, frame: int, overwrite: bool, as_json: bool, **how: Any
+    source: str,
+    what: list[str] | None,
+    out: str | None,
+    form: str,
+    frame: int,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+    **how: Any,
 ) -> None:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
@@ -61,7 +152,8 @@ def command(
     """
     from ..io.run_folder import make_folder, replace_file
 
-    folder, names = _check_options(Path(source), what, out, form, overwrite, how)
+    folder, names = _place(Path(source), what, out, form, overwrite)
+    how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
     pictures = _draw(_open_source(Path(source)), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)
@@ -69,41 +161,21 @@ def command(
     for path, content in zip(paths, pictures, strict=True):
         replace_file(path, content)
     rows = [("folder", str(folder)), ("files", ", ".join(path.name for path in paths))]
-    report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json)
+    report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json, quiet=quiet)
 
 
-def _check_options(
-    source: Path, selection: str | None, out: str | None, form: str, overwrite: bool, how: dict[str, Any]
+def _place(
+    source: Path, selection: list[str] | None, out: str | None, form: str, overwrite: bool
 ) -> tuple[Path, list[str]]:
-    """Folder to write to and names of what to draw; converts `how` for the picture.  Raises BadInput, all errors."""
-    from ..analysis.quantities import GRAIN_NAMES
+    """Folder to write to and names of what to draw.  Raises BadInput, all errors."""
     from ..plotting.plots import HISTORY
-    from ..plotting.render.still import check_picture_options
 
     problems: list[str] = []
     is_trajectory = source.is_file()
-    default = (STILL,) if is_trajectory else (*HISTORY, STILL)
-    names = list(default if selection is None else dict.fromkeys(part.strip() for part in selection.split(",")))
-    allowed = (*HISTORY, STILL, *GRAIN_NAMES)
-    problems += [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
+    names = selection or list((STILL,) if is_trajectory else (*HISTORY, STILL))
     if is_trajectory:
         missing = [name for name in names if name in HISTORY]
         problems += [f"--what {name}: {source} has no ledger; give a run's folder" for name in missing]
-    if how["cluster"] is not None and selection is not None and (others := [name for name in names if name != STILL]):
-        problems.append(
-            f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
-        )
-    try:
-        width, height = map(int, how["size"].lower().replace("×", "x").split("x"))
-    except ValueError:
-        problems.append(f"--size {how['size']!r} must be width x height in pixels, such as 1600x1000")
-        width, height = 1600, 1000
-    how["size"], how["whole"] = (width, height), not how.pop("cut")
-    how["bonds"] = None if how["bonds"] == "none" else how["bonds"]
-    try:
-        check_picture_options(how["colour"], how["bonds"], how["view"], how["size"])
-    except BadInput as error:
-        problems += error.problems
     beside = source.with_name(f"{source.stem}-{FOLDER}") if is_trajectory else source / FOLDER
     folder = beside if out is None else Path(out)
     if not folder.is_dir() and (folder.exists() or (out is not None and not folder.parent.is_dir())):
@@ -154,7 +226,7 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
             return still_picture(one, field=field, **how)
         return grains_figure(one, name, field, dark=how["dark"])
 
-    return [figure_bytes(draw(name), form, how["transparent"]) for name in names]
+    return [figure_bytes(draw(name), form, how["transparent"], how["dpi"]) for name in names]
 
 
 def _frame(source: Source, number: int) -> Any:

@@ -10,14 +10,32 @@ import click
 
 from ..errors import SandError
 from ..version import __version__
-from . import analyse, build, cite, collide, export, grow, info, new, options, plot, report, resume, run, scatter, view
+from . import (
+    analyse,
+    build,
+    cite,
+    collide,
+    completion,
+    export,
+    grow,
+    info,
+    new,
+    options,
+    parsing,
+    plot,
+    report,
+    resume,
+    run,
+    scatter,
+    view,
+)
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
-COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
+COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite, completion)
 """One module per command, with a click command named `command`."""
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=parsing.Group, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="sand", message="%(prog)s %(version)s")
 @options.debug
 @click.pass_context
@@ -49,6 +67,8 @@ def run_command(words: list[str], interrupted: Callable[[], bool]) -> int:
     int
         The exit code.
     """
+    if (code := completion.answer_shell(sand)) is not None:
+        return code
     try:
         with sand.make_context("sand", list(words)) as context, report.notes():
             return sand.invoke(context) or DONE
@@ -73,7 +93,8 @@ def _explain(error: Exception) -> tuple[list[str], int]:
         return str(error).splitlines(), BAD_INPUT
     if isinstance(error, click.UsageError):
         where = error.ctx.command_path if error.ctx else "sand"
-        return [f"{_one_line(error.format_message()).rstrip('.')}; see {where} --help"], BAD_INPUT
+        *others, last = getattr(error, "lines", [_one_line(error.format_message()).rstrip(".")])
+        return [*others, f"{last}; see {where} --help"], BAD_INPUT
     if isinstance(error, MemoryError):
         return ["not enough memory; use fewer grains"], BAD_INPUT
     text = _one_line(f"{type(error).__name__}: {error}")

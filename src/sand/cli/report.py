@@ -280,7 +280,7 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
 
 
 def _grains(grains: Any, temperature: float) -> str:
-    from ..units import format_quantity
+    from ..units import MELTED, format_quantity
 
     def span(values: Any, text: Callable[[float], str]) -> str:
         least, most = text(float(values.min())), text(float(values.max()))
@@ -294,6 +294,9 @@ def _grains(grains: Any, temperature: float) -> str:
         size = (grains.body_moment**2).sum(axis=1) ** 0.5
         parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
     motion = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "at rest"
+    if temperature > MELTED:  # bodies that fly, not thermal motion
+        speed = float((grains.mass @ (grains.velocity**2).sum(axis=1) / grains.mass.sum()) ** 0.5)
+        motion = f"rms speed {format_quantity(speed, 'm/s')}"
     return ", ".join([*parts, motion])
 
 

@@ -12,7 +12,7 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, SUMMARY, read_json
 from ..threads import set_threads
-from . import options, report
+from . import options, parsing, report
 from .collide import collide
 from .grow import boxes
 from .scatter import scatter
@@ -21,14 +21,14 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 """Results file of a finished job, by command."""
 
 
-@click.command("resume", short_help="Continue an interrupted run or job of any command.")
-@click.argument("folder", metavar="DIR", type=options.PATH)
+@parsing.command("resume", short_help="Continue an interrupted run or job of any command.")
+@click.argument("folder", metavar="DIR", type=options.RUN)
 @options.end_of_run('For a run: a new end instead of the planned one, such as "10 us".')
 @options.imports
 @options.workers
 @options.scheduler
 @options.threads
-@options.quiet_output
+@options.output
 def command(
     folder: str,
     until: float | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +12,25 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import CASE, TRAJECTORY
 from ..threads import set_threads
-from . import options, report
+from . import options, parsing, report
 
 
-@click.command("run", short_help="Run the simulation that a case file describes.")
-@click.argument("case", metavar="CASE.toml", required=False, type=options.PATH)
-@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+def _check(values: Mapping[str, Any]) -> Iterator[str]:
+    """Errors of options that need others."""
+    if values["source"] is None and values["frame"] is not None:
+        yield "--frame selects the frame of --from FILE to start with; give --from, too"
+    if values["source"] is None and values["case"] is None:
+        yield "give a case file: sand run CASE.toml; or an earlier run: sand run --from DIR"
+
+
+@parsing.command("run", short_help="Run the simulation that a case file describes.", check=_check)
+@click.argument("case", metavar="CASE.toml", required=False, type=options.CASE_FILE)
+@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @click.option(
     "--from",
     "source",
     metavar="FILE",
-    type=options.PATH,
+    type=options.RUN,
     help="Trajectory, or folder of a run, to take grains and contacts from.",
 )
 @click.option("--frame", type=options.FRAME, metavar="K", help="Frame of --from, from 0 (default: −1, the last).")
@@ -30,7 +39,7 @@ from . import options, report
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.imports
 @options.threads
-@options.quiet_output
+@options.output
 def command(
     case: str | None,
     source: str | None,
@@ -65,8 +74,6 @@ def command(
     from ..config.case import GrainsSection, read_case
     from .launch import launch, refuse_folder
 
-    if source is None and frame is not None:
-        raise BadInput("--frame selects the frame of --from FILE to start with; give --from, too")
     grains = None if source is None else _source(source)
     name = _case_name(case, grains)
     described = read_case(name)
@@ -109,8 +116,6 @@ def _case_name(case: str | None, source: Path | None) -> str:
     """The case file given, or that of the run whose grains are taken.  Raises BadInput."""
     if case is not None:
         return case
-    if source is None:
-        raise BadInput("give a case file: sand run CASE.toml; or an earlier run: sand run --from DIR")
-    if not (source.parent / CASE).exists():
+    if source is None or not (source.parent / CASE).exists():
         raise BadInput(f"--from: there is no {CASE} beside {source}; give a case file before --from")
     return str(source.parent / CASE)

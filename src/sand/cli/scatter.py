@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,17 +10,25 @@ import click
 
 from ..errors import BadInput
 from ..io.run_folder import FLIGHTS
-from . import options, report
+from . import options, parsing, report
 
 
-@click.command("scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.")
-@click.argument("case", metavar="CASE.toml", type=options.PATH)
-@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+def _check(values: Mapping[str, Any]) -> Iterator[str]:
+    """Errors of options that exclude each other."""
+    if values["resume"] and values["overwrite"]:
+        yield "--resume and --overwrite exclude each other"
+
+
+@parsing.command(
+    "scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.", check=_check
+)
+@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
+@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @options.workers
 @options.scheduler
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
 @click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
-@options.quiet_output
+@options.output
 def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: Any) -> None:
     """Compute the encounters of two bodies that CASE.toml describes.
 
@@ -30,8 +39,6 @@ def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: An
     from ..experiments.scattering.case import read_scattering
     from .launch import refuse_folder
 
-    if resume and overwrite:
-        raise BadInput("--resume and --overwrite exclude each other")
     read = read_scattering(case)
     folder = Path(out or read[0].measure.out or Path(case).stem)
     if not resume:

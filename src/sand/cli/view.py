@@ -13,8 +13,7 @@ import click
 
 from ..errors import BadInput
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
-from . import options, report
-from .export import chosen
+from . import options, parsing, report
 
 LARGE = 100e6
 """Size [B] above which a page takes long to open."""
@@ -24,19 +23,28 @@ YOUNG = 5.0
 """Age [s] of a trajectory up to which its first frame may still be missing."""
 
 
-@click.command("view", short_help="Show the grains of a run in the browser.")
-@click.argument("folder", metavar="DIR", type=options.PATH)
+@parsing.command("view", short_help="Show the grains of a run in the browser.")
+@click.argument("folder", metavar="DIR", type=options.RUN)
 @click.option(
-    "--html", "html", metavar="FILE", type=options.PATH, help="Write one self-contained page instead, to keep or send."
+    "--html", "html", metavar="FILE", type=options.FILE, help="Write one self-contained page instead, to keep or send."
 )
-@click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Only every K-th frame.")
-@click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
-@click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port (default: any free one).")
+@click.option("--every", metavar="K", type=options.WholeNumber(min=1), default=1, help="Only every K-th frame.")
+@options.frames
+@click.option(
+    "--port", metavar="N", type=options.WholeNumber(0, 65535), default=0, help="Port (default: any free one)."
+)
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 @click.option("--overwrite", is_flag=True, help="Replace FILE if it exists.")
-@options.quiet_output
+@options.output
 def command(
-    folder: str, html: str | None, every: int, frames: str, port: int, no_browser: bool, overwrite: bool, **output: bool
+    folder: str,
+    html: str | None,
+    every: int,
+    frames: slice,
+    port: int,
+    no_browser: bool,
+    overwrite: bool,
+    **output: bool,
 ) -> None:
     """Show the grains of the run in DIR, or of a trajectory of SAND, in the browser.
 
@@ -48,11 +56,13 @@ def command(
     target = None if html is None else Path(html)
     if target is not None:
         _refuse_target(target, overwrite)
-    selection = frame_slice(chosen(frames), every)
+    selection = frame_slice(frames, every)
     silent = output["quiet"] or output["as_json"]
     dataset = _open_dataset(Path(folder), verbose=not silent)
     if selection != slice(None, None, 1):
-        parts = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
+        ends = ("" if k is None else str(k) for k in (frames.start, frames.stop, frames.step))
+        chosen = ":".join(ends).removesuffix(":")
+        parts = [f"frames {chosen} of the run"] * (chosen != ":") + [f"one frame of {every}"] * (every > 1)
         dataset.select(selection, ", ".join(parts))
     if target is None:
         _serve(dataset, folder, port, not no_browser, as_json=output["as_json"], silent=silent)

@@ -1,4 +1,4 @@
-"""Case file with every key of `sand run`, its meaning, unit and default, from the classes that read the keys."""
+"""Case files with every key, its meaning, unit and default, from the classes that read the keys; that of `sand run`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ast
 import dataclasses
 import inspect
 import itertools
+import shlex
 import textwrap
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -25,11 +26,13 @@ from .case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSe
 WIDTH = 110
 """Columns of comments."""
 HEAD = """\
-# Case file of SAND with every key.  Check it with `sand info {name}`, run it with `sand run {name}`.
+# Case file of `sand {command}` with every key.  Check it: sand info {name}   Run it: sand {command} {name}
 # Numbers are SI, or text with a unit such as "10 nm".  A line that begins with # and no space is a key, or a table,
 # that is not in use, with its default value; remove the # to use it.
 """
-EXAMPLES: dict[str, dict[str, Any]] = {
+Values = dict[str, dict[str, Any]]
+"""Values of keys, by table."""
+EXAMPLES: Values = {
     "run": {"until": "20 us", "frame_every": "0.1 us", "seed": 1},
     "box": {"periodic": "3 um"},
     "grains": {"kind": "gas", "number": 100, "radius": "0.1 um", "material": "silica", "temperature": "300 K"},
@@ -50,38 +53,68 @@ class Key(NamedTuple):
     default: Any  # None: the key is left out; REQUIRED
 
 
-def template(name: str) -> str:
-    """Text of a case file with all keys; those of `EXAMPLES` are in use, all others are in comments.
+class Table(NamedTuple):
+    """A table of a case file."""
+
+    head: str  # such as "[run]"
+    note: str
+    keys: list[Key]
+
+
+def run_tables() -> list[Table]:
+    """The tables of case files of `sand run`."""
+    return [
+        Table("[run]", "", keys_of(RunSection)),
+        Table("[box]", "", keys_of(BoxSection)),
+        Table("[grains]", "", [key for key in keys_of(GrainsSection) if key.name != "classes"]),
+        Table("[[grains.classes]]", summary(GrainClass), keys_of(GrainClass)),
+        material_table(),
+        Table("[[walls]]", summary(WallSection).removeprefix("[[walls]]: ").capitalize(), keys_of(WallSection)),
+        *force_tables(),
+        *stepping_tables(),
+        Table("[neighbours]", summary(Neighbours), keys_of(Neighbours)),
+        Table("[[driven]]", summary(Driven), keys_of(Driven)),
+    ]
+
+
+def force_tables() -> list[Table]:
+    """The tables of all forces."""
+    return [Table(f"[forces.{force}]", summary(kind), keys_of(kind)) for force, kind in FORCES.items()]
+
+
+def stepping_tables() -> list[Table]:
+    """The table [stepping], once for each integrator."""
+    meaning = f'Integrator; allowed: {", ".join(INTEGRATORS)}. clusters = "rigid" stands for "rigid-clusters".'
+    return [
+        Table("[stepping]", summary(kind), [Key("method", meaning, method), *keys_of(kind)])
+        for method, kind in INTEGRATORS.items()
+    ]
+
+
+def template(name: str, command: str = "run", tables: list[Table] | None = None, used: Values = EXAMPLES) -> str:
+    """Text of a case file with all keys; those of `used` are in use, all others are in comments.
 
     Parameters
     ----------
     name : str
         Name of the file, for its first line.
+    command : str, optional
+        The command that reads it.
+    tables : list of Table, optional
+        Its tables; those of `sand run` by default.
+    used : dict of str to dict, optional
+        Values of the keys in use, by table.
     """
-    tables: list[tuple[str, str, list[Key]]] = [
-        ("[run]", "", keys_of(RunSection)),
-        ("[box]", "", keys_of(BoxSection)),
-        ("[grains]", "", [key for key in keys_of(GrainsSection) if key.name != "classes"]),
-        ("[[grains.classes]]", _summary(GrainClass), keys_of(GrainClass)),
-        ("[materials.NAME]", _material_note(), _material_keys()),
-        ("[[walls]]", _summary(WallSection).removeprefix("[[walls]]: ").capitalize(), keys_of(WallSection)),
-        *((f"[forces.{force}]", _summary(kind), keys_of(kind)) for force, kind in FORCES.items()),
-    ]
-    for method, kind in INTEGRATORS.items():
-        meaning = f'Integrator; allowed: {", ".join(INTEGRATORS)}. clusters = "rigid" stands for "rigid-clusters".'
-        chosen = Key("method", meaning, method)
-        tables.append(("[stepping]", _summary(kind), [chosen, *keys_of(kind)]))
-    tables.append(("[neighbours]", _summary(Neighbours), keys_of(Neighbours)))
-    tables.append(("[[driven]]", _summary(Driven), keys_of(Driven)))
-    return HEAD.format(name=name) + "".join("\n" + "\n".join(_table(*one)) + "\n" for one in tables)
+    chosen = run_tables() if tables is None else tables
+    parts = ("\n" + "\n".join(_lines(table, used.get(table.head.strip("[]"), {}))) + "\n" for table in chosen)
+    return HEAD.format(name=shlex.quote(name), command=command) + "".join(parts)
 
 
-def _table(head: str, note: str, keys: list[Key]) -> Iterator[str]:
+def _lines(table: Table, used: dict[str, Any]) -> Iterator[str]:
     """Lines of a table: its note, its name, and each key with its meaning."""
-    used = EXAMPLES.get(head.strip("[]"), {})
-    yield from _comment(note)
-    yield head if used else f"#{head}"
-    for key in keys:
+    yield from _comment(table.note)
+    yield table.head if used else f"#{table.head}"
+    for key in table.keys:
         default = "required" if key.default is REQUIRED else "default: none" if key.default is None else ""
         if key.name in used and not default:
             default = f"default: {_toml(key.default)}"
@@ -97,23 +130,23 @@ def _comment(text: str) -> list[str]:
 
 
 def _toml(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
     return tomli_w.dumps({"key": value}).strip().removeprefix("key = ").replace("\n", "")
 
 
-def _summary(kind: type) -> str:
+def summary(kind: type) -> str:
     """The first line of the docstring of a class."""
     return (inspect.getdoc(kind) or "").splitlines()[0]
 
 
-def _material_note() -> str:
-    return f"A new material, or changes to a preset. Presets: {', '.join(PRESETS)}."
-
-
-def _material_keys() -> list[Key]:
-    """Keys of [materials.NAME], those of `Material` and `like`."""
+def material_table() -> Table:
+    """The table [materials.NAME], with the keys of `Material` and `like`."""
     meaning = {key.name: key.meaning for key in keys_of(Material)}
     like = "Preset to start from. Without it, density, young_modulus and poisson_ratio are required."
-    return [key._replace(meaning=meaning.get(key.name, like)) for key in keys_of(MaterialSection)]
+    keys = [key._replace(meaning=meaning.get(key.name, like)) for key in keys_of(MaterialSection)]
+    note = f"A new material, or changes to a preset. Presets: {', '.join(PRESETS)}."
+    return Table("[materials.NAME]", note, keys)
 
 
 def keys_of(kind: Any) -> list[Key]:
@@ -123,7 +156,7 @@ def keys_of(kind: Any) -> list[Key]:
         return [
             Key(
                 name,
-                notes.get(name, "") + _bounds(field.metadata),
+                notes.get(name, "") + _bounds(field.annotation, field.metadata),
                 REQUIRED if field.is_required() else field.get_default(call_default_factory=True),
             )
             for name, field in kind.model_fields.items()
@@ -139,11 +172,11 @@ def _default_of(one: Any) -> Any:
     return REQUIRED if one.default_factory is dataclasses.MISSING else None
 
 
-def _bounds(metadata: list[Any]) -> str:
+def _bounds(kind: Any, metadata: list[Any]) -> str:
     """Text for the bounds of a number, or nothing."""
     words = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
     found = [f"{text} {getattr(one, key)}" for one in metadata for key, text in words.items() if hasattr(one, key)]
-    return f" A whole number {', '.join(found)}." if found else ""
+    return f" A {'' if kind is float else 'whole '}number {', '.join(found)}." if found else ""
 
 
 def _attribute_docstrings(kind: type) -> dict[str, str]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ from ..setup.encounters import encounter, turned_at_random
 from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
 from ..units import seed_given, si
-from .collision_outcome import Approach, Collision, classify_collision
+from .collision_outcome import Approach, Collision, classify_collision, collision_title
 
 QUIET = 3
 """Number of consecutive intervals without contacts formed, slipped or broken that end a collision."""
@@ -156,9 +157,11 @@ def run_to_end(start: Approach, simulation: Simulation) -> Collision:
     if record is not None:
         record.draws = False  # the figure is drawn once at the end, not after each interval
     quiet = _until_quiet(simulation, start)
+    found = classify_collision(simulation, start, before, quiet)
+    simulation.title = collision_title([asdict(found)], start.bodies())
     if record is not None:
         record.draw(simulation)
-    return classify_collision(simulation, start, before, quiet)
+    return found
 
 
 def _until_quiet(simulation: Simulation, start: Approach) -> bool:

@@ -26,6 +26,7 @@ from ..io.run_folder import (
 from ..io.table import GrowingOutcomes
 from .collision import prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase, read_collision, run_seeds
+from .collision_outcome import collision_title
 
 
 class CollisionJob:
@@ -143,7 +144,8 @@ class CollisionJob:
             progress(done, len(set(seeds)))
             results = run_seeds(self.content, seeds, executor, kept.found, keep, observers)
             announce("drawing the figure")
-            save(collision_figure(results), self.folder / FIGURE)
+            title = collision_title(results, self.case.approach(seeds[0]).bodies())
+            save(collision_figure(results, title), self.folder / FIGURE)
         return results
 
     def _describe(self, name: str) -> None:

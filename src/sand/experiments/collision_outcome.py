@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
+from ..analysis.quantities import material_names
 from ..analysis.shape import gyration_radius
 from ..grains import Grains
 from ..simulation.simulation import Simulation
 from ..state.state import LOST
+from ..units import format_quantity
+
+ENDS = {"stick": "they stick", "bounce": "they bounce", "fragment": "they break up", "miss": "they miss"}
+"""Outcomes in words."""
+ROUNDING = 1e-15
+"""Impact parameter [m] below which it is one of rounding."""
 
 
 class Approach(NamedTuple):
@@ -24,6 +32,25 @@ class Approach(NamedTuple):
     flight: float  # approximate time of the earliest possible contact [s]
     speed: float  # [m/s]
     seed: int | None
+
+    @property
+    def impact_parameter(self) -> float:
+        """Distance of the centres of mass perpendicular to the flight [m]."""
+        first = len(self.target)
+        parts = [slice(first), slice(first, None)]
+        centres = [np.average(self.grains.position[p], axis=0, weights=self.grains.mass[p]) for p in parts]
+        offset = centres[1] - centres[0]
+        flight = self.grains.velocity[-1] - self.grains.velocity[0]
+        flight = flight / np.linalg.norm(flight)
+        return float(np.linalg.norm(offset - (offset @ flight) * flight))
+
+    def bodies(self) -> str:
+        """The bodies in words, such as '64 + 3 grains of silica'."""
+        names = [", ".join(material_names(body)) for body in (self.target, self.projectile)]
+        first, second = len(self.target), len(self.projectile)
+        if names[0] == names[1]:
+            return f"{first} + {second} grains of {names[0]}"
+        return " + ".join(f"{n} grain{'s' * (n > 1)} of {m}" for n, m in zip((first, second), names, strict=True))
 
     @property
     def check_every(self) -> float:
@@ -102,6 +129,25 @@ class Collision:
         return asdict(self)
 
 
+def collision_title(results: Sequence[dict[str, Any]], bodies: str) -> str:
+    """Title of a figure: number of collisions, bodies, speed, impact parameter, and the outcome if there is one.
+
+    Parameters
+    ----------
+    results : sequence of dict
+        Outcomes as dictionaries, see `Collision.to_dict`.
+    bodies : str
+        The bodies in words, see `Approach.bodies`.
+    """
+    offsets = [r["impact_parameter"] for r in results]
+    low, high = (format_quantity(float(f"{value:.3g}"), "m") for value in (min(offsets), max(offsets)))
+    offset = f"impact parameter {low if low == high else f'{low} to {high}'}" if max(offsets) > ROUNDING else "head-on"
+    what = f"Collision of {bodies}" if len(results) == 1 else f"{len(results)} collisions of {bodies}"
+    end = f": {ENDS[results[0]['outcome']]}" if len(results) == 1 else ""
+    text = f"{what} at {format_quantity(results[0]['speed'], 'm/s')}, {offset}{end}"
+    return text.replace(" um", " µm")
+
+
 def classify_collision(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
     """Classify the outcome of a collision and measure the final bodies.
 
@@ -116,7 +162,7 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
     quiet : bool
         False if the simulation was stopped while contacts still changed.
     """
-    target, projectile, initial, speed = start.target, start.projectile, start.grains, start.speed
+    target, projectile, speed = start.target, start.projectile, start.speed
     grains, row = simulation.grains, simulation.ledger.rows[-1]
     labels = cluster_labels(len(grains), simulation.contacts["pair"])
     masses = np.bincount(labels, weights=grains.mass)
@@ -124,17 +170,10 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
     counts = np.bincount(labels)
     largest = labels == order[0]
     m1, m2 = float(target.mass.sum()), float(projectile.mass.sum())
-    n = len(target)
-    centres = [
-        np.average(initial.position[part], axis=0, weights=initial.mass[part]) for part in (slice(n), slice(n, None))
-    ]
-    offset = centres[1] - centres[0]
-    flight = initial.velocity[-1] - initial.velocity[0]
-    flight = flight / np.linalg.norm(flight)
     return Collision(
         outcome=_outcome(labels, len(target), int(row["made"])),
         speed=speed,
-        impact_parameter=float(np.linalg.norm(offset - (offset @ flight) * flight)),
+        impact_parameter=start.impact_parameter,
         seed=start.seed,
         fragments=tuple(int(counts[k]) for k in order),
         largest_remnant=float(masses[order[0]] / masses.sum()),

@@ -82,8 +82,8 @@ def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
     return content | {"sigma": separation(np.log(one), np.log(other)), "sigma_of_size": separation(one, other)}
 
 
-def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any]) -> None:
-    """Write analysis.json, the tables of S(t) and of all aggregates, and the figure.
+def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any], guides: bool = False) -> None:
+    """Write analysis.json, the tables of S(t) and of all aggregates, and the figure, with `guides` or without.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     for one in ensembles:
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
         drawn.append((one.name, one.growth, all_aggregates(one.boxes) | units))
-    save(growth_figure(drawn), folder / NAMES[3])
+    save(growth_figure(drawn, guides), folder / NAMES[3])
 
 
 def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:

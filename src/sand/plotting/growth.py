@@ -11,16 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_prefix
+from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, legend_above, plot_style, si_prefix
 
 COLOURS = (RED, BLUE, GREEN, PURPLE)
 PAPER_EXPONENTS = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
 """Exponents of Dominik & Nübold (2002): growth of S (section 3.3), and μ(N) (Figure 1)."""
-LEGEND_ROW = 0.1
-"""Height of a row of the legend, relative to the range of the data."""
 
 
-def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figure:
+def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: bool = False) -> Figure:
     """Figure of S(t), μ(N) and N(r_g) of one or more ensembles.
 
     Parameters
@@ -28,14 +26,16 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
         For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
         `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain.
+    guides : bool, optional
+        Whether lines show the power laws of the paper.
     """
     with plot_style():
-        figure = Figure(figsize=(9.6, 3.3), layout="constrained")
+        figure = Figure(figsize=(9.6, 3.3 + 0.3 * len(ensembles)), layout="constrained")
         left, middle, right = figure.subplots(1, 3)
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
-            _draw_growth(left, name, growth, size, colour)
-            _draw_moments(middle, growth, rows, colour)
+            _draw_growth(left, name, growth, size, colour, guides)
+            _draw_moments(middle, growth, rows, colour, guides)
             _draw_dimension(right, growth, rows, colour)
         for axes in (left, middle, right):
             axes.set(xscale="log", yscale="log")
@@ -44,21 +44,18 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
                 axis.set_major_formatter(lambda value, _: f"{value:g}")
                 axis.set_minor_formatter(NullFormatter())
         left.set(xlabel=f"time [{unit}]", ylabel="mean size $S$ [grains]")
-        low, high = left.get_ylim()
-        left.set_ylim(low, low * (high / low) ** (1.0 + LEGEND_ROW * (len(ensembles) + 1)))  # space for the legend
-        left.legend(loc="upper left")
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
-        for axes, corner in ((middle, "lower right"), (right, "upper left")):
+        for axes in (left, middle, right):
             if axes.get_legend_handles_labels()[0]:
-                axes.legend(loc=corner)
+                legend_above(axes)
             else:
                 axes.text(0.5, 0.5, "no aggregates", ha="center", color=MUTED, transform=axes.transAxes)
     return figure
 
 
-def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> None:
-    """S(t) of each box, the mean with its error, the fit, and the paper's slopes through the centre of the fit."""
+def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str, guides: bool) -> None:
+    """S(t) of each box, the mean with its error, the fit, and with `guides` the slopes of the paper."""
     time = growth.time / size
     positive = growth.time > 0.0
     for sizes in growth.sizes:
@@ -74,14 +71,14 @@ def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -
     axes.plot(time[fitted], growth.z.at(growth.time[fitted]), color=TEXT_COLOUR, lw=0.8, ls="--")
     axes.axhline(growth.window[1], color=MUTED, lw=0.6, ls=":", zorder=0)
     centre = np.exp(np.log(growth.time[fitted]).mean())
-    for z in (PAPER_EXPONENTS["z, Brownian"], PAPER_EXPONENTS["z, magnetic"]):
+    for z in (PAPER_EXPONENTS["z, Brownian"], PAPER_EXPONENTS["z, magnetic"]) if guides else ():
         ends = centre * np.array([0.7, 1.4])
         height = float(growth.z.at(centre)) * (ends / centre) ** z
         axes.plot(ends / size, height, color=MUTED, lw=0.8)
         axes.annotate(f"$t^{{{z:g}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=7)
 
 
-def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:
+def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str, guides: bool) -> None:
     if growth.moment is None:
         return
     moment = rows["moment"] / rows["unit_moment"]
@@ -97,7 +94,8 @@ def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) ->
     if growth.moment_without_rings is not None:
         text = f"without rings: $N^{{{_with_error(growth.moment_without_rings)}}}$"
         axes.plot(n, growth.moment_without_rings.at(n), color=colour, lw=0.9, label=text)
-    axes.plot(n, n ** PAPER_EXPONENTS["moment"], color=MUTED, lw=0.9, label="the paper: $N^{0.63}$")
+    if guides:
+        axes.plot(n, n ** PAPER_EXPONENTS["moment"], color=MUTED, lw=0.9, label="the paper: $N^{0.63}$")
     axes.set_ylim(bottom=0.1)
 
 

@@ -24,6 +24,7 @@ from .style import (
     TEXT_COLOUR,
     YELLOW,
     format_number,
+    format_si,
     legend_above,
     si_prefix,
 )
@@ -48,15 +49,22 @@ OPTIONAL_CHANNELS = ("damping", "stiffness", "settling", "gas", "outside", "cuto
 
 DECADES = 6
 """Decades shown of a quantity that spans many."""
+NOTE_SHARE = 0.16
+"""Height of a note below the curves, relative to that of the curves."""
 MIN_BALANCE_RANGE = 1e-3
 """Minimum half range of the balance axis, relative to all losses and the largest kinetic energy."""
 
 
+FEW = 2
+"""Bodies at the start up to which their motion is a flight, not a thermal motion, and energies are in units of it."""
+
+
 class AxisUnit(NamedTuple):
-    """Unit of an axis: its size in SI units, and its name for the label."""
+    """Unit of an axis: its size in SI units, its name for the label, and its value in words, "" if the name says it."""
 
     size: float
     name: str
+    value: str = ""
 
 
 def column(ledger: Any, *names: str) -> np.ndarray:
@@ -75,11 +83,23 @@ def time_unit(ledger: Any) -> AxisUnit:
     return AxisUnit(*si_prefix(peak(ledger["time"]), "s"))
 
 
+def has_few_bodies(ledger: Any) -> bool:
+    """Whether there were one or two bodies at the start, as in a collision, so that their motion has no temperature."""
+    return float(ledger["clusters"][0]) <= FEW
+
+
 def energy_unit(ledger: Any, temperature: float, grains: int) -> AxisUnit:
-    """N k_B T₀ with the initial temperature [K]; joules with an SI prefix if the grains were initially at rest."""
+    """N k_B T₀ with the initial temperature [K]; for one or two bodies their kinetic energy at the start, E₀.
+
+    Joules with an SI prefix if the grains were initially at rest.
+    """
+    start = float(column(ledger, *KINETIC)[0])
+    if has_few_bodies(ledger) and start > 0.0:
+        return AxisUnit(start, "$E_0$", f"$E_0$ = {format_si(start, 'J')}, the kinetic energy at the start")
     if temperature > 0.0:
         name = r"$N k_\mathrm{B}T_0$" if grains > 1 else r"$k_\mathrm{B}T_0$"
-        return AxisUnit(grains * BOLTZMANN * temperature, name)
+        value = f"$T_0$ = {format_number(temperature)} K, the kinetic temperature at the start"
+        return AxisUnit(grains * BOLTZMANN * temperature, name, value)
     return AxisUnit(*si_prefix(max(map(peak, (*energies(ledger).values(), *losses(ledger).values()))), "J"))
 
 
@@ -171,8 +191,6 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
         axes.plot(t, size, color=colour, label=CHANNEL_LABELS.get(name, name), **_markers(t))
     smallest = min(float(np.nanmin(size)) for size, _ in drawn.values())
     axes.set(yscale="log", ylim=(max(smallest / 2.0, top * 10.0**-DECADES), top * 2.5))
-    _log_ticks(axes)
-    legend_above(axes)
     zero = [name for name, (size, _) in channels.items() if not peak(size) and name not in OPTIONAL_CHANNELS]
     small = [name for name, (size, _) in channels.items() if name not in drawn and peak(size)]
     notes = [
@@ -180,7 +198,12 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
         for text, names in (("none", zero), ("negligible", small))
         if names
     ]
-    axes.text(0.995, 0.03, "; ".join(notes), transform=axes.transAxes, ha="right", va="bottom", size=7, color=MUTED)
+    if notes:  # below all curves
+        low, high = axes.get_ylim()
+        axes.set_ylim(low * (low / high) ** NOTE_SHARE, high)
+        axes.text(0.995, 0.03, "; ".join(notes), transform=axes.transAxes, ha="right", va="bottom", size=7, color=MUTED)
+    _log_ticks(axes)
+    legend_above(axes)
 
 
 def draw_contacts(axes: Axes, ledger: Any, time: AxisUnit) -> None:

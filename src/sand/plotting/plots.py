@@ -55,7 +55,8 @@ def history_figure(ledger: LedgerColumns, name: str, grains: int, temperature: f
     grains : int
         Number of grains N.
     temperature : float
-        Initial kinetic temperature [K]. Energies are in N k_B T, or in joules if it is 0.
+        Initial kinetic temperature [K]. Energies are in N k_B T; in joules if it is 0; for one or two bodies at the
+        start in units of their kinetic energy then.
     dark : bool, optional
         Dark background.
 
@@ -70,8 +71,11 @@ def history_figure(ledger: LedgerColumns, name: str, grains: int, temperature: f
         with plot_style():
             figure, axes = _figure()
             time = time_unit(ledger)
-            _DRAW[name](axes, ledger, time, energy_unit(ledger, temperature, grains))
+            unit = energy_unit(ledger, temperature, grains)
+            _DRAW[name](axes, ledger, time, unit)
             draw_time([axes], time, ledger)
+            if unit.name in axes.get_ylabel() and unit.value:
+                axes.set_xlabel(f"{axes.get_xlabel()}\n{unit.value}")
             _apply_dark(figure, dark)
     except KeyError as error:
         raise BadInput(f"the ledger has no column {error}; it was written by another version of SAND") from None

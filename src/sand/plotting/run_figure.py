@@ -15,9 +15,19 @@ from matplotlib.figure import Figure
 from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
-from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
+from .panels import (
+    draw_balance,
+    draw_clusters,
+    draw_contacts,
+    draw_energies,
+    draw_losses,
+    draw_time,
+    energy_unit,
+    has_few_bodies,
+    time_unit,
+)
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
-from .style import MUTED, RED, format_number, format_si, panel_letter, plot_style
+from .style import MUTED, RED, format_si, panel_letter, plot_style
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
@@ -37,10 +47,15 @@ _METADATA: dict[str, dict[str, Any]] = {
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
 _TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
 _MARGIN = 0.012
+_HEIGHTS = (1.0, 1.35, 1.1, 0.5)
+"""Heights of the panels over time, relative to each other."""
 
 
 class RunFigure(Figure):
     """A figure that notebooks display as PNG with any backend."""
+
+    pixels_per_inch: float = DPI
+    """Of its files; `dpi` is that of the window that shows it."""
 
     def _repr_png_(self) -> bytes:
         return figure_bytes(self)
@@ -51,7 +66,8 @@ def run_figure(simulation: Simulation) -> Figure:
 
     Left, over time: clusters (Eq. 17), energies, losses by channel, and the energy balance. Right: the grains at the
     present time with their moments, coloured by cluster; if they are small, the largest clusters again, enlarged.
-    Energies are in N k_B T₀, or in joules if the grains were initially at rest.
+    Energies are in N k_B T₀, or in joules if the grains were initially at rest. Of one or two bodies, as in a
+    collision, contacts take the place of clusters, and energies are in units of their kinetic energy at the start.
 
     The left half is empty if the ledger has no row, the right half if no position is finite.
     """
@@ -67,38 +83,45 @@ def run_figure(simulation: Simulation) -> Figure:
 
 
 def _draw_header(figure: Figure, simulation: Simulation) -> None:
-    title = headline(simulation.grains, simulation.box, simulation.time)
+    title = headline(simulation.grains, simulation.box, simulation.time, simulation.title)
     figure.text(_MARGIN, 0.968, title, size=10.5, weight="bold", va="center")
     if not simulation.ledger.rows:
         return
     last = simulation.ledger.rows[-1]
     count, mean = int(last["clusters"]), last["mean_cluster_size"]
-    facts = [
-        f"{count} cluster{'s' if count != 1 else ''}",
-        f"mean size S = {mean:.0f}" if mean >= 100.0 else f"mean size S = {mean:.3g}",
-        f"largest {int(last['largest_cluster'])}",
-        f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)",
-    ]
-    if simulation.temperature > 0.0:
-        facts.append(f"$T_0$ = {format_number(simulation.temperature)} K")
+    unit = energy_unit(simulation.ledger, simulation.temperature, len(simulation.grains))
+    if has_few_bodies(simulation.ledger):
+        largest = f"{', the largest' if count > 1 else ''} of {int(last['largest_cluster'])} grains"
+        facts = [f"{count} bod{'ies' if count > 1 else 'y'}{largest}"]
+    else:
+        facts = [
+            f"{count} cluster{'s' if count != 1 else ''}",
+            f"mean size S = {mean:.0f}" if mean >= 100.0 else f"mean size S = {mean:.3g}",
+            f"largest {int(last['largest_cluster'])}",
+        ]
+    facts.append(f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)")
+    facts += [unit.value.replace(", the kinetic temperature at the start", "")] if unit.value else []
     figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
     for k, note in enumerate(simulation.notes()):
         brief = note.split(";")[0]
         figure.text(_MARGIN, 0.911 - 0.019 * k, f"Note: {brief}.", size=7.0, color=RED, va="center")
 
 
-def headline(grains: Any, box: Box, time: float) -> str:
-    """Title of a run: '100 grains of iron, r = 10 nm, periodic cube of 1.2 µm, t = 5 µs'."""
+def headline(grains: Any, box: Box, time: float, title: str = "") -> str:
+    """Title of a run: '100 grains of iron, r = 10 nm, periodic cube of 1.2 µm, t = 5 µs'.
+
+    Parameters
+    ----------
+    title : str, optional
+        What takes the place of the grains and the box, such as 'Collision of 3 + 1 grains of silica'.
+    """
     names = material_names(grains)
     materials = ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
     small, large = float(grains.radius.min()), float(grains.radius.max())
     least = "" if large < 1.001 * small else f"{format_si(small, 'm')} to "
-    parts = [
-        f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {materials}",
-        f"r = {least}{format_si(large, 'm')}",
-        _describe_box(box),
-        f"t = {format_si(time, 's')}",
-    ]
+    what = title or f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {materials}"
+    parts = [what, f"r = {least}{format_si(large, 'm')}", *([] if title else [_describe_box(box)])]
+    parts.append(f"t = {format_si(time, 's')}")
     return ",  ".join(parts)
 
 
@@ -114,17 +137,29 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    gap = 4 * _GAP / (_TOP - _BOTTOM - 3 * _GAP)  # relative to the mean height of the four panels
-    place = {"left": _LEFT[0], "right": _LEFT[1], "bottom": _BOTTOM, "top": _TOP, "hspace": gap}
-    panels = list(figure.subplots(4, 1, height_ratios=(1.0, 1.35, 1.1, 0.5), gridspec_kw=place))
-    draw_clusters(panels[0], ledger, time)
+    panels = [figure.add_axes((_LEFT[0], 0.1 * k, _LEFT[1] - _LEFT[0], 0.1)) for k in range(len(_HEIGHTS))]
+    (draw_contacts if has_few_bodies(ledger) else draw_clusters)(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
     draw_balance(panels[3], ledger, time, unit)
     draw_time(panels, time, ledger)
     for name, axes in zip("abcd", panels, strict=True):
-        axes.yaxis.set_label_coords(-0.138, 0.5)
+        axes.yaxis.set_label_coords(-0.155, 0.5)
         panel_letter(axes, name, -0.185)
+    _place_panels(figure, panels)
+
+
+def _place_panels(figure: Figure, panels: list[Axes]) -> None:
+    """Place the panels one below the other, with space for the rows of their legends."""
+    legends = [axes.get_legend() for axes in panels]
+    rows = [0.0 if one is None else one.get_window_extent().height / figure.bbox.height for one in legends]
+    gaps = [max(_GAP, row + 0.4 * _GAP) for row in rows]
+    height = (_TOP + _GAP - _BOTTOM - sum(gaps)) / sum(_HEIGHTS)
+    top = _TOP + _GAP
+    for axes, share, gap in zip(panels, _HEIGHTS, gaps, strict=True):
+        top -= gap + share * height
+        for one in axes.get_shared_x_axes().get_siblings(axes):  # with the axis on the right
+            one.set_position((_LEFT[0], top, _LEFT[1] - _LEFT[0], share * height))
 
 
 def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
@@ -167,7 +202,7 @@ def _pixels(height: float) -> tuple[int, int]:
     return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
 
 
-def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -> bytes:
+def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False, dpi: float = 0.0) -> bytes:
     """Encode a figure as a file, without time stamps: equal figures give equal bytes.
 
     Parameters
@@ -178,10 +213,18 @@ def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -
         "png", "pdf" or "svg".
     transparent : bool, optional
         Transparent background.
+    dpi : float, optional
+        Pixels per inch, which a PNG states; by default `RunFigure.pixels_per_inch`, DPI for other figures.
     """
     colour = "none" if transparent else "auto"  # "auto" is the colour of the figure, also with a dark background
     with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
-        figure.savefig(content := io.BytesIO(), format=form, dpi=DPI, facecolor=colour, metadata=_METADATA[form])
+        figure.savefig(
+            content := io.BytesIO(),
+            format=form,
+            dpi=dpi or getattr(figure, "pixels_per_inch", DPI),
+            facecolor=colour,
+            metadata=_METADATA[form],
+        )
     return content.getvalue()
 
 

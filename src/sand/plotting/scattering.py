@@ -21,6 +21,7 @@ from .style import (
     RED,
     TEXT_COLOUR,
     format_si,
+    legend_above,
     panel_letter,
     plot_style,
     si_prefix,
@@ -63,8 +64,7 @@ def trajectories_figure(groups: Sequence[Sequence[Any]], names: Sequence[str], s
                 _draw_trajectory(axes, one, colour, unit)
             axes.set(xlim=(-WINDOW, WINDOW), ylim=(-WINDOW, WINDOW), aspect="equal")
             axes.set(xlabel=f"$x/{unit_name}$", ylabel=f"$y/{unit_name}$")
-            axes.set_title(f"spin: {names[k]}", loc="left", fontsize=8.0)
-            axes.legend(loc="upper left", title=f"$b/{unit_name}$", title_fontsize=7.0, fontsize=6.5, alignment="left")
+            legend_above(axes, title=f"spin: {names[k]};  $b/{unit_name}$ and outcome:")
             panel_letter(axes, "abcdefgh"[k], -0.12)
         lines = "thick lines: projectile; thin lines: target; dots: equal time intervals"
         figure.suptitle(f"{title}\n{lines}", x=0.01, ha="left", fontsize=8.0)
@@ -189,7 +189,7 @@ def _draw_sigma(axes: Axes, found: Sequence[Any]) -> None:
         axes.plot(fine, line / size**2, "--", color=RED, label="Eq. 14")
     axes.axhline(found[0].geometric / size**2, color=MUTED, linewidth=0.9, label="$\\pi(r_1+r_2)^2$")
     axes.set(xscale="log", yscale="log", xlabel=SPEED, ylabel=f"$\\sigma$ [{name}²]")
-    axes.legend(loc="best")
+    legend_above(axes)
 
 
 def _draw_profile(axes: Axes, found: Any) -> None:

@@ -121,19 +121,44 @@ def format_number(value: float) -> str:
     return rf"{digits}$\times 10^{{{int(exponent)}}}$"
 
 
-def legend_above(axes: Axes, lines: Sequence[Artist] = ()) -> None:
-    """Draw the legend of the axes, or of these lines, as one row above the axes, where it covers no data."""
-    handles: list[Any] = list(lines) or axes.get_legend_handles_labels()[0]
-    axes.legend(
-        handles=handles,
-        loc="lower right",
-        bbox_to_anchor=(1.01, 0.97),
-        ncols=max(len(handles), 1),
-        borderpad=0.1,
-        handlelength=1.3,
-        handletextpad=0.5,
-        columnspacing=1.1,
-    )
+def legend_above(axes: Axes, lines: Sequence[Artist] = (), *, title: str = "") -> None:
+    """Draw the legend of the axes, or of these lines, above the axes, where it covers no data.
+
+    It has one row, or more if it would be wider than the axes; entries that look and read the same are drawn once.
+
+    Parameters
+    ----------
+    lines : Sequence[Artist], optional
+        What to list; everything that has a label by default.
+    title : str, optional
+        Text above the entries, at the left.
+    """
+    given: list[Any] = list(lines) or axes.get_legend_handles_labels()[0]
+    handles = list({_look(one): one for one in given}.values())
+    for columns in range(len(handles), 0, -1):
+        legend = axes.legend(
+            handles=handles,
+            loc="lower right",
+            bbox_to_anchor=(1.01, 1.0),
+            ncols=columns,
+            borderpad=0.1,
+            borderaxespad=0.25,
+            handlelength=1.3,
+            handletextpad=0.5,
+            columnspacing=1.1,
+            title=title or None,
+            title_fontsize=7.5,
+            alignment="left",
+        )
+        if legend.get_window_extent().width <= axes.get_window_extent().width:
+            return
+
+
+def _look(handle: Any) -> tuple[str, str, object]:
+    """What an entry of a legend reads, and what its line looks like; no two handles of another kind look the same."""
+    if not hasattr(handle, "get_marker"):
+        return handle.get_label(), "", id(handle)
+    return handle.get_label(), str(handle.get_color()), f"{handle.get_marker()} {handle.get_linestyle()}"
 
 
 def panel_letter(axes: Axes, text: str, x: float) -> None:

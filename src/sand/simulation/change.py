@@ -16,7 +16,7 @@ from ..forces.gas.model import Gas
 from ..grains import Grains
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
-from ..schema import BY_NAME, stored
+from ..schema import BY_NAME, CHANGEABLE, stored
 from ..state.arrays import SAVED_LONG_RANGE
 from ..state.state import (
     BROKEN,
@@ -47,7 +47,7 @@ from .initial_contacts import overlapping_pairs, refuse_overlaps
 from .settings import read_forces
 from .walls import Wall
 
-QUANTITIES = ("velocity", "spin", "moment", "charge")
+QUANTITIES = CHANGEABLE
 """Quantities of the grains that can be changed."""
 ASSIGNED = (*QUANTITIES, "forces", "box")
 """Attributes of a change that can be assigned."""

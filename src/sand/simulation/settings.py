@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 from ..arguments import objects_with
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
+from ..forces.registry import FORCES
+from ..schema import CHANGEABLE, FIELDS
 from .cadence import read_cadence
 from .observers import Observer
 from .updater import read_updaters
@@ -16,12 +18,38 @@ ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls
 """Arguments of a simulation that are fixed once it is built."""
 RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound", "wall_seconds")
 """Attributes of a simulation that follow from the run."""
+QUANTITIES = tuple(field.name for field in FIELDS)
+"""Quantities of grains."""
+
+CHANGES = {
+    "forces": "change.replace(sand.Field('1 mT')) for each force that differs, or change.forces = (…)",
+    "box": "change.box = '3 um', or change.scale_box(0.9)",
+    "grains": "change.velocity[…] = …, change.add(grains), change.remove([0])",
+    **{name: f"change.{name}[…] = …" for name in CHANGEABLE},
+}
+"""What `Simulation.change` can change, and how, by the attribute that one would assign."""
 
 
-def _rebuild(name: str) -> str:
-    """Code that builds a new simulation with another value of one argument."""
-    others = {"grains": "grains, …", "forces": "sim.grains, forces=[…]"}
-    return f"build a new one: sand.Simulation({others.get(name, f'sim.grains, sim.forces, {name}=…')})"
+def _refusal(name: str) -> str:
+    """Why an attribute of a simulation cannot be assigned, and what to write instead; "" if it may be assigned."""
+    if name in CHANGES:
+        return f"{name} of a simulation cannot be assigned; write: with sim.change() as change: {CHANGES[name]}"
+    if name == "contact":
+        other = "sim.start, [sand.Contact(…), …]"
+        return f"the contact model of a simulation cannot change; build a new one: sand.Simulation({other})"
+    if name in FORCES:
+        code = f"change.replace(sand.{FORCES[name].__name__}(…))"
+        return f"{name} of a simulation cannot be assigned; write: with sim.change() as change: {code}"
+    if name in ARGUMENTS:
+        return (
+            f"{name} of a simulation cannot change once it is built; build a new one: "
+            f"sand.Simulation(sim.grains, sim.forces, {name}=…)"
+        )
+    if name in RESULTS:
+        return f"{name} of a simulation follows from its run and cannot be assigned"
+    if name in QUANTITIES:
+        return f"{name} of the grains of a simulation cannot be assigned; build a new one from sand.Grains(…, {name}=…)"
+    return ""
 
 
 def read_setting(name: str, *, wall: bool = False) -> Callable[[Any], float | str | None]:
@@ -71,19 +99,19 @@ class ReadOnlySettings:
         "observers": read_observers,
         "updaters": read_updaters,
     }
-    INTERNAL = ("recipe", "origin", "planned")
+    INTERNAL = ("recipe", "origin", "planned", "title")
     """Attributes that SAND itself assigns later."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Assign an attribute that may change.  Raises BadInput."""
+        """Assign an attribute that may change.  Raises BadInput, which says what to write instead."""
         if name in ReadOnlySettings.CONVERTERS:
             value = ReadOnlySettings.CONVERTERS[name](value)
         elif self._built and not name.startswith("_") and name not in ReadOnlySettings.INTERNAL:
-            if name in ARGUMENTS:
-                raise NoSuchAttribute(f"{name} of a simulation cannot change once it is built; {_rebuild(name)}")
-            if name in RESULTS:
-                raise NoSuchAttribute(f"{name} of a simulation follows from its run and cannot be assigned")
-            if type(self).__module__.startswith("sand."):
+            # a subclass may use any name that a simulation does not have
+            own = type(self).__module__.startswith("sand.")
+            if (own or name in ARGUMENTS or name in RESULTS) and (refusal := _refusal(name)):
+                raise NoSuchAttribute(refusal)
+            if own:
                 advice = did_you_mean(name, (*ReadOnlySettings.CONVERTERS, *ARGUMENTS))
                 raise NoSuchAttribute(f"a simulation has no '{name}'; {advice}")
         object.__setattr__(self, name, value)

@@ -133,6 +133,7 @@ class Simulation(ReadOnlySettings):
         self._choices_at_start: dict[str, str] = {}  # of a resumed run, from its checkpoint
         self.recipe: dict[str, Any] | None = None  # the [grains] table of the case file that described the grains
         self.origin = ""  # description of the file that the grains come from
+        self.title = ""  # what a figure says instead of the numbers of grains
         self.planned: tuple[float, float, str | None] = (math.inf, math.inf, None)  # end of a resumed run
         self.start = grains.copy()
         integrator = Verlet() if stepping is None else checked_integrator(stepping)

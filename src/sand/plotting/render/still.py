@@ -31,12 +31,14 @@ VIEWS: dict[str, tuple[float, float, float] | None] = {
 """Directions to the eye; None for the default of `scene.camera_rotation`."""
 MIN_SIZE, MAX_SIZE = 200, 8000
 """Allowed width and height [pixels]."""
+LEAST_DPI, MOST_DPI = 50, 1200
+"""Allowed numbers of pixels per inch."""
 LIGHTING_ON_LIGHT = Lighting(haze=0.26)
 LIGHTING_ON_DARK = Lighting(ambient=0.64, key=0.66, specular=0.24, haze=0.45, background=tuple(rgb(DARK_BACKGROUND)))
 CONTACT_RADIUS = 0.52
 """Radius of the cylinder that marks a contact, in radii of the smaller grain; its half length is 0.4 of that."""
-MAX_FINE_GRAINS = 3000
-"""Up to this number of grains, 9 samples per pixel are taken instead of 4."""
+MAX_FINE_GRAINS, MAX_FINE_PIXELS = 3000, 4_000_000
+"""Up to these numbers of grains and of pixels, 9 samples per pixel are taken instead of 4."""
 _VIEWPORT = (0.035, 0.845, 0.075, 0.905)
 """Left, right, bottom and top of the area for grains and box, relative to the image."""
 
@@ -75,6 +77,7 @@ def still_picture(
     arrows: bool = True,
     view: str | Sequence[float] = "iso",
     size: tuple[int, int] = (1600, 1000),
+    dpi: int = DPI,
     dark: bool = False,
     transparent: bool = False,
     whole: bool = True,
@@ -98,6 +101,8 @@ def still_picture(
         "iso", "front", "top", "side", or the direction to the eye as three numbers.
     size : tuple of int, optional
         Width and height [pixels], each from 200 to 8000.
+    dpi : int, optional
+        Pixels per inch, from 50 to 1200, which set the printed size; texts and lines keep their share of the picture.
     dark : bool, optional
         Dark background.
     transparent : bool, optional
@@ -122,7 +127,7 @@ def still_picture(
         With one line for each error.
     """
     refuse_other(frame, "radius", "pair", "box")
-    towards_eye = check_picture_options(colour, bonds, view, size)
+    towards_eye = check_picture_options(colour, bonds, view, size, dpi)
     flux_density = None if field is None else np.asarray(field, dtype=np.float64)
     scene = make_scene(frame, frame.pair, frame.box, whole)
     scene, key = _coloured_scene(scene, frame, colour, flux_density, arrows)
@@ -136,8 +141,8 @@ def still_picture(
     rotation = camera_rotation(towards_eye)
     keys = [each for each in (key, contact_key) if each is not None]
     with plot_style():
-        figure = Still(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
-        figure.scene, figure.rotation = scene, rotation
+        figure = Still(figsize=(size[0] / dpi, size[1] / dpi), dpi=dpi)
+        figure.scene, figure.rotation, figure.pixels_per_inch = scene, rotation, dpi
         _draw(figure, contacts, size, dark, perspective)
         _draw_background(figure, dark, transparent)
         _annotate(figure, frame, keys, flux_density, dark)
@@ -145,7 +150,7 @@ def still_picture(
 
 
 def check_picture_options(
-    colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]
+    colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int], dpi: int = DPI
 ) -> np.ndarray | None:
     """Check the options of `still_picture`.
 
@@ -168,6 +173,8 @@ def check_picture_options(
                 problems += error.problems
     if not all(MIN_SIZE <= length <= MAX_SIZE for length in size):
         problems.append(f"size {size[0]}x{size[1]}: width and height must be from {MIN_SIZE} to {MAX_SIZE} pixels")
+    if not LEAST_DPI <= dpi <= MOST_DPI:
+        problems.append(f"dpi {dpi}: pixels per inch must be from {LEAST_DPI} to {MOST_DPI}")
     direction: Any = VIEWS.get(view) if isinstance(view, str) else view
     if isinstance(view, str) and view not in VIEWS:
         try:
@@ -262,7 +269,7 @@ def _draw(figure: Still, contacts: Rods, size: tuple[int, int], dark: bool, pers
         rods=dataclasses.replace(rods, start=rods.start @ rotation.T - shift, end=rods.end @ rotation.T - shift),
         eye=eye,
         lighting=LIGHTING_ON_DARK if dark else LIGHTING_ON_LIGHT,
-        supersampling=3 if len(spheres.radius) <= MAX_FINE_GRAINS else 2,
+        supersampling=3 if len(spheres.radius) <= MAX_FINE_GRAINS and size[0] * size[1] <= MAX_FINE_PIXELS else 2,
     )
 
 
@@ -279,7 +286,7 @@ def _draw_background(figure: Still, dark: bool, transparent: bool) -> None:
 def _annotate(figure: Still, frame: Any, keys: list[ColourKey], field: np.ndarray | None, dark: bool) -> None:
     """Draw caption, colour keys, scale bar and directions, with font sizes in proportion to the image."""
     text_colour, muted = (TEXT_ON_DARK, MUTED_ON_DARK) if dark else (TEXT_COLOUR, MUTED)
-    width, height = figure.get_size_inches() * DPI
+    width, height = figure.get_size_inches() * DPI  # points keep their share of the picture at any `dpi`
     scale = float(min(width / 1600.0, height / 1000.0))
     axes = figure.axes[0]
     caption = headline(frame, frame.box, frame.time).split(",  ")

@@ -1,0 +1,98 @@
+"""Case files with every key, for each command that reads one; see `config.template`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..config.template import (
+    EXAMPLES,
+    REQUIRED,
+    Key,
+    Table,
+    Values,
+    force_tables,
+    keys_of,
+    material_table,
+    run_tables,
+    stepping_tables,
+    summary,
+    template,
+)
+from ..descriptions import parameter_docs
+from .collision_case import BodySection, ImpactSection
+from .growth_case import GrowSection
+from .scattering.case import FlightSection, MeasureSection, ScatterBody
+from .scattering.problem import flight
+
+BODY = {"kind": "bpca", "grains": 16, "radius": "0.1 um", "material": "silica"}
+COLLISION: Values = {
+    "target": BODY,
+    "projectile": BODY,
+    "impact": {"speed": "1 m/s", "impact_parameter": "0.3 b", "seeds": [1]},
+    "forces.contact": {"damping": "viscoelastic", "viscous_time": "1.25e-11 s"},
+}
+"""Keys in use of `sand collide`: two fluffy aggregates of silica."""
+SCATTERING: Values = {
+    "projectile": {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg"},
+    "flight": {"temperature": "100 K", "speed": ["0.5 m/s", "2 m/s"]},
+    "measure": {"relative_error": 0.05, "seed": 1},
+}
+"""Keys in use of `sand scatter`: cross-sections of two magnetic grains of iron at two speeds."""
+GROWTH: Values = {
+    **EXAMPLES,
+    "grow": {"seeds": [1, 2, 3, 4]},
+    "run": {"until": "20 us", "frame_every": "0.1 us"},
+}
+"""Keys in use of `sand grow`: the gas of the case of `sand run`, for four seeds."""
+
+
+def _collision(name: str) -> str:
+    note = "A grain or an aggregate; a different one for each seed if it is random, or a file."
+    tables = [
+        Table("[target]", note, keys_of(BodySection)),
+        Table("[projectile]", note, keys_of(BodySection)),
+        Table(
+            "[impact]", summary(ImpactSection).removeprefix("Section [impact]: ").capitalize(), keys_of(ImpactSection)
+        ),
+        material_table(),
+        *force_tables(),
+        *stepping_tables(),
+    ]
+    return template(name, "collide", tables, COLLISION)
+
+
+def _scattering(name: str) -> str:
+    tables = [
+        Table("[projectile]", "The body that flies: a grain, or an aggregate.", keys_of(ScatterBody)),
+        Table("[target]", "The body that it meets; without this table, one like the projectile.", keys_of(ScatterBody)),
+        Table("[flight]", "Initial conditions.", _flight_keys()),
+        Table("[measure]", "What to compute, and how accurately.", keys_of(MeasureSection)),
+        material_table(),
+    ]
+    return template(name, "scatter", tables, SCATTERING)
+
+
+def _flight_keys() -> list[Key]:
+    """Keys of [flight], with the meanings of the arguments of `flight`."""
+    meaning = parameter_docs(flight) | {"speed": f"{parameter_docs(flight)['speed']} One, or a list."}
+    return [
+        key._replace(meaning=meaning[key.name], default=REQUIRED if key.name == "speed" else key.default)
+        for key in keys_of(FlightSection)
+    ]
+
+
+def _growth(name: str) -> str:
+    grow = Table("[grow]", "One box for each seed, all alike otherwise.", keys_of(GrowSection))
+    run, *others = run_tables()
+    # all boxes end at the same time, and each has its own seed and folder
+    kept = [key for key in run.keys if key.name not in ("stop", "seed", "out")]
+    return template(name, "grow", [grow, run._replace(keys=kept), *others], GROWTH)
+
+
+TEMPLATES: dict[str, Callable[[str], str]] = {
+    "run": template,
+    "collide": _collision,
+    "scatter": _scattering,
+    "grow": _growth,
+}
+"""Text of a case file, from its name, by command."""
