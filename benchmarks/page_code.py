@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import linecache
 import re
+import subprocess
 import sys
-import types
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from .quoted import TOP
 
 PAGES = (TOP / "README.md", *sorted((TOP / "docs").rglob("*.md")))
 SCRIPT = re.compile(r"^```python\n(import .*?)^```$", re.MULTILINE | re.DOTALL)
 """A block of Python that begins with an import is a whole script; others are parts."""
-CELL = re.compile(r"^```\{code-cell\}[^\n]*\n((?::[^\n]*\n)*)(.*?)^```$", re.MULTILINE | re.DOTALL)
+CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(?::[^\n]*\n)*(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def scripts(page: Path) -> list[str]:
@@ -24,17 +26,24 @@ def scripts(page: Path) -> list[str]:
 
 def cells(page: Path) -> list[str]:
     """The code of the cells of a page, in order."""
-    return [code for _, code in CELL.findall(page.read_text("utf-8"))]
+    return CELL.findall(page.read_text("utf-8"))
 
 
 def run_cells(codes: list[str]) -> None:
-    """Run the cells of a page in the current folder as one program; `%%name` calls the magic that a cell defined."""
-    magics: dict[str, Callable[[str, str], None]] = {}
-    module = types.ModuleType("IPython.core.magic")
-    module.register_cell_magic = lambda magic: magics.setdefault(magic.__name__, magic)  # type: ignore[attr-defined]
-    before = sys.modules.get(module.__name__)
-    sys.modules[module.__name__] = module
+    """Run the cells of a page in the current folder as one program, without IPython.
+
+    `%%name` calls the magic that a cell defined; `%%bash` by itself runs a shell script, which must succeed.
+    """
+    magics: dict[str, Callable[[str, str], object]] = {
+        "bash": lambda _, script: subprocess.run(["bash", "-c", script], check=True)
+    }
+    instead: dict[str, Any] = {
+        "IPython.core.magic": SimpleNamespace(register_cell_magic=lambda f: magics.update({f.__name__: f})),
+        "IPython.display": SimpleNamespace(Markdown=str),
+    }
     names: dict[str, object] = {"__name__": "__main__"}
+    before = {name: sys.modules.get(name) for name in instead}
+    sys.modules.update(instead)
     try:
         for number, code in enumerate(codes, 1):
             first, _, rest = code.partition("\n")
@@ -46,6 +55,5 @@ def run_cells(codes: list[str]) -> None:
                 linecache.cache[file] = (len(code), None, code.splitlines(True), file)
                 exec(compile(code, file, "exec"), names)
     finally:
-        del sys.modules[module.__name__]
-        if before is not None:
-            sys.modules[module.__name__] = before
+        for name, module in before.items():
+            sys.modules.pop(name) if module is None else sys.modules.update({name: module})

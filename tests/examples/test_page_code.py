@@ -68,8 +68,8 @@ def test_first_page(as_docs, capfd):
 def test_readme_prints_its_result(as_docs, capsys):
     """5 µs, steps and drift of README are those of its script up to the choice of the processor's last digits.
 
-    Grains that meet differently change both as another seed does.  Steps of 30 seeds have a standard deviation of 4 %
-    of their mean; two runs differ by at most 30 %, five standard deviations of the difference.  The drift is stated
+    Grains that meet differently change both as another seed does.  Steps of twelve seeds have a standard deviation of
+    5 % of their mean; two runs differ by at most 30 %, four standard deviations of the difference.  The drift is stated
     with one digit and stays below 1e-3, a tenth of a percent.
     """
     (code,) = page_code.scripts(quoted.TOP / "README.md")

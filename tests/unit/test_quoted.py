@@ -106,6 +106,14 @@ def test_copies_are_those_of_the_file(path):
     )
 
 
+@pytest.mark.parametrize("path", quoted.COPIES, ids=lambda path: path.name)
+def test_links_lead_to_files(path):
+    """Relative links and pictures of the pages at the top."""
+    links = re.findall(r"\]\((?!\w+:|#)([^)#\s]+)", path.read_text("utf-8"))
+    assert not [link for link in links if not (TOP / link).is_file()]
+    assert path.name != "README.md" or quick_figures.PICTURE.relative_to(TOP).as_posix() in links
+
+
 def test_a_changed_figure_is_noticed():
     """Checks the helper of the test before: another number, and another line of a block."""
     time = quoted.quotable()["main_job"]["time"]
