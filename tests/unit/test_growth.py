@@ -116,7 +116,7 @@ def test_exponents_of_synthetic_boxes():
 
     A straight line misses z, because S begins at 1. Boxes differ in τ by a tenth, which changes λ by its square.
     """
-    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed) for seed in range(8)], (2.0, 100.0))
+    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed, 10**6) for seed in range(8)], (2.0, 100.0))
     assert growth.z.low < 2.0 < growth.z.high
     assert len(growth.local_degrees) == 5
     assert [one.degree for one in growth.local_degrees] == pytest.approx([0.5] * 5, abs=0.01)

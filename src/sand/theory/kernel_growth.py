@@ -1,7 +1,7 @@
 """Growth S(t) by kernels of any degree λ: how far the degree alone determines it.
 
 S of single grains obeys dS/dt = R(S)/τ, R(1) = 1, and the local degree d ln R/d ln S tends to λ. Before that it depends
-on how the kernel varies with the ratio of the masses: for λ = ½ it is 0.36 … 0.53 at S = 1.5, 0.45 … 0.54 at S = 5. The
+on how the kernel varies with the ratio of the masses: for λ = ½ it is 0.36 … 0.53 at S = 1.5, 0.44 … 0.54 at S = 5. The
 kernels of `EXPONENTS` cover this range: K = [½(N1^(η/2) + N2^(η/2))]² [2N1N2/(N1 + N2)]^ν with η + ν = λ.
 """
 
