@@ -146,14 +146,7 @@ def local_degrees(time: np.ndarray, sizes: np.ndarray, grains: float = np.inf) -
     have a ratio of 4, and the windows start about a factor of two apart; S that grows by less than 5.7 has one window.
     No kernel is assumed. For a homogeneous kernel λ(S) tends to its degree.
 
-    Parameters
-    ----------
-    time : ndarray
-        (K,) [s] > 0.
-    sizes : ndarray
-        Mean cluster size S (boxes, K) ≥ 1.
-    grains : float, optional
-        Number of grains N of a box, above every S; infinite for solutions of the coagulation equation.
+    Parameters as for `rate_law`.
 
     Returns
     -------
