@@ -110,12 +110,16 @@ def synthetic_box(z, gamma, dimension, seed, grains=1000):
     )
 
 
+@pytest.mark.slow
 def test_exponents_of_synthetic_boxes():
-    """z, γ and D_f within four standard errors; a straight line misses z, because S begins at 1."""
-    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed) for seed in range(8)], (2.0, 100.0))
-    assert growth.z.exponent == pytest.approx(
-        2.0, rel=0.01, abs=0.0
-    )  # boxes differ in τ by a tenth, and z by its square
+    """γ and D_f within four standard errors; the local degree is that of S = (1 + t/zτ)^z, 1 − 1/z, z in its interval.
+
+    A straight line misses z, because S begins at 1. Boxes differ in τ by a tenth, which changes λ by its square.
+    """
+    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed, 10**6) for seed in range(8)], (2.0, 100.0))
+    assert growth.z.low < 2.0 < growth.z.high
+    assert len(growth.local_degrees) == 5
+    assert [one.degree for one in growth.local_degrees] == pytest.approx([0.5] * 5, abs=0.01)
     assert growth.slope.exponent < 1.8
     for law, exact in ((growth.moment, 0.63), (growth.moment_without_rings, 0.63)):
         assert abs(law.exponent - exact) < 4 * law.error < 0.04
@@ -130,6 +134,7 @@ def test_missing_results_give_a_reason(ensembles):
     growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
     assert growth.moment is None and growth.missing["moment"] == "the grains have no moments"
     assert growth.z is None and "fewer than three times have S between 2" in growth.missing["z"]
+    assert growth.local_degrees is None and "fewer than three times" in growth.missing["local_degrees"]
     with pytest.raises(sand.BadInput, match=r"different \[grains\]"):
         growth_of([synthetic_box(2, 0.6, 1.4, 1), synthetic_box(2, 0.6, 1.4, 2, grains=10)])
 
@@ -149,6 +154,9 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     assert [one["boxes"] for one in message["ensembles"]] == [3, 3]
     assert message["ensembles"][0]["mean_size"] > 1.5 * message["ensembles"][1]["mean_size"]
     assert (tmp_path / "told" / "growth.png").stat().st_size > 10_000
+    degrees = (tmp_path / "told" / "degrees.csv").read_text().splitlines()
+    found = message["ensembles"][0]["local_degrees"] or []
+    assert len(degrees) == 1 + len(found)
     assert len((tmp_path / "told" / "growth.csv").read_text().splitlines()) == 1 + 2 * 31
     assert main(["analyse", *words, "--out", "told"]) == 2
     assert "--overwrite" in capsys.readouterr().err

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.fits import PowerLawFit, RateLaw, mean_interval, power_law, rate_law
+from ..analysis.fits import PowerLawFit, mean_interval, power_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
+from ..analysis.growth_law import LocalDegree, RateLaw, local_degrees, rate_law
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..results import Run
@@ -23,11 +24,7 @@ LOOKS = 10
 FIRST_SIZE = 2.0
 """Smallest S of the fit; below it most grains have not collided."""
 LARGEST_PART = 0.1
-"""Largest S of the fit as a fraction of all grains; beyond it collision partners are depleted.
-
-With 0.15 the 95 % interval of z contained z = 1 of a constant kernel in only 87 % of ensembles of eight boxes of 125
-grains, with 0.1 in 91 % (tests/reference/fit_coverage.py).
-"""
+"""Largest S of the fit as a fraction of all grains; beyond it few clusters are left in a box."""
 LEAST = 3
 """Smallest number of grains of an aggregate in the fit of moments."""
 
@@ -110,7 +107,8 @@ class GrowthResult(NamedTuple):
     time: np.ndarray  # (K,) [s], common to all boxes
     sizes: np.ndarray  # S(t), (boxes, K)
     window: tuple[float, float]  # range of S of the fit of z
-    z: RateLaw | None  # dS/dt ∝ S^λ, S = (1 + t/zτ)^z
+    z: RateLaw | None  # degree λ of the kernel, z = 1/(1 − λ)
+    local_degrees: list[LocalDegree] | None  # λ(S) = d ln(dS/dt)/d ln S
     slope: PowerLawFit | None  # fit S ∝ t^slope
     moment: PowerLawFit | None  # μ/μ1 = N^γ
     moment_without_rings: PowerLawFit | None  # fit of μ for aggregates without rings
@@ -130,21 +128,26 @@ class GrowthResult(NamedTuple):
         return self.sizes.std(axis=0, ddof=1) / np.sqrt(len(self.sizes))
 
     @property
+    def fitted(self) -> np.ndarray:
+        """Whether a time belongs to the fits of z and λ(S), (K,)."""
+        return _in_window(self.time, self.sizes, self.window)
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the mean of S at the last time (`analysis.fits.mean_interval`)."""
         return mean_interval(self.sizes[:, -1])
 
 
 def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = None) -> GrowthResult:
-    """Fit growth exponent, moment exponent and fractal dimension of an ensemble.
+    """Fit growth exponent, local degree, moment exponent and fractal dimension of an ensemble.
 
     Parameters
     ----------
     boxes : sequence of BoxResult
         Boxes with equal settings except for the seed.
     window : tuple of float or None, optional
-        Range of S for the fit of z: from the time when the mean over boxes reaches the first value until any box
-        exceeds the second. By default 2 and 0.1 N, beyond which depletion affects growth.
+        Range of S, mean over boxes, for the fits of z and of the local degree. By default 2 and 0.1 N, beyond which
+        few clusters are left in a box of N grains.
 
     Returns
     -------
@@ -189,7 +192,8 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
         time,
         sizes,
         chosen,
-        law("z", lambda: rate_law(*_within(time, sizes, chosen))),
+        law("z", lambda: rate_law(*_within(time, sizes, chosen), boxes[0].grains)),
+        law("local_degrees", lambda: local_degrees(*_within(time, sizes, chosen), boxes[0].grains)),
         law("slope", lambda: _slope(*_within(time, sizes, chosen))),
         law("moment", lambda: moment_law(heavy)),
         law("moment_without_rings", lambda: moment_law(heavy & (rows["rings"] == 0))),
@@ -199,14 +203,20 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
 
 
 def _within(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Times from which the mean over boxes is in the window until any box leaves it, and S (boxes, K) at these."""
-    used = (sizes.mean(axis=0) >= window[0]) & (sizes.max(axis=0) <= window[1]) & (time > 0.0)
+    """Times at which the mean over boxes is in the window, and S (boxes, K) at these."""
+    used = _in_window(time, sizes, window)
     if used.sum() < 3:
         raise BadInput(
             f"fewer than three times have S between {window[0]:g} and {window[1]:g}; "
             f"the mean of S goes from {sizes.mean(axis=0)[0]:.3g} to {sizes.mean(axis=0)[-1]:.3g}"
         )
     return time[used], sizes[:, used]
+
+
+def _in_window(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> np.ndarray:
+    """Whether the mean of S over boxes is in the window, until it first leaves it."""
+    mean = sizes.mean(axis=0)
+    return (mean >= window[0]) & (np.maximum.accumulate(mean) <= window[1]) & (time > 0.0)
 
 
 def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLawFit:
