@@ -56,8 +56,8 @@ def command(
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
     a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with the
-    moment of their cluster), field_alignment, material, at_rest (with rigid clusters). As a colour of grains, size is
-    the number of grains in their cluster.
+    moment of their cluster), field_alignment, material, at_rest (with rigid clusters), or an own quantity of the run,
+    such as temperature. As a colour of grains, size is the number of grains in their cluster.
     """
     from ..io.run_folder import make_folder, replace_file
 
@@ -76,7 +76,7 @@ def _check_options(
     source: Path, selection: str | None, out: str | None, form: str, overwrite: bool, how: dict[str, Any]
 ) -> tuple[Path, list[str]]:
     """Folder to write to and names of what to draw; converts `how` for the picture.  Raises BadInput, all errors."""
-    from ..analysis.quantities import GRAIN_NAMES
+    from ..analysis.quantities import names_of
     from ..plotting.plots import HISTORY
     from ..plotting.render.still import check_picture_options
 
@@ -84,7 +84,8 @@ def _check_options(
     is_trajectory = source.is_file()
     default = (STILL,) if is_trajectory else (*HISTORY, STILL)
     names = list(default if selection is None else dict.fromkeys(part.strip() for part in selection.split(",")))
-    allowed = (*HISTORY, STILL, *GRAIN_NAMES)
+    one = _first_frame(source)
+    allowed = (*HISTORY, STILL, *names_of(one))
     problems += [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
     if is_trajectory:
         missing = [name for name in names if name in HISTORY]
@@ -101,7 +102,7 @@ def _check_options(
     how["size"], how["whole"] = (width, height), not how.pop("cut")
     how["bonds"] = None if how["bonds"] == "none" else how["bonds"]
     try:
-        check_picture_options(how["colour"], how["bonds"], how["view"], how["size"])
+        check_picture_options(how["colour"], how["bonds"], how["view"], how["size"], one)
     except BadInput as error:
         problems += error.problems
     beside = source.with_name(f"{source.stem}-{FOLDER}") if is_trajectory else source / FOLDER
@@ -128,6 +129,15 @@ def _open_source(path: Path) -> Source:
     if not frames.written_by_sand:
         raise BadInput(f"{path} is not a trajectory of SAND, or has no frame")
     return Source(path, frames, None)
+
+
+def _first_frame(path: Path) -> Any:
+    """The first frame, for the names of own quantities; None if it cannot be read, which is reported later."""
+    try:
+        frames = _open_source(path).frames
+        return frames[0] if len(frames) else None
+    except BadInput:
+        return None
 
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:

@@ -10,7 +10,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | lost | energy lost per channel [J] |
 | cutoff | the cut-off of dipoles that follows the largest clusters, and the choice; meta.json names all entries |
 | ledger | all rows so far, (K, columns of ledger.csv) |
-| grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
+| grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials; `own`: own quantities (K, N) |
 | contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
 | pair_list/… | the list of candidate pairs, and the positions at its last rebuild |
 | order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
@@ -42,7 +42,7 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 10
+VERSION = 11
 """Version of the file format; other versions are refused. Versions before 9 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""

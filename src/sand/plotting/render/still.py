@@ -89,7 +89,7 @@ def still_picture(
     frame : Frame
         Frame of a trajectory, or any object with its attributes.
     colour : str, optional
-        Quantity shown as the colour of grains: a name in `analysis.quantities.GRAINS`.
+        Quantity shown as the colour of grains: a name in `analysis.quantities.GRAINS`, or of an own quantity.
     bonds : str, optional
         Mark contacts with colours by "load" or "mode" (`analysis.quantities.CONTACTS`); None: do not mark them.
     arrows : bool, optional
@@ -122,7 +122,7 @@ def still_picture(
         With one line for each error.
     """
     refuse_other(frame, "radius", "pair", "box")
-    towards_eye = check_picture_options(colour, bonds, view, size)
+    towards_eye = check_picture_options(colour, bonds, view, size, frame)
     flux_density = None if field is None else np.asarray(field, dtype=np.float64)
     scene = make_scene(frame, frame.pair, frame.box, whole)
     scene, key = _coloured_scene(scene, frame, colour, flux_density, arrows)
@@ -145,9 +145,9 @@ def still_picture(
 
 
 def check_picture_options(
-    colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]
+    colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int], frame: Any = None
 ) -> np.ndarray | None:
-    """Check the options of `still_picture`.
+    """Check the options of `still_picture`; `frame` has the names of own quantities.
 
     Returns
     -------
@@ -160,10 +160,10 @@ def check_picture_options(
         With one line for each error.
     """
     problems: list[str] = []
-    for name, allowed in ((colour, GRAIN_NAMES), (bonds, CONTACT_NAMES)):
+    for name, allowed, of in ((colour, GRAIN_NAMES, frame), (bonds, CONTACT_NAMES, None)):
         if name is not None:
             try:
-                quantity(name, allowed)
+                quantity(name, allowed, of)
             except BadInput as error:
                 problems += error.problems
     if not all(MIN_SIZE <= length <= MAX_SIZE for length in size):
@@ -190,7 +190,7 @@ def _coloured_scene(
 ) -> tuple[Scene, ColourKey | None]:
     """Scene with grains coloured by a quantity, and the colour key."""
     values = measured(frame, name, field)[scene.number]
-    colours, key = coloured(values, quantity(name), frame, scene.label)
+    colours, key = coloured(values, quantity(name, frame=frame), frame, scene.label)
     shown = scene.arrow if arrows else np.zeros_like(scene.arrow)
     return dataclasses.replace(scene, colour=colours, arrow=shown), key
 
