@@ -23,7 +23,7 @@ RESERVED = frozenset(
         *("arrays", "material", "materials", "id", "own", "overlaps", "touching", "own_units", "copy", "grains", "forces", "box"),
         *("remove", "add", "scale_box", "replace", "regroups", "is_of_own", "checked_forces", "checked_grains", "refuse_overlaps"),
         *("step", "time", "pair", "overlap", "formed", "slide", "roll", "twist", "share", "drawn", "at_rest"),
-        *("path", "close", "frames", "at", "count", "index", "stored", "pairs", "identities", "written_by_sand", "head"),
+        *("path", "close", "frames", "at", "count", "index", "stored", "pairs", "identities", "written_by_sand", "head", "has_array"),
         # quantities and figures of `sand plot`, and other variables of `Run.to_xarray`
         *("cluster", "size", "coordination", "speed", "kinetic_energy", "alignment", "field_alignment"),
         *("load", "mode", "energies", "losses", "contacts", "balance", "still", "frame", "grain", "axis"),
@@ -145,8 +145,6 @@ def read_own(own: Any, count: int) -> OwnQuantities:
     values: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     problems: list[str] = []
-    if not isinstance(own, Mapping | None):
-        raise BadInput(f"own = {shown(own)} must be a dict of values by name, such as {{'temperature': '300 K'}}")
     for given_name, given in (own or {}).items():
         try:
             name = own_name(given_name)

@@ -42,7 +42,7 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 11
+VERSION = 10
 """Version of the file format; other versions are refused. Versions before 9 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
@@ -127,11 +127,20 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         raise OtherFormat(f"{path} has format {meta['version']}, and this SAND reads format {VERSION}; {advice}")
     if _checksum(arrays) != meta.get("sha256"):
         raise BadInput(f"{path} is damaged: its checksum is wrong")
+    _name_own(arrays, meta)
     try:
         check_state(arrays, meta)
     except BadInput as error:
         raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
+
+
+def _name_own(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    """Own quantities of a checkpoint that was written when the only one was the temperature of the grain."""
+    only = arrays.pop("grains/internal_temperature", None)
+    if only is not None and "grains/own" not in arrays:
+        meta["own"] = {"internal_temperature": "K"} if only.any() else {}
+        arrays["grains/own"] = only[None][: len(meta["own"])]
 
 
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

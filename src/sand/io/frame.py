@@ -51,8 +51,8 @@ OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
 IDENTITY, LATE = "id", "late/"
 """Name of the identities of grains, and beginning of the names of chunks that the first frame lacks."""
-OWN, NO_OWN = "own", np.frombuffer(b"{}", np.uint8)
-"""Name of the array with names and units of own quantities, and its content without them."""
+OWN = "own"
+"""Name of the array with names and units of own quantities."""
 REST = "at_rest"
 """Name of the array that says which grains belong to clusters at rest."""
 MODES = ("stretch", "slide", "roll", "twist")
@@ -200,7 +200,9 @@ class Frame:
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
         self.id = np.asarray(stored.log.get(f"particles/{IDENTITY}", np.arange(p.N)), np.uint32)
-        units = json.loads(np.asarray(stored.log.get(OWN, NO_OWN)).tobytes())
+        # before own quantities had names, the only one was this temperature
+        before = {"internal_temperature": "K"} if "particles/internal_temperature" in stored.log else {}
+        units = json.loads(stored.log[OWN].tobytes()) if OWN in stored.log else before
         self.own = OwnQuantities({name: stored.log[f"particles/{name}"] for name in units}, units)
         rest = stored.log.get(f"particles/{REST}")
         self.at_rest = None if rest is None else np.asarray(rest) == 1
@@ -267,7 +269,8 @@ class FrameArrays(Sequence[np.ndarray]):
     """
 
     def __init__(self, frames: FrameSequence, name: str, chosen: range | None = None):
-        if name not in (known := (*OF_GRAINS, *OF_CONTACTS, *frames.own_units)):
+        if not frames.has_array(name):
+            known = (*OF_GRAINS, *OF_CONTACTS, *frames.own_units)
             raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(str(name), known)}")
         self.frames, self.name = frames, name
         self.chosen = range(len(frames)) if chosen is None else chosen
@@ -345,12 +348,16 @@ class FrameSequence(Sequence[Frame]):
         """Units of the own quantities by name, those of the first frame."""
         return self[0].own.units if len(self) else {}
 
+    def has_array(self, name: Any) -> bool:
+        """Whether the frames have an array of this name; reads the first frame if it may be an own quantity."""
+        return name in (*OF_GRAINS, *OF_CONTACTS) or name in self.own_units
+
     def arrays(self, name: str) -> FrameArrays:
         """One array of each frame, such as "position", read on access; also as `frames.position`.  Raises BadInput."""
         return FrameArrays(self, name)
 
     def __getattr__(self, name: str) -> FrameArrays:
-        if name[0] == "_" or name not in (*OF_GRAINS, *OF_CONTACTS, *self.own_units):
+        if name[0] == "_" or not self.has_array(name):
             known = [*OF_GRAINS, *OF_CONTACTS, *self.own_units, *(known for known in dir(self) if known[0] != "_")]
             raise NoSuchAttribute(f"frames have no '{name}'; {did_you_mean(name, known)}")
         return FrameArrays(self, name)
