@@ -220,12 +220,26 @@ def _contact_rods(scene: Scene, frame: Any, name: str | None) -> tuple[Rods, Col
     distance = np.linalg.norm(offset, axis=1, keepdims=True)
     radius = CONTACT_RADIUS * np.minimum(scene.radius[i], scene.radius[j])
     half = 0.4 * radius[:, None] * offset / np.maximum(distance, 1e-300)
-    share = (scene.radius[i] / (scene.radius[i] + scene.radius[j]))[:, None]
+    share = contact_share(distance[:, 0], scene.radius[i], scene.radius[j])[:, None]
     first, second = scene.position[i] + share * offset, scene.position[j] - (1.0 - share) * offset
     separated = np.linalg.norm(first - second, axis=1) > 1e-6 * distance[:, 0]
     centre = np.concatenate([first, second[separated]])
     half, radius, colours = (np.concatenate([each, each[separated]]) for each in (half, radius, colours))
     return _cylinders(centre - half, centre + half, radius, colours), key
+
+
+def contact_share(distance: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Share of the way between two centres at which their spheres intersect, (d² + r² − s²) / (2 d²), from 0 to 1.
+
+    Parameters
+    ----------
+    distance : ndarray
+        Distances d (C,) [m].
+    first, second : ndarray
+        Radii r and s (C,) [m]; the share is measured from the centre of the first grain.
+    """
+    squared = np.maximum(distance, 1e-300) ** 2
+    return np.clip(0.5 + 0.5 * (first**2 - second**2) / np.maximum(squared, 1e-300), 0.0, 1.0)
 
 
 def _cylinders(
