@@ -191,6 +191,21 @@ class Grains:
         """Own quantities by name, read-only (N,), and their `units`."""
         return OwnQuantities(dict(zip(self.own_units, self.arrays.own, strict=True)), self.own_units)
 
+    def with_own(self, own: Mapping[str, Any]) -> Grains:
+        """A copy with these own quantities, as in the argument `own`, beside or in place of those that it has.
+
+        Raises
+        ------
+        BadInput
+            If a name or a value cannot be used; one line for each.
+        """
+        more, other = read_own(own, len(self)), self.copy()
+        units = self.own_units | more.units
+        rows = [more[name] if name in more else self.own[name] for name in units]
+        other.__dict__["own_units"] = units
+        other.arrays = other.arrays._replace(own=np.array(rows).reshape(len(units), len(self)))
+        return other
+
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse assignments, which would leave the arrays and derived quantities unchanged."""
         if name == "arrays" or (name in ("materials", "own_units") and name not in self.__dict__):

@@ -20,10 +20,47 @@ RESERVED = frozenset(
     {
         *BY_NAME,
         # attributes of grains, frames, sequences of frames and changes
-        *("arrays", "material", "materials", "id", "own", "overlaps", "touching", "own_units", "copy", "grains", "forces", "box"),
-        *("remove", "add", "scale_box", "replace", "regroups", "is_of_own", "checked_forces", "checked_grains", "refuse_overlaps"),
+        *(
+            "arrays",
+            "material",
+            "materials",
+            "id",
+            "own",
+            "overlaps",
+            "touching",
+            "own_units",
+            "with_own",
+            "copy",
+            "grains",
+            "forces",
+            "box",
+        ),
+        *(
+            "remove",
+            "add",
+            "scale_box",
+            "replace",
+            "regroups",
+            "is_of_own",
+            "checked_forces",
+            "checked_grains",
+            "refuse_overlaps",
+        ),
         *("step", "time", "pair", "overlap", "formed", "slide", "roll", "twist", "share", "drawn", "at_rest"),
-        *("path", "close", "frames", "at", "count", "index", "stored", "pairs", "identities", "written_by_sand", "head", "has_array"),
+        *(
+            "path",
+            "close",
+            "frames",
+            "at",
+            "count",
+            "index",
+            "stored",
+            "pairs",
+            "identities",
+            "written_by_sand",
+            "head",
+            "has_array",
+        ),
         # quantities and figures of `sand plot`, and other variables of `Run.to_xarray`
         *("cluster", "size", "coordination", "speed", "kinetic_energy", "alignment", "field_alignment"),
         *("load", "mode", "energies", "losses", "contacts", "balance", "still", "frame", "grain", "axis"),
@@ -117,8 +154,8 @@ def own_name(name: Any) -> str:
         words = re.sub(r"\W+", "_", found).strip("_")
         other = words if words[:1].isalpha() and not keyword.iskeyword(words) else f"own_{words}" if words else "heat"
         raise BadInput(
-            f"own: {shown(name)} is no name of a quantity; it must be made of letters, digits and _, begin with a letter "
-            f"and be no word of Python, such as {other!r}"
+            f"own: {shown(name)} is no name of a quantity; it must be made of letters, digits and _, begin with a "
+            f"letter and be no word of Python, such as {other!r}"
         )
     if len(found) > LONGEST_NAME:
         raise BadInput(f"own: the name {found[:20]!r}… has {len(found)} characters; at most {LONGEST_NAME}")

@@ -213,7 +213,7 @@ class Run:
             "material": ("grain", np.array(whole[0].materials)[whole[0].material]),
             "axis": ("axis", list("xyz")),
         }
-        columns = {name: (("frame", "grain"), values, {}) for name, values in of_grains.items()}
+        columns: dict[str, Any] = {name: (("frame", "grain"), values) for name, values in of_grains.items()}
         columns |= {
             name: (("frame", "grain"), np.array([one.own[name] for one in whole]), {"units": unit})
             for name, unit in whole[0].own.units.items()

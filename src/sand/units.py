@@ -160,7 +160,28 @@ def in_unit(value: Any, unit: str) -> Any:
     return float(array) if array.ndim == 0 else array
 
 
-_SI_UNITS = ("m", "kg", "s", "A", "K", "mol", "cd", "rad", "N", "J", "W", "Pa", "C", "V", "ohm", "T", "Wb", "F", "H", "Hz")
+_SI_UNITS = (
+    "m",
+    "kg",
+    "s",
+    "A",
+    "K",
+    "mol",
+    "cd",
+    "rad",
+    "N",
+    "J",
+    "W",
+    "Pa",
+    "C",
+    "V",
+    "ohm",
+    "T",
+    "Wb",
+    "F",
+    "H",
+    "Hz",
+)
 """Units of SI without a prefix that replace others of the same dimension."""
 
 
@@ -212,7 +233,9 @@ def si_unit(text: str) -> str | None:
 
 def _as_factors(text: str) -> str:
     """A unit that begins with a name and has no brackets: "s^-1" for "1/s", "J/kg/K" for "J/(kg K)"."""
-    flat = re.sub(r"/\s*\(([^()]*)\)", lambda found: "/" + "/".join(re.split(r"[\s*·]+", found[1].strip())), text.strip())
+    flat = re.sub(
+        r"/\s*\(([^()]*)\)", lambda found: "/" + "/".join(re.split(r"[\s*·]+", found[1].strip())), text.strip()
+    )
     inverse = re.fullmatch(r"1\s*/\s*([^\W\d²³]+)(?:(?:\^|\*\*)?(\d)|([²³]))?", flat)
     return f"{inverse[1]}^-{inverse[2] or {'²': 2, '³': 3}.get(inverse[3], 1)}" if inverse else flat
 
@@ -238,7 +261,8 @@ def with_own_unit(value: Any) -> tuple[Any, str] | None:
     Parameters
     ----------
     value : float, array_like, str, tuple or quantity
-        Numbers without a unit; text with a unit; numbers and a unit, `(values, "W/m^2")`; or a quantity of pint or astropy.
+        Numbers without a unit; text with a unit; numbers and a unit, `(values, "W/m^2")`; or a quantity of pint or
+        astropy.
 
     Returns
     -------

@@ -18,8 +18,8 @@ import sand
 from sand.box import Box
 from sand.io import run_folder as files
 from sand.io.ledger_table import LedgerFile
-from sand.own_quantities import OwnQuantities
 from sand.io.trajectory import TrajectoryWriter
+from sand.own_quantities import OwnQuantities
 
 RADIUS = 10e-9
 SUNK = 0.997
@@ -43,7 +43,7 @@ class Body:
         count, rng = len(self.radius), np.random.default_rng(self.seed)
         self.id = np.arange(count)
         self.material = (np.arange(count) % 4 == 3).astype(np.uint32)
-        # a name that objects of JavaScript have already, and letters beyond ASCII; changed from frame to frame by `write`
+        # a name that objects of JavaScript have already, and letters beyond ASCII; `write` changes them in each frame
         own = {"constructor": 100.0 + np.arange(count, dtype=float), "Wärmestrom": np.linspace(-2.0, 3.0, count)}
         self.own = OwnQuantities(own, {"constructor": "K", "Wärmestrom": "W/m^2"})
         density = np.array([one.density for one in self.materials])[self.material]
@@ -252,4 +252,12 @@ def many(folder: Path, bodies: int = 5, each: int = 2000, frames: int = 3) -> Pa
     return write(folder, moments, Box.open())
 
 
-KINDS = {"two": two, "hundred": hundred, "resting": resting, "ten-thousand": many}
+def unequal(folder: Path) -> Path:
+    """A row of grains of 10 and 25 nm in contact, in open space, most of them large; one frame."""
+    radius = np.array([1.0, 2.5, 1.0, 2.5, 2.5]) * RADIUS
+    along = np.concatenate([[0.0], np.cumsum(SUNK * (radius[1:] + radius[:-1]))])
+    place = np.stack([along - along.mean(), 0.0 * along, 0.0 * along], axis=1)
+    return write(folder, [Body(place, radius)], Box.open())
+
+
+KINDS = {"two": two, "unequal": unequal, "hundred": hundred, "resting": resting, "ten-thousand": many}

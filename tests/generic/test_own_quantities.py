@@ -1,4 +1,4 @@
-"""Own quantities of any name and unit: read, carried, changed, stored, exported and shown; with a wrong one, refused."""
+"""Own quantities of any name and unit: read, carried, changed, stored, exported and shown; wrong ones are refused."""
 
 import re
 import warnings
@@ -50,7 +50,7 @@ EXPECTED = {
 def five(own=None):
     """A chain of five grains with own quantities."""
     body = sand.setup.chain(5, radius="0.1 um", material="silica")
-    return sand.Grains(body.position, body.radius, "silica", own=OWN if own is None else own)
+    return body.with_own(OWN if own is None else own)
 
 
 def assert_same(own, index=slice(None)):
@@ -107,10 +107,14 @@ def test_quantities_of_pint_have_their_unit():
     assert found["heating"] == pytest.approx([10, 20, 30, 40, 50], rel=4.5e-16, abs=0.0)
 
 
-@pytest.mark.parametrize("given", ["25 degC", (25.0, "degC"), "3 dB", "5 parrots", (["a"], "K"), "warm", None, ("3", "K")])
+@pytest.mark.parametrize(
+    "given", ["25 degC", (25.0, "degC"), "3 dB", "5 parrots", (["a"], "K"), "warm", None, ("3", "K")]
+)
 def test_what_is_no_quantity_is_refused(given):
     """Unknown units, and those with an offset or a logarithm: one line, with what to write."""
-    with pytest.raises(sand.BadInput, match=r"own: warmth = .* no quantity; .* text with a unit such as '300 K'") as caught:
+    with pytest.raises(
+        sand.BadInput, match=r"own: warmth = .* no quantity; .* text with a unit such as '300 K'"
+    ) as caught:
         five({"warmth": given})
     assert len(caught.value.problems) == 1 and "degC" in str(caught.value)
 
@@ -171,6 +175,8 @@ def test_grains_carry_own_quantities():
     assert_same(grains.own)
     assert_same(grains[1:3].own, slice(1, 3))
     assert_same(grains.copy().own)
+    assert_same(five({"heating": "3 K", **{name: 0 for name in OWN if name != "heating"}}).with_own(OWN).own)
+    assert five({"a": "1 m"}).with_own({"b": "2 s"}).own.units == {"a": "m", "b": "s"}
     assert_same(sand.Grains(grains.position, grains.radius, "silica", own=grains.own).own)
     assert_same(grains.own.taken([4, 0]), [4, 0])
     assert_same(encounter(grains, grains[[4, 0]], speed=1.0).grains.own, [0, 1, 2, 3, 4, 4, 0])
@@ -276,7 +282,7 @@ def test_own_quantities_do_not_change_the_motion():
 
 @pytest.mark.compiled("contacts")
 def test_wrong_changes_are_refused():
-    """A quantity that the simulation lacks, one left out, a wrong unit: one line each; the simulation stays as it was."""
+    """A quantity that the simulation lacks, one left out, a wrong unit: one line each; nothing is changed."""
     sim = sand.Simulation(five(), [sand.Contact()])
     with pytest.raises(sand.BadInput) as caught, sim.change() as state:
         state.own["charm"] = 1.0
@@ -431,7 +437,7 @@ def test_prefixes_are_written_where_they_mean_it():
 @pytest.mark.slow
 @pytest.mark.draws
 def test_pictures_show_own_quantities():
-    """Colours of grains follow the values, and the legend has name and unit; a wrong name is refused with a proposal."""
+    """Colours of grains follow the values, the legend has name and unit; a wrong name is refused with a proposal."""
     still = still_picture(five_frame(), colour="Oberfläche", size=(300, 200))
     assert any("Oberfläche" in text.get_text() for text in still.texts)
     still = still_picture(five_frame(), colour="heating", size=(300, 200))

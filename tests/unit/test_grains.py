@@ -104,7 +104,9 @@ def test_parts_of_grains():
     rng = np.random.default_rng(3)
     kinds = [sand.IRON, sand.SILICA, sand.SILICA, sand.IRON]
     vectors = {name: rng.normal(size=(4, 3)) for name in ("position", "velocity", "spin", "moment")}
-    grains = sand.Grains(**vectors, radius=[1e-8, 2e-8, 3e-8, 4e-8], material=kinds, charge=[1, 2, 3, 4], own={"age": [4, 3, 2, 1]})
+    grains = sand.Grains(
+        **vectors, radius=[1e-8, 2e-8, 3e-8, 4e-8], material=kinds, charge=[1, 2, 3, 4], own={"age": [4, 3, 2, 1]}
+    )
     grains.arrays.orientation[:] = rng.normal(size=(4, 4))
     for index in (2, -1, slice(1, 3), [3, 0], np.array([False, True, True, False]), slice(None, None, -1)):
         part, numbers = grains[index], np.atleast_1d(np.arange(4)[index])

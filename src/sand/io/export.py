@@ -22,8 +22,9 @@ from .trajectory import Frame
 
 
 def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as extended XYZ: species, position [Å], radius [Å]; in SI velocity, moment, spin, mass, charge, own
-    quantities; cluster.
+    """Format a frame as extended XYZ: species, position [Å], radius [Å], and in SI velocity, moment, spin, mass, charge.
+
+    Then own quantities in SI, whose units are in the second line, and the cluster.
     """
     periodic = " ".join("T" if v is not None else "F" for v in frame.box.lengths)
     own, units = own_columns(frame.own)
@@ -58,10 +59,9 @@ def _file_names(stem: str, ending: str, steps: Sequence[int]) -> list[str]:
 
 
 def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as a snapshot of a custom dump: id, type, position, radius, velocity, spin, moment, cluster, mass,
-    charge, and own quantities in SI, with the prefix d_ that LAMMPS gives such numbers.
+    """Format a frame as a snapshot of a custom dump: id, type, position, radius, velocity, spin, moment, cluster, mass, q.
 
-    It has step numbers but no times, because some readers do not accept `ITEM: TIME`.
+    Own quantities follow, in SI, with the prefix d_ that LAMMPS gives such numbers. It has step numbers but no times, because some readers do not accept `ITEM: TIME`.
     """
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
@@ -108,7 +108,8 @@ def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
     """Format a frame as VTK: grains as points, contacts as lines with overlap and force.
 
     Contacts across a periodic face have no line. Point data: radius [m], moment [A m²], velocity, spin, mass, charge,
-    material, cluster, own quantities in SI; cell data (zero for the vertices, which come first): overlap [m], force [N].
+    material, cluster, own quantities in SI. Cell data (zero for the vertices, which come first): overlap [m], force
+    [N].
     """
     n = len(frame)
     offset = np.diff(frame.position[frame.pair], axis=1)[:, 0]

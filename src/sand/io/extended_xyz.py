@@ -51,9 +51,10 @@ def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Se
 
 
 def xyz_text(grains: Grains) -> str:
-    """Format grains as extended XYZ: species, position and radius [Å], moment [A m²], charge [C], own quantities, material.
+    """Format grains as extended XYZ: species, position and radius [Å], moment [A m²], charge [C], own quantities.
 
-    Numbers are in full precision. Materials are indices; their names, and units of own quantities, are in the second line.
+    Numbers are in full precision. The last column, material, is an index; names of materials, and units of own
+    quantities, are in the second line.
     """
     names, (own, units) = [m.name for m in grains.materials], own_columns(grains.own)
     head = (

@@ -107,7 +107,6 @@ def encounter(
 
 def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities: Sequence[np.ndarray]) -> Grains:
     """Combine bodies into one set of grains, each shifted [m] and with a velocity [m/s] added."""
-
     pair = ("target: it has", "projectile: it has")
     called = pair if len(bodies) == 2 else [f"body {k}: it has" for k in range(len(bodies))]
 

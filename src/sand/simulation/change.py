@@ -265,7 +265,8 @@ class Change:
         units = self.grains.own_units
         for name in [name for name in self.own if name not in units]:
             self._errors.problems.append(
-                f"own: the simulation has no '{name}'; a quantity is given at the start: sand.Grains(…, own={{'{name}': …}})"
+                f"own: the simulation has no '{name}'; a quantity is given at the start: "
+                f"sand.Grains(…, own={{'{name}': …}})"
             )
             del self.own[name]
         for name, unit in units.items():

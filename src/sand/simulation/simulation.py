@@ -389,8 +389,8 @@ class Simulation(ReadOnlySettings):
         Yields
         ------
         Change
-            Arrays `velocity`, `spin`, `moment`, `charge` and own quantities (`change.own`), the `box`, and `remove`, `add`,
-            `scale_box`, `replace`. A change of own quantities alone leaves the motion as it is, bit by bit.
+            Arrays `velocity`, `spin`, `moment`, `charge` and own quantities (`change.own`), the `box`, and `remove`,
+            `add`, `scale_box`, `replace`. A change of own quantities alone leaves the motion as it is, bit by bit.
 
         Raises
         ------

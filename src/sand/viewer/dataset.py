@@ -202,7 +202,9 @@ class RunDataset:
         """Approximate size of all selected frames as sent [bytes]."""
         contacts = self.frames.contacts[np.array(self.frame_numbers, dtype=int)]
         per_contact = frame_bytes(0, 1, self.compact) - frame_bytes(0, 0, self.compact)
-        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact, len(self.own)) + int(contacts.sum() * per_contact)
+        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact, len(self.own)) + int(
+            contacts.sum() * per_contact
+        )
 
     def answer(self, kind: str, *numbers: int) -> bytes | dict[str, Any]:
         """Answer a request of the page: a packet, or the content of JSON.
