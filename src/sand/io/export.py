@@ -22,7 +22,7 @@ from .trajectory import Frame
 
 
 def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as extended XYZ: species, position [Å], radius [Å], and in SI velocity, moment, spin, mass, charge.
+    """Format a frame as extended XYZ: species, position [Å], radius [Å], velocity, moment, spin, mass, charge (SI).
 
     Then own quantities in SI, whose units are in the second line, and the cluster.
     """
@@ -59,9 +59,11 @@ def _file_names(stem: str, ending: str, steps: Sequence[int]) -> list[str]:
 
 
 def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as a snapshot of a custom dump: id, type, position, radius, velocity, spin, moment, cluster, mass, q.
+    """Format a frame as a snapshot of a custom dump.
 
-    Own quantities follow, in SI, with the prefix d_ that LAMMPS gives such numbers. It has step numbers but no times, because some readers do not accept `ITEM: TIME`.
+    Columns: id, type, position, radius, velocity, spin, moment, cluster, mass, charge, and own quantities in SI, with
+    the prefix d_ that LAMMPS gives such numbers. The snapshot has a step number but no time, because some readers do
+    not accept `ITEM: TIME`.
     """
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
