@@ -216,6 +216,7 @@ class Heating(sand.Updater):
                 grain = {**dict.fromkeys(("T", "t", "constructor"), 9.0), "T": "9 J/kg/K", "t": "9 s"}
                 grain |= {"temperature": "77 K", "heating": "9 W/m^2", "Oberfläche": "9 m^2"}
                 state.add(sand.Grains([[5e-6, 0, 0]], "0.1 um", "silica", own=grain))
+                assert [values[-1] for values in state.grains.own.values()] == [77.0, 9.0, 9.0, 9.0, 9.0, 9.0]
 
 
 @pytest.fixture(scope="module")
@@ -278,6 +279,20 @@ def test_own_quantities_do_not_change_the_motion():
     arrays = with_clock.state.to_arrays()
     for name, array in without.state.to_arrays().items():
         assert name == "grains/own" or (arrays[name] == array).all(), name
+
+
+@pytest.mark.compiled("contacts")
+def test_a_change_between_two_steps_is_kept():
+    """Where a run ends at a time at which no step ends, a change is in the state shown and in that of the next step."""
+    sim = sand.Simulation(five(), [sand.Contact()])
+    sim.run(steps=3)
+    step = sim.time / 3
+    sim.run(until=sim.time + 2.4 * step)
+    with sim.change() as state:
+        state.temperature = "5 K"
+    assert sim.grains.temperature.tolist() == [5.0] * 5
+    sim.run(steps=4)
+    assert sim.grains.temperature.tolist() == [5.0] * 5
 
 
 @pytest.mark.compiled("contacts")
