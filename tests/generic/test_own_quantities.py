@@ -411,7 +411,7 @@ def columns_of(text, form):
         return dict(zip(names, zip(*(line.split() for line in lines[head + 1 :]), strict=True), strict=True)), None
     arrays = [each for each in ElementTree.fromstring(text).iter("DataArray") if each.get("Name") in EXPECTED]
     keys = {each.get("Name"): each.find("InformationKey") for each in arrays}
-    return {name: key.tail.split() for name, key in keys.items()}, {name: key.text for name, key in keys.items()}
+    return {each.get("Name"): each.text.split() for each in arrays}, {name: key.text for name, key in keys.items()}
 
 
 @pytest.mark.parametrize("form", ["xyz", "vtk", "lammps-dump"])

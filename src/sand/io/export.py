@@ -102,8 +102,9 @@ def _array(name: str, values: np.ndarray, unit: str = "") -> str:
     parts = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
     kind, form = ("Int64", "%d") if np.issubdtype(values.dtype, np.integer) else ("Float64", "%.17g")
     text = " ".join(form % v for v in values.ravel().tolist())
+    # after the numbers: VTK reads these from the beginning of the element
     key = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{escape(unit)}</InformationKey>' if unit else ""
-    return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="ascii">{key}{text}</DataArray>'
+    return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="ascii">{text}{key}</DataArray>'
 
 
 def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
