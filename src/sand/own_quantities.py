@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -164,6 +164,13 @@ def own_name(name: Any) -> str:
     return found
 
 
+def refuse_alike(name: str, others: Iterable[str]) -> None:
+    """Refuse a name that other programs, and some file systems, take for another one.  Raises BadInput."""
+    for other in others:
+        if other.casefold() == name.casefold():
+            raise BadInput(f"own: {name!r} and {other!r} differ by capitals at most; give one of them another name")
+
+
 def read_own(own: Any, count: int) -> OwnQuantities:
     """Read the argument `own` of `Grains`.
 
@@ -185,8 +192,7 @@ def read_own(own: Any, count: int) -> OwnQuantities:
     for given_name, given in (own or {}).items():
         try:
             name = own_name(given_name)
-            if name in units:
-                raise BadInput(f"own: {shown(given_name)} is given twice, in two forms that Python reads alike")
+            refuse_alike(name, units)
             found = (given, own.units[given_name]) if isinstance(own, OwnQuantities) else with_own_unit(given)
             if found is None:
                 raise BadInput(

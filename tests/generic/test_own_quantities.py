@@ -32,8 +32,8 @@ OWN = {
     "heating": ([0.1, -0.2, 0.3, -0.4, 0.5], "mW/cm^2"),
     "constructor": [3.0, 1.0, 4.0, 1.0, 5.0],  # a name that objects of JavaScript have already
     "Oberfläche": "2 cm^2",
-    "T": "1e-30 J/(kg K)",  # differs from "t" by its case alone
-    "t": "0 s",
+    "T": "1e-30 J/(kg K)",
+    "age": "0 s",
 }
 """Own quantities of five grains, with names and units that may cause trouble."""
 EXPECTED = {
@@ -42,7 +42,7 @@ EXPECTED = {
     "constructor": ([3.0, 1.0, 4.0, 1.0, 5.0], "1"),
     "Oberfläche": ([2e-4] * 5, "m^2"),
     "T": ([1e-30] * 5, "J/kg/K"),
-    "t": ([0.0] * 5, "s"),
+    "age": ([0.0] * 5, "s"),
 }
 """The same in SI."""
 
@@ -164,6 +164,15 @@ def test_no_name_hides_another_meaning():
     assert {name.casefold() for name in public if name[0] != "_"} <= RESERVED
 
 
+def test_names_that_others_confuse_are_refused():
+    """OVITO reads columns of dump files in lower case, and T.png is t.png on some file systems."""
+    with pytest.raises(sand.BadInput, match="'heat' and 'Heat' differ by capitals at most"):
+        five({"Heat": "1 K", "heat": "2 K"})
+    with pytest.raises(sand.BadInput, match="'age' and 'Age' differ by capitals at most"):
+        five({"Age": "1 s"}).with_own({"age": "2 s"})
+    assert five({"age": "1 s"}).with_own({"age": "2 s"}).age.tolist() == [2.0] * 5
+
+
 def test_letters_are_those_that_python_reads():
     """Python reads the micro sign µ (U+00B5) in a script as the Greek letter μ (U+03BC)."""
     assert five({"µ": "1 K"}).µ.tolist() == [1.0] * 5
@@ -213,7 +222,7 @@ class Heating(sand.Updater):
             state.constructor[0] = simulation.time
             if simulation.steps == 10:
                 state.remove([4])
-                grain = {**dict.fromkeys(("T", "t", "constructor"), 9.0), "T": "9 J/kg/K", "t": "9 s"}
+                grain = {**dict.fromkeys(("constructor",), 9.0), "T": "9 J/kg/K", "age": "9 s"}
                 grain |= {"temperature": "77 K", "heating": "9 W/m^2", "Oberfläche": "9 m^2"}
                 state.add(sand.Grains([[5e-6, 0, 0]], "0.1 um", "silica", own=grain))
                 assert [values[-1] for values in state.grains.own.values()] == [77.0, 9.0, 9.0, 9.0, 9.0, 9.0]
@@ -265,7 +274,7 @@ def test_own_quantities_do_not_change_the_motion():
 
         def act(self, simulation):
             with simulation.change() as state:
-                state.t[...] = simulation.time
+                state.age[...] = simulation.time
 
     def end(updaters):
         grains = five()
@@ -275,7 +284,7 @@ def test_own_quantities_do_not_change_the_motion():
         return sim
 
     with_clock, without = end([Clock()]), end([])
-    assert with_clock.grains.t[0] > 0.0
+    assert with_clock.grains.age[0] > 0.0
     arrays = with_clock.state.to_arrays()
     for name, array in without.state.to_arrays().items():
         assert name == "grains/own" or (arrays[name] == array).all(), name
@@ -301,14 +310,14 @@ def test_wrong_changes_are_refused():
     sim = sand.Simulation(five(), [sand.Contact()])
     with pytest.raises(sand.BadInput) as caught, sim.change() as state:
         state.own["charm"] = 1.0
-        del state.own["t"]
+        del state.own["age"]
         state.temperature = "3 m"
         state.own["heating"] = [1.0, 2.0]
     assert [problem.split(";")[0][:44] for problem in caught.value.problems] == [
         "own: the simulation has no 'charm'",
         "temperature is not in K",
         "heating has shape (2,) but must be (5,) for 5 grains (own quantity, in W/m^2)"[:44],
-        "own: 't' cannot be left out of a simulation",
+        "own: 'age' cannot be left out of a simulatio",
     ]
     with pytest.raises(sand.BadInput, match="the grains added have no own quantity T"), sim.change() as state:
         state.add(sand.Grains([[5e-6, 0, 0]], "0.1 um", "silica", own={"temperature": "77 K"}))
