@@ -13,7 +13,7 @@ from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
-from .own_quantities import OwnQuantities, read_own, refuse_alike
+from .own_quantities import OwnQuantities, read_own, refuse_same_letters
 from .schema import BY_NAME, FIELDS, public, stored
 from .units import format_quantity, in_unit
 
@@ -201,7 +201,7 @@ class Grains:
         """
         more, other = read_own(own, len(self)), self.copy()
         for name in more:
-            refuse_alike(name, (other_name for other_name in self.own_units if other_name != name))
+            refuse_same_letters(name, (other_name for other_name in self.own_units if other_name != name))
         units = self.own_units | more.units
         rows = [more[name] if name in more else self.own[name] for name in units]
         other.__dict__["own_units"] = units

@@ -164,7 +164,7 @@ def own_name(name: Any) -> str:
     return found
 
 
-def refuse_alike(name: str, others: Iterable[str]) -> None:
+def refuse_same_letters(name: str, others: Iterable[str]) -> None:
     """Refuse a name that other programs, and some file systems, take for another one.  Raises BadInput."""
     for other in others:
         if other.casefold() == name.casefold():
@@ -192,7 +192,7 @@ def read_own(own: Any, count: int) -> OwnQuantities:
     for given_name, given in (own or {}).items():
         try:
             name = own_name(given_name)
-            refuse_alike(name, units)
+            refuse_same_letters(name, units)
             found = (given, own.units[given_name]) if isinstance(own, OwnQuantities) else with_own_unit(given)
             if found is None:
                 raise BadInput(
