@@ -51,6 +51,7 @@ STORED = {
     "ledger": ArraySpec("f8", (None, None)),
     **{f"grains/{field.name}": ArraySpec("f8", ("N",) if field.width == 1 else (field.width, "N")) for field in FIELDS},
     **{f"grains/{name}": ArraySpec("f8", ("N",), "above 0") for name in ("radius", "mass", "inertia")},
+    "grains/own": ArraySpec("f8", (None, "N")),
     "grains/material": ArraySpec("u4", ("N",), "any"),
     "grains/id": ArraySpec("u4", ("N",), "ascending"),
     "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
@@ -100,8 +101,8 @@ PLANNED_END = {"until": float, "last_step": int}
 """Numbers of `meta.json` that may be null."""
 TABLES = {"choices": dict, "case": dict, "ledger": list}
 """Tables of `meta.json`."""
-CHANGES = {"case_written": dict, "updaters": list}
-"""Entries of `meta.json` that a run without changes may lack: the case in case.toml, and names of updaters."""
+CHANGES = {"case_written": dict, "updaters": list, "own": dict}
+"""Entries of `meta.json` that a run may lack: the case in case.toml, names of updaters, units of own quantities."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
@@ -130,6 +131,8 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
             or ("bodies/first" in arrays and name.startswith("bodies/"))
         ):
             raise BadInput(f"there is no array {name!r}")
+    if len(meta.get("own", {})) != len(arrays["grains/own"]):
+        raise BadInput(f"'grains/own' has {len(arrays['grains/own'])} rows, but meta.json names a different number")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
     if arrays["ledger"].shape[1] != len(meta.get("ledger", ())):

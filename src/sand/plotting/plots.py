@@ -90,7 +90,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     frame : Frame
         Frame of a trajectory.
     name : str
-        Name of a quantity in `analysis.quantities.GRAINS`.
+        Name of a quantity in `analysis.quantities.GRAINS`, or of an own quantity.
     field : ndarray, optional
         (3,) external flux density [T].
     dark : bool, optional
@@ -101,7 +101,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     BadInput
         If the frame does not have the quantity.
     """
-    what = quantity(name)
+    what = quantity(name, frame=frame)
     values = measured(frame, name, field)
     if not np.isfinite(values).any():
         raise BadInput(f"{name}: no grain has a finite value")

@@ -222,6 +222,7 @@ class RunWriter:
             "case": plain(self._case),
             **({} if self._written is None else {"case_written": self._written}),
             "next_id": simulation._next_id,
+            "own": regular.grains.own_units,
             "updaters": described(simulation.updaters),
             "ledger": simulation.ledger.columns,
             "clock": CLOCK,

@@ -391,7 +391,8 @@ class Simulation(ReadOnlySettings):
         Yields
         ------
         Change
-            Arrays `velocity`, `spin`, `moment`, `charge`, the `box`, and `remove`, `add`, `scale_box`, `replace`.
+            Arrays `velocity`, `spin`, `moment`, `charge` and own quantities (`change.own`), the `box`, and `remove`,
+            `add`, `scale_box`, `replace`. A change of own quantities alone leaves the motion as it is, bit by bit.
 
         Raises
         ------
@@ -408,6 +409,13 @@ class Simulation(ReadOnlySettings):
         pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
         change = Change(self.grains, present, self.box, pair, self._next_id)
         yield change
+        if change.is_of_own:
+            own = change.checked_grains().arrays.own
+            for grains in (self._engine.state.grains, self._engine.regular_state.grains, self.start):
+                grains.arrays.own[...] = own
+            if self.writer:
+                self.writer.changed(self)
+            return
         seed, fixed = int(self.seed or 0), (self.driven, self._walls)
         engine, forces, driven = changed_engine(change, present, self._engine, self.ledger.columns, seed, *fixed)
         before = self._log_row()["total"]

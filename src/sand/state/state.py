@@ -12,7 +12,7 @@ from ..errors import BadInput
 from ..grains import GrainArrays, Grains
 from ..material import Material
 from ..numerics.simd import all_aligned
-from ..schema import OWN
+from ..own_quantities import OwnQuantities
 from .arrays import (
     GROWTH,
     NOT_SAVED,
@@ -275,8 +275,10 @@ class State:
             _copy_into(getattr(self.wall_contacts, name)[..., :used], saved, f"wall_contacts/{name}")
 
 
-def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Material]) -> Grains:
-    """Grains with the radii, masses, velocities, spins, moments and charges of saved arrays.
+def grains_from_arrays(
+    saved: Mapping[str, np.ndarray], materials: Sequence[Material], units: Mapping[str, str]
+) -> Grains:
+    """Grains with the radii, masses, velocities, spins, moments, charges and own quantities of saved arrays.
 
     Their moments are those in the body frames; `State.from_arrays` restores the orientations.
 
@@ -286,6 +288,8 @@ def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Mate
         Arrays of `State.to_arrays`.
     materials : Sequence[Material]
         Material of each grain.
+    units : Mapping[str, str]
+        Units of the own quantities by name, in the order of their rows.
 
     Raises
     ------
@@ -304,7 +308,7 @@ def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Mate
         moment=part["body_moment"].T,
         charge=part["charge"],
         mass=part["mass"],
-        own={name: part[name] for name in OWN},
+        own=OwnQuantities(dict(zip(units, part["own"], strict=True)), units),
     )
 
 
