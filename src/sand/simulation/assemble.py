@@ -197,6 +197,19 @@ def build_engine(
     return engine
 
 
+def fitting_forces(forces: tuple[Force, ...], stepping: Integrator) -> tuple[Force, ...]:
+    """The forces, with nearest images where "auto" would choose an Ewald sum whose rates a Taylor scheme needs."""
+    taylor = stepping.contact_stepping.far.startswith("taylor")
+    if not taylor or not any(isinstance(force, Contact) for force in forces):
+        return forces
+    return tuple(
+        dataclasses.replace(force, periodic="nearest image")
+        if isinstance(force, EwaldForce) and force.periodic == "auto"
+        else force
+        for force in forces
+    )
+
+
 def _between_all(force: Force) -> Force:
     """The force between nearest images of all pairs of grains, without a cut-off, which would depend on time."""
     near: Any = force.of_nearest_images() if isinstance(force, EwaldForce) else force

@@ -26,7 +26,7 @@ from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
 from ..state.state import CONTACTS, LATE, OUTSIDE, State
 from ..units import format_quantity, seed_given
-from .assemble import build_engine
+from .assemble import build_engine, fitting_forces
 from .cadence import SHORTEST_DURATION
 from .change import Change, as_chosen, changed_engine
 from .condition import GIVEN, OwnCondition
@@ -135,6 +135,7 @@ class Simulation(ReadOnlySettings):
         self.planned: tuple[float, float, str | None] = (math.inf, math.inf, None)  # end of a resumed run
         self.start = grains.copy()
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
+        self.forces = fitting_forces(self.forces, integrator)
         parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
         saved = None if restart is None else restart[0].get("cutoff")
         moved = (self.driven, self._walls)
