@@ -24,16 +24,16 @@ COULOMB_LENGTH = CHARGE * 2 * CHARGE / (4 * math.pi * epsilon_0 * BOLTZMANN * T)
 
 
 def grains_with(**options):
-    """Eight grains of 10 nm in motion of 100 K; the two largest charges are 6 e and −3 e, moments 2e-18 and 1e-18."""
+    """Eight grains of 10 nm in motion of 100 K; the two largest charges are 6 e and −3 e, moments 2e-17 and 1e-17."""
     charge = CHARGE * np.array([0.1, 2.0, 0.2, -1.0, 0.1, 0.1, 0.1, 0.1])
     moment = np.zeros((8, 3))
-    moment[1, 0], moment[3, 1], moment[5, 2] = 2e-18, 1e-18, 1e-19
+    moment[1, 0], moment[3, 1], moment[5, 2] = 2e-17, 1e-17, 1e-18
     options = {"charge": charge, "moment": moment} | options
     gas = sand.setup.gas(8, BOX, radius="10 nm", material="silica", temperature=T, seed=1)
     return sand.Grains(gas.position, 1e-8, "silica", velocity=gas.velocity, **options)
 
 
-@pytest.mark.parametrize(("box", "share"), [(BOX, 0.2), (OPEN, 1.0)], ids=["periodic", "open"])
+@pytest.mark.parametrize(("box", "share"), [(BOX, 0.15), (OPEN, 1.0)], ids=["periodic", "open"])
 def test_charges_are_compared_at_the_cutoff_with_kt(box, share):
     """|U(r_c)| = k q₁q₂/r_c of the two largest charges is 0.1 kT at ten Coulomb lengths: warned of just below that."""
     given = grains_with()
@@ -86,7 +86,7 @@ def test_every_pair_force_is_compared():
 
     cases = {
         sand.ScreenedCharges("0.5 um", cutoff=r): COULOMB_LENGTH / r * math.exp(-r / 5e-7),
-        sand.Dipoles(cutoff=r): 2 * mu_0 / (4 * math.pi) * 2e-36 / r**3 / (BOLTZMANN * T),
+        sand.Dipoles(cutoff=r): 2 * mu_0 / (4 * math.pi) * 2e-34 / r**3 / (BOLTZMANN * T),
         soft(strength=0.2 * BOLTZMANN * T, cutoff=r): 0.2,
     }
     for force, expected in cases.items():

@@ -21,7 +21,6 @@ from ..forces.gas.model import Gas
 from ..forces.pair.cutoff import CutoffForce
 from ..forces.pair.dipoles import Dipoles, kinetic_temperature
 from ..forces.pair.ewald_force import EwaldForce
-from ..forces.pair.pair_force import PairForce
 from ..grains import Grains
 from ..units import format_quantity
 
@@ -37,7 +36,7 @@ def truncation_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> li
     """
     found = []
     for force in forces:
-        if isinstance(force, PairForce | Dipoles) and force.acts_on(grains):
+        if isinstance(force, CutoffForce) and force.acts_on(grains):
             radius = _end(force, grains, box)
             if radius is not None:
                 found.append(_warning(force, radius, grains, motion_temperature(grains, forces), box))
@@ -61,7 +60,7 @@ def _end(force: CutoffForce, grains: Grains, box: Box) -> float | None:
     return 0.5 * box.shortest if radius is None and not box.is_open else radius
 
 
-def _warning(force: PairForce | Dipoles, radius: float, grains: Grains, kelvin: float, box: Box) -> str:
+def _warning(force: CutoffForce, radius: float, grains: Grains, kelvin: float, box: Box) -> str:
     """The warning, "" if the interaction is weak at its end."""
     energy = force.largest_energy(grains, radius)
     unit, name = BOLTZMANN * kelvin, f"kT at {kelvin:.3g} K"
@@ -85,7 +84,7 @@ def _nearest(grains: Grains, box: Box) -> float:
     return float(np.median(tree.query(tree.data, 2)[0][:, 1]))
 
 
-def _remedy(force: PairForce | Dipoles, box: Box) -> str:
+def _remedy(force: CutoffForce, box: Box) -> str:
     """What to do."""
     if box.is_open:
         return "leave cutoff out, which sums all pairs in an open box, or give a longer one"
