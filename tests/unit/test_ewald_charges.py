@@ -241,7 +241,12 @@ def test_all_images_act_by_default_in_a_periodic_box():
 @pytest.mark.parametrize(
     ("box", "options", "radius", "parts"),
     [
-        (1e-6, {}, None, ["all images, as the box is periodic along x, y and z and no cut-off is given: radius of the"]),
+        (
+            1e-6,
+            {},
+            None,
+            ["all images, as the box is periodic along x, y and z and no cut-off is given: radius of the"],
+        ),
         (1e-6, {"accuracy": 1e-5}, None, ["all images", "accuracy 1e-05"]),
         (1e-6, {"periodic": "ewald"}, None, ["radius of the real part of an Ewald sum"]),
         (1e-6, {"periodic": "nearest image"}, 0.5e-6 / 1.35, ["smooth, half the box / 1.35"]),
@@ -249,7 +254,12 @@ def test_all_images_act_by_default_in_a_periodic_box():
         (1e-6, {"cut": "sharp"}, 0.5e-6 / 1.35, ["sharp, half the box / 1.35"]),
         (1e-6, {"cutoff": None}, "none", ["no cut-off, given by the user: nearest images"]),
         (None, {}, "none", ["open box: all pairs"]),
-        ((1e-6, 1e-6, None), {}, 0.5e-6 / 1.35, ["half the box / 1.35; no Ewald sum: the box is periodic 1 um x 1 um x o"]),
+        (
+            (1e-6, 1e-6, None),
+            {},
+            0.5e-6 / 1.35,
+            ["half the box / 1.35; no Ewald sum: the box is periodic 1 um x 1 um x o"],
+        ),
         ((1e-4, 1e-4, 1e-7), {}, 0.5e-7 / 1.35, ["; no Ewald sum: ", "needs more than 1000000 wave vectors"]),
     ],
 )
@@ -277,7 +287,7 @@ def test_a_scheme_without_rates_takes_nearest_images():
         sim = sand.Simulation(grains, [contact, sand.Charges()], **taylor)
     assert any("charges: the cut-off" in str(each.message) for each in warned)
     assert sim.choices["charges cut-off"].endswith("(smooth, half the box / 1.35)")
-    with pytest.raises(BadInput, match="^stepping: far = 'taylor' needs the rate of change of every pair force, which"):
+    with pytest.raises(BadInput, match=r"^stepping: far = 'taylor' needs the rate of change of every pair"):
         sand.Simulation(grains, [contact, sand.Charges(periodic="ewald")], **taylor)
 
 

@@ -82,7 +82,12 @@ def test_velocities_are_thermal_in_a_periodic_box_only():
         ("5 nm", "15 K", "material", None),
         ("10 nm", "100 K", "material", None),
         # above 11.32 nm there are several domains
-        ("12 nm", "100 K", "material", ["iron grains of radius 12 nm are 100% of saturation", "above 11.32 nm", "40 to"]),
+        (
+            "12 nm",
+            "100 K",
+            "material",
+            ["iron grains of radius 12 nm are 100% of saturation", "above 11.32 nm", "40 to"],
+        ),
         ("12 nm", "100 K", "19 A m^2/kg", None),  # a tenth of saturation is 20 A m²/kg
         ("12 nm", "100 K", "40 A m^2/kg", ["are 20% of saturation"]),
         ("12 nm", "100 K", None, None),

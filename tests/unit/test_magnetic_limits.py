@@ -73,6 +73,7 @@ def test_barriers_are_those_of_the_lowest_path(k, kind, start, end, barrier):
     The field that turns the moment is the curvature at the easy direction, by differences of angle 1e-4 (error 1e-8,
     rounding 1e-8).
     """
+
     def energy(n):
         n = np.asarray(n, float)
         if kind == "uniaxial":
@@ -99,8 +100,12 @@ def test_all_presets_have_the_kind_of_their_crystal():
         "magnetite": pytest.approx(-1 / 12, rel=1e-12, abs=0.0),
     }
 
+
 def test_the_time_that_a_moment_stays():
-    """τ = τ₀ exp(|K₁|V/12 k_BT) of magnetite: at the blocking temperature or radius of a time t it is t; ln t is then exact to 1e-12."""
+    """τ = τ₀ exp(|K₁|V/12 k_BT) of magnetite: at the blocking temperature or radius of a time t it is t.
+
+    ln t is then exact to 1e-12.
+    """
     for seconds in (1e-6, 100.0, 1e9):
         given = magnetic_limits("magnetite", R, "300 K", seconds)
         blocked = magnetic_limits("magnetite", R, given.blocking_temperature)

@@ -46,7 +46,9 @@ def test_charges_are_compared_at_the_cutoff_with_kt(box, share):
             energy = 0.1 * BOLTZMANN * T / factor
             assert f"is up to {energy:.3g} J, {0.1 / factor:.3g} kT at 100 K (limit 0.1)" in found[0]
             assert found[0].startswith("charges: the cut-off, ")
-            remedy = "leave cutoff out, which sums all pairs" if box is OPEN else "use periodic = 'ewald' without cutoff"
+            remedy = (
+                "leave cutoff out, which sums all pairs" if box is OPEN else "use periodic = 'ewald' without cutoff"
+            )
             assert remedy in found[0]
 
 

@@ -202,12 +202,14 @@ def fitting_forces(forces: tuple[Force, ...], stepping: Integrator) -> tuple[For
     taylor = stepping.contact_stepping.far.startswith("taylor")
     if not taylor or not any(isinstance(force, Contact) for force in forces):
         return forces
-    return tuple(
-        dataclasses.replace(force, periodic="nearest image")
-        if isinstance(force, EwaldForce) and force.periodic == "auto"
-        else force
-        for force in forces
-    )
+    return tuple(_of_nearest_images(force) for force in forces)
+
+
+def _of_nearest_images(force: Force) -> Force:
+    """The force, with nearest images instead of an automatic choice."""
+    given: Any = force
+    auto = isinstance(force, EwaldForce) and force.periodic == "auto"
+    return cast("Force", dataclasses.replace(given, periodic="nearest image")) if auto else force
 
 
 def _between_all(force: Force) -> Force:

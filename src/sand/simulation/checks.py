@@ -50,8 +50,8 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
     names = {force.name for force in forces}
     if {Charges.name, ScreenedCharges.name} <= names:
         problems.append(
-            "forces: charges (sand.Charges) and screened_charges (sand.ScreenedCharges) both act between the charges of "
-            "the grains, which would repel and attract each other twice; leave one of them out"
+            "forces: charges (sand.Charges) and screened_charges (sand.ScreenedCharges) both act between the charges "
+            "of the grains, which would count twice; leave one of them out"
         )
     for force in forces:
         try:

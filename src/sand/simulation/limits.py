@@ -146,9 +146,9 @@ def _moments(grains: Grains, kind: int, kelvin: float) -> str:
     material = grains.materials[kind]
     return (
         f"{material.name}: one domain up to a radius of {format_quantity(limits.single_domain_radius, 'm')} "
-        f"({_domain_note(material)}); fixed for 100 s {stable}{small}, with the energy barrier {_barrier(material)}; the "
-        f"field of a touching grain, {format_quantity(field, 'T')}, is {'above' if strong else 'below'} the anisotropy field, "
-        f"{format_quantity(limits.anisotropy_field, 'T')}"
+        f"({_domain_note(material)}); fixed for 100 s {stable}{small}, with the energy barrier {_barrier(material)}; "
+        f"the field of a touching grain, {format_quantity(field, 'T')}, is {'above' if strong else 'below'} the "
+        f"anisotropy field, {format_quantity(limits.anisotropy_field, 'T')}"
         + (": moments would turn inside the grains" if strong else "")
     )
 

@@ -513,7 +513,8 @@ class Simulation(ReadOnlySettings):
             self._record_output()
 
     def _log_row(self) -> dict[str, float]:
-        energies = self._engine.contact_energies(), self._engine.force_energies()
+        engine = self._engine
+        energies = engine.losses().tolist(), engine.contact_energies(), engine.force_energies()
         row = log_row(self.state, *energies, wall_columns(self._walls))
         return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
 

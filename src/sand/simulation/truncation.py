@@ -1,10 +1,10 @@
 """Pair forces that a cut-off ends where they still matter: |U(r_c)| is compared with the energy of motion.
 
-A force beyond its cut-off does nothing.  Where the energy of a pair at the cut-off is above 0.1 k_B T, the positions and
-the motion of the grains depend on where the cut-off lies.  T is that of a gas with Brownian motion or of the bath of
-contacts, the higher one, else that of the translation of the grains at the start.  Grains at rest have no k_B T: they
-are moved by their forces alone, and gain energies of the order of |U| of neighbours, which takes its place: |U| at the
-median distance of a grain to its nearest neighbour.
+Where the energy of a pair at the cut-off is above 0.1 k_B T, positions and motion of the grains depend on where the
+cut-off lies.  T is that of a gas with Brownian motion or of the bath of contacts, the higher one, else that of the
+translation of the grains at the start.  Grains at rest have no k_B T: they are moved by their forces alone, and gain
+energies of the order of |U| of neighbours, which takes its place: |U| at the median distance of a grain to its nearest
+neighbour.
 """
 
 from __future__ import annotations

@@ -95,10 +95,10 @@ def magnetic_limits(
     Notes
     -----
     The single-domain radius is that of a sphere with uniaxial walls of energy 4 √(A|K|).  For iron it is 11 nm, a
-    diameter of 23 nm.  Dominik & Nübold 2002 (introduction) quote other diameters of iron condensates: superparamagnetic
-    below 20 nm, one domain between 40 and 60 nm, several above 80 nm (after Nuth et al. 1994 and Withey & Nuth 1999,
-    which were not read for this program).  The formula is not made to agree: shape, strain and surface of real grains
-    are not in it.  Take the quoted sizes where your grains are like those.
+    diameter of 23 nm.  Dominik & Nübold 2002 (introduction) quote other diameters of iron condensates:
+    superparamagnetic below 20 nm, one domain between 40 and 60 nm, several above 80 nm (after Nuth et al. 1994 and
+    Withey & Nuth 1999, which were not read for this program).  The formula is not made to agree: shape, strain and
+    surface of real grains are not in it.  Take the quoted sizes where your grains are like those.
 
     References
     ----------

@@ -48,7 +48,12 @@ class EwaldForce(CutoffForce):
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        words = ("periodic", self._periodic_words()), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS), ("open", OPEN)
+        words = (
+            ("periodic", self._periodic_words()),
+            ("boundary", BOUNDARIES),
+            ("reciprocal", RECIPROCALS),
+            ("open", OPEN),
+        )
         for name, allowed in words:
             value = getattr(self, name)
             if value not in allowed:
@@ -164,7 +169,8 @@ class EwaldForce(CutoffForce):
         auto = "all images, as the box is periodic along x, y and z and no cut-off is given: "
         return CutoffChoice(
             chosen.radius,
-            f"{auto if self.periodic == 'auto' else ''}radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
+            (auto if self.periodic == "auto" else "")
+            + f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
             f"alpha = {chosen.product:g}/radius, {chosen.reciprocal}; predicted errors "
             f"of force {chosen.force_error:.1e}, of {self.sources.field} {chosen.field_error:.1e}",
         )

@@ -191,8 +191,9 @@ class Charges(EwaldForce, InverseSquare):
             energy = 0.5 * mean_field(self.ewald(grains, box).alpha, box.volume, False, CHARGES) * net**2
             warnings.append(
                 f"{self.name}: the net charge of the box is {format_quantity(net, 'C')}; periodic = '{self.periodic}' "
-                f"balances it by a uniform background of {format_quantity(-net, 'C')}, which exerts no force on grains and adds "
-                f"the constant energy -pi k Q^2/(2 V alpha^2) = {format_quantity(energy, 'J')} to column {self.column}"
+                f"balances it by a uniform background of {format_quantity(-net, 'C')}, which exerts no force on grains "
+                f"and adds the constant energy -pi k Q^2/(2 V alpha^2) = {format_quantity(energy, 'J')} to column "
+                f"{self.column}"
             )
         return warnings
 
