@@ -401,8 +401,8 @@ def test_the_work_of_a_bath_is_in_the_balance(ratio):
 
     Velocity Verlet changes v by F/m Δt/2 twice per step.  With the work Δt/2 F·v of the middle of the step, K at its
     end is larger by ⅛Δt² F²/m than the recorded work of all forces.  The noise in F is of order 1/√Δt and gives ζ ω Δt
-    of ½ kT, 3 to 4 % with 25 steps per period; its work in this half kick is recorded.  For springs ⅛Δt² F²/m = ¼(ω Δt)² U
-    is left, at most (2π/25)²/4 = 1.6 % for the fastest mode, and a quarter of that for half the step; the factor is
+    of ½ kT, 3 to 4 % with 25 steps per period; its work in this half kick is recorded.  For springs ¼(ω Δt)² U is
+    left, at most (2π/25)²/4 = 1.6 % for the fastest mode, and a quarter of that for half the step; the factor is
     above 2.5 within the noise of F·v.  Rows at any time, of a step that is cut short, and after a change that sums the
     loads anew have the same error.
     """
