@@ -220,8 +220,7 @@ def test_all_images_act_by_default_in_a_periodic_box():
     """40 charges ±5 e at random: `Charges()` against an Ewald sum in NumPy of which no term above exp(−25) is left out.
 
     rms error of the force at most the accuracy, 1e-3, of F = √3 k q²/a², a = (3V/4πN)^(1/3); largest-case factor 2 for
-    the spread of one sample of 40.  Nearest images with the automatic cut-off err by more than half of the forces, and
-    their energy has the wrong sign: the default until then.
+    the spread of one sample of 40.  Nearest images with the automatic cut-off err by more than half of the forces.
     """
     e, rng = 1.602176634e-19, np.random.default_rng(1)
     position, charge = CUBE * (rng.random((40, 3)) - 0.5), 5 * e * np.where(np.arange(40) % 2, 1.0, -1.0)
