@@ -300,6 +300,10 @@ def test_cluster_table_across_periodic_faces():
     assert rows["mass"].tolist() == [8, 4]
     assert rows["gyration_radius"] == pytest.approx([math.sqrt(15 / 3), 1.0], rel=1e-6, abs=0.0)
     assert rows["moment"].tolist() == [4, 2]
+    # as `COLUMNS` says: N a³/((5/3)^(3/2) r_g³), r_g² = 15/3 + 3/5 and 1 + 3/5 with the extent of the grains
+    assert "(5/3)^(1/2) r_g, r_g with the extent of grains" in COLUMNS["filling_factor"][1]
+    filled = [n / (5 / 3 * (square + 3 / 5)) ** 1.5 for n, square in ((4, 5.0), (2, 1.0))]
+    assert rows["filling_factor"] == pytest.approx(filled, rel=1e-6, abs=0.0)
     assert rows["longest"].tolist() == [4, 2]
     assert rows["rings"].tolist() == [0, 0]
     assert size_distribution(np.array([0, 0, 0, 0, 1, 1, 2]))[0].tolist() == [1, 2, 4]

@@ -109,6 +109,7 @@ class MaterialSection(Section):
     specific_moment: Any = None
     anisotropy: Any = None
     exchange_stiffness: Any = None
+    anisotropy_kind: str | None = None
 
     def build(self, name: str) -> Material:
         """Build the material.  Raises BadInput for missing or impossible numbers."""

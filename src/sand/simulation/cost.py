@@ -19,6 +19,7 @@ from ..compiler.jit import cache_folder
 from ..compiler.progress import compilation_seconds
 from ..contact.law import contact_constants
 from ..contact.model import Contact
+from ..forces.pair.ewald_force import EwaldForce
 from ..integrate.rigid_clusters import RigidClusters
 from ..integrate.step_control import FLIGHT_FRACTION, MAX_SPIN_ANGLE
 from ..integrate.task_queue import uses_task_queue
@@ -63,7 +64,7 @@ def _name(force: Any, simulation: Simulation) -> str:
     words = [force.name]
     if isinstance(force, Contact):
         words += [force.law, *([] if force.damping == "none" else ["damped"])]
-    elif getattr(force, "periodic", "") == "ewald" and not simulation.box.is_open:
+    elif isinstance(force, EwaldForce) and force.uses_ewald(simulation.start, simulation.box):
         words.append("ewald")
     return " ".join(words)
 

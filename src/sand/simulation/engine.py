@@ -15,6 +15,7 @@ import numpy as np
 from ..compiler.program import Program
 from ..compiler.stage import Stage
 from ..compiler.table import Table
+from ..contact.damping import THERMAL
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
@@ -29,8 +30,9 @@ from ..integrate.driven import HEAVY
 from ..integrate.driver import advance
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
-from ..integrate.program import Components, build_program
+from ..integrate.program import Components, build_program, variant_of
 from ..integrate.respa import clear_long_range_loads
+from ..integrate.stages import NO_STEP, bath_wall_work, bath_work
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
     SHARED,
@@ -511,10 +513,34 @@ class Engine:
         with self._held():
             return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
 
+    def losses(self) -> np.ndarray:
+        """Losses [J] up to the time of `state`, in the order of `state.state.LOST`.
+
+        With a bath they include the work in the half kick at the end of the last step (`contact.bath_work`).
+        """
+        state = self.state
+        if variant_of(self.parameters.settings) != THERMAL:
+            return state.lost
+        arrays = state.lost, state.contacts.lost, state.wall_contacts.lost
+        kept = [array.copy() for array in arrays]
+        self._record_bath_work(state)
+        found = state.lost.copy()
+        for array, values in zip(arrays, kept, strict=True):
+            array[...] = values
+        return found
+
+    def _record_bath_work(self, state: State) -> None:
+        """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
+        walls = self._components.walls
+        with self._held(state):
+            bath_work.run(self._current_table(state), (), NO_STEP)
+            if walls is not None:
+                bath_wall_work.run(self._current_table(state), walls, NO_STEP)
+
     @contextlib.contextmanager
-    def _held(self) -> Iterator[None]:
+    def _held(self, state: State | None = None) -> Iterator[None]:
         """While constants of contacts are computed, driven grains have a mass that counts as infinite."""
-        driven, arrays = self._components.driven, self._state.grains.arrays
+        driven, arrays = self._components.driven, (state or self._state).grains.arrays
         index: Any = [] if driven is None else driven.grain
         for quantity in (arrays.mass, arrays.inertia):
             quantity[index] *= HEAVY
@@ -546,6 +572,8 @@ class Engine:
         """As `refresh_loads`, in the present order of the arrays."""
         state = self._state
         steps, sums = state.steps, int(state.count[LONG_RANGE_SUMS])
+        if variant_of(self.parameters.settings) == THERMAL:
+            self._record_bath_work(state)  # the loads that follow have no noise
         state.count[STAGE] = 1
         state.clock[STEP] = state.clock[CYCLE] = state.clock[LEFT] = 0.0
         self._drive(-math.inf, steps + 1)

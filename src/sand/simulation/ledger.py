@@ -39,12 +39,18 @@ WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
 
 
 def log_row(
-    state: State, of_contacts: Sequence[float], forces: dict[str, float], walls: Sequence[str] = ()
+    state: State,
+    lost: Sequence[float],
+    of_contacts: Sequence[float],
+    forces: dict[str, float],
+    walls: Sequence[str] = (),
 ) -> dict[str, float]:
     """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
 
     Parameters
     ----------
+    lost : Sequence[float]
+        Losses [J] up to this time, see `Engine.losses`.
     of_contacts : Sequence[float]
         Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
     forces : dict[str, float]
@@ -58,10 +64,10 @@ def log_row(
     counts = count_row(state)
     row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
-    row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
+    row |= dict(zip(LOSSES, lost, strict=True))
     moved = {LOST_WALLS: -math.fsum(state.walls.work)} if walls else {}
     row |= moved
-    row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist(), *moved.values()])
+    row["total"] = math.fsum([*energies, *forces.values(), *lost, *moved.values()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
         CORRECTION: float(state.clock[CORRECTED]),

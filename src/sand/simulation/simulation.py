@@ -26,7 +26,7 @@ from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
 from ..state.state import CONTACTS, LATE, OUTSIDE, State
 from ..units import format_quantity, seed_given
-from .assemble import build_engine
+from .assemble import build_engine, fitting_forces
 from .cadence import SHORTEST_DURATION
 from .change import Change, as_chosen, changed_engine
 from .condition import GIVEN, OwnCondition
@@ -137,6 +137,7 @@ class Simulation(ReadOnlySettings):
         self.planned: tuple[float, float, str | None] = (math.inf, math.inf, None)  # end of a resumed run
         self.start = grains.copy()
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
+        self.forces = fitting_forces(self.forces, integrator)
         parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
         saved = None if restart is None else restart[0].get("cutoff")
         moved = (self.driven, self._walls)
@@ -527,7 +528,8 @@ class Simulation(ReadOnlySettings):
             self._record_output()
 
     def _log_row(self) -> dict[str, float]:
-        energies = self._engine.contact_energies(), self._engine.force_energies()
+        engine = self._engine
+        energies = engine.losses().tolist(), engine.contact_energies(), engine.force_energies()
         row = log_row(self.state, *energies, wall_columns(self._walls))
         return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
 
