@@ -62,7 +62,7 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: 
     several, hidden = len(job.case.impact.seeds) > 1, as_json or quiet
     observers: list[Any] = [] if several or hidden else [Progress(math.inf, math.inf)]
     with (
-        report.progress_bar(1.0, hidden or not several, bar_format="{percentage:3.0f}% {desc}") as bar,
+        report.progress_bar(1.0, hidden or not several, bar_format=report.LAYOUT) as bar,
         running_job(job.folder, workers if several else 1, threads=threads, quiet=hidden) as (executor, interrupts),
     ):
 

