@@ -162,34 +162,55 @@ def describe_case(path: Path) -> Description:
     steps = math.inf if case.run.steps is None else case.run.steps
     limits = _limits(simulation)
     ends = (end, steps, case.run.stop)
-    cost, costs = _cost(simulation, end, steps)
+    cost, costs = _cost(simulation, *ends)
     content = {"kind": "case", "case": case_of(simulation, *ends), "choices": simulation.choices, "limits": limits}
     rows = report.opening(simulation, *ends, Path(case.run.out or path.stem))
     return "a valid case", [*rows, *costs, *limits.items()], content | {"cost": cost}
 
 
-def _cost(simulation: Any, end: float, last_step: float) -> tuple[dict[str, Any], report.Rows]:
-    """Expected steps, wall time, memory and compilation of a run."""
+def _cost(
+    simulation: Any, end: float, last_step: float, condition: str | None, runs: int = 1
+) -> tuple[dict[str, Any], report.Rows]:
+    """Expected steps, wall time, memory and compilation of a run, or of several like it one after the other."""
     from ..compiler.jit import COMPILE_TIMES
     from ..compiler.progress import compile_times
     from ..simulation.cost import expected_cost
-    from ..units import format_quantity
 
-    cost, missing = expected_cost(simulation, end, last_step), simulation._engine.uncompiled()
+    cost, missing = expected_cost(simulation, end, last_step, condition), simulation._engine.uncompiled()
     known = compile_times(COMPILE_TIMES)
     compilation = sum(known.get(name, COMPILATION) for name in missing)
-    source = f"as in {cost.measured}" if cost.measured else "rough estimate: no such run was measured on this machine"
-    steps = "" if cost.steps is None else f", {cost.steps:.2g} steps"
-    wall = "depends on the condition" if cost.seconds is None else f"about {report.format_wall_time(cost.seconds)}"
     names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
     rows = [
-        ("steps", f"about {format_quantity(cost.step, 's')} each{steps}"),
-        ("wall time", f"{wall} ({source})"),
+        ("steps", _steps(cost)),
+        ("wall time", _wall_time(cost, runs)),
         ("memory", f"about {cost.memory / 1e6:.0f} MB" if cost.memory < 1e9 else f"about {cost.memory / 1e9:.2g} GB"),
         ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
     ]
     content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": missing}
     return content | {"compilation_seconds": compilation}, rows
+
+
+def _steps(cost: Any) -> str:
+    """Expected steps, for people."""
+    from ..units import format_quantity
+
+    each = f"about {format_quantity(float(f'{cost.step:.2g}'), 's')} each"
+    if cost.steps is None:
+        return each
+    number = f"{cost.bound or 'about'} {cost.steps:.2g}"
+    if cost.contact_steps is None:
+        return f"{number}, {each}"
+    return f"{number} of bodies, {each}, and about {cost.contact_steps:.2g} contact steps of awake clusters"
+
+
+def _wall_time(cost: Any, runs: int) -> str:
+    """Expected wall time and its parts, for people."""
+    if cost.seconds is None:
+        return "depends on the condition"
+    stepping, output, start = (report.format_wall_time(float(f"{runs * v:.2g}")) for v in cost.parts.values())
+    total = report.format_wall_time(float(f"{runs * cost.seconds:.2g}"))
+    source = f"speed {cost.measured}" if cost.measured else "rough estimate: no run was measured on this machine"
+    return f"{cost.bound or 'about'} {total}: steps {stepping}, output {output}, start and figure {start} ({source})"
 
 
 def _limits(simulation: Any) -> dict[str, str]:

@@ -338,7 +338,9 @@ def wall_time(summary: dict[str, Any]) -> str:
         return total + speed
     others = {"output": "output", "compilation": "compiled code", "start": "start", "other": "other"}
     shares = [f"{name} {format_wall_time(parts[key])}" for key, name in others.items() if parts[key] >= 0.005]
-    return f"{total}: " + ", ".join([f"steps {format_wall_time(parts['stepping'])}{speed and f' ({speed[2:]})'}", *shares])
+    return f"{total}: " + ", ".join(
+        [f"steps {format_wall_time(parts['stepping'])}{speed and f' ({speed[2:]})'}", *shares]
+    )
 
 
 def awake_share(rigid: dict[str, Any]) -> str:

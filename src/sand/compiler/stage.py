@@ -26,8 +26,8 @@ from numba.extending import lower_builtin, type_callable
 
 from .jit import COMPILED, caller, in_cache, kernel, loop, rare, separate
 from .native_calls import call_from_python
-from .progress import making_code
 from .processor import FAST_512_BIT, SLOW_GATHER, target
+from .progress import making_code
 from .table import (
     ANY_TABLE,
     BLOCK,

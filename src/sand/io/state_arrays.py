@@ -100,8 +100,8 @@ PLANNED_END = {"until": float, "last_step": int}
 TABLES = {"choices": dict, "case": dict, "ledger": list}
 """Tables of `meta.json`."""
 CHANGES = {"case_written": dict, "updaters": list, "wall_times": dict}
-"""Entries of `meta.json` that may be missing: the case in case.toml and names of updaters without changes, and the parts
-of the wall time in older files."""
+"""Entries of `meta.json` that may be missing: the case in case.toml and names of updaters without changes, and parts of
+the wall time in older files."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:

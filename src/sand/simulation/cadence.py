@@ -100,6 +100,15 @@ def read_cadence(value: Any, name: str, *, wall: bool = False) -> Cadence:
     return Cadence("time", duration(value, name))
 
 
+def number_in(cadence: Cadence, span: float, steps: float) -> float:
+    """Number of outputs in a run of a length [s] and of so many steps, from time 0 on."""
+    if cadence.kind == "steps":
+        return steps // cadence.every
+    if cadence.kind == "time":
+        return span // cadence.every
+    return max(cadence.per_decade * math.log10(span / cadence.every) + 1.0, 0.0) // 1.0 if span > 0.0 else 0.0
+
+
 class Chosen(NamedTuple):
     """The cadence of frames that was chosen for one run, where the user gives none."""
 

@@ -14,8 +14,19 @@ from .updater import read_updaters
 
 ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
 """Arguments of a simulation that are fixed once it is built."""
-RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound", "wall_seconds",
-    "wall_times")
+RESULTS = (
+    "time",
+    "steps",
+    "state",
+    "start",
+    "temperature",
+    "ledger",
+    "writer",
+    "choices",
+    "is_sound",
+    "wall_seconds",
+    "wall_times",
+)
 """Attributes of a simulation that follow from the run."""
 
 

@@ -27,7 +27,9 @@ class WallClock:
     def __init__(self, total: float = 0.0, parts: Mapping[str, float] | None = None):
         self._before, self._began = total, -1.0
         self._seconds = {name: float((parts or {}).get(name, 0.0)) for name in PARTS}
-        self._inside: list[list[float]] = []  # of each part that is measured now: seconds and compilation of parts in it
+        self._inside: list[
+            list[float]
+        ] = []  # of each part that is measured now: seconds and compilation of parts in it
 
     @property
     def runs(self) -> bool:
