@@ -93,6 +93,8 @@ def _collision(r: dict[str, Any]) -> str:
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
     unfinished = "" if r["quiet"] else " (stopped before it came to rest)"
+    if r["outcome"] == "miss" and r.get("end"):
+        return f"miss{unfinished}: no contact formed; {r['end']}; drift {r['drift']:.1e}"
     return (
         f"{r['outcome']}{unfinished}: {pieces}; {events}; lost {lost:.2g} of the impact energy; drift {r['drift']:.1e}"
     )

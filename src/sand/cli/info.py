@@ -221,31 +221,61 @@ def _limits(simulation: Any) -> dict[str, str]:
 
 
 def _collision_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.collision import INTERVAL, MOST_CHECKS, expected_end
     from ..experiments.collision_case import read_collision
+    from ..units import format_quantity
 
     case = read_collision(path)
+    seeds = case.impact.seeds
     with report.naming(path):
-        simulation = case.check()
+        simulation, start_of_first = case.check(), case.approach(seeds[0])
     bodies = f"{case.projectile.kind} on {case.target.kind}, {len(simulation.grains)} grains"
-    rows = [("bodies", bodies), ("seeds", str(len(case.impact.seeds))), start]
-    return "a valid collision case", rows, {"kind": "collision case", "case": files.read_toml(path)}
+    cost, costs = _cost(simulation, expected_end(start_of_first), math.inf, None, len(seeds))
+    longest = start_of_first.flight + MOST_CHECKS * INTERVAL * start_of_first.check_every
+    note = f"the contacts decide when a collision ends, at {format_quantity(longest, 's')} at the latest"
+    rows = [
+        ("bodies", bodies),
+        ("seeds", str(len(seeds))),
+        *_of_each(costs, len(seeds), "collision"),
+        ("end", note),
+        start,
+    ]
+    content = {"kind": "collision case", "case": files.read_toml(path), "cost": cost}
+    return "a valid collision case", rows, content
+
+
+def _of_each(costs: report.Rows, number: int, name: str) -> report.Rows:
+    """Rows of the cost of several runs: the steps are those of one of them, the wall time that of all by one worker."""
+    if number == 1:
+        return costs
+    texts = dict(costs)
+    texts["steps"] += f", in each {name}"
+    texts["wall time"] += f"; all {number} by one worker"
+    return list(texts.items())
 
 
 def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     from ..config.build import simulation_of
     from ..config.case import check_case
     from ..experiments.growth_case import read_growth
+    from .grow import DEFAULT_SEEDS
 
-    content, seeds = read_growth(path)
+    content, given = read_growth(path)
+    seeds = given or DEFAULT_SEEDS
+    case = check_case(content, "")
     with report.naming(path):
-        simulation = simulation_of(check_case(content, ""), None)
-    limits = _limits(simulation)
-    rows = [("boxes", f"{len(seeds or [])} of {len(simulation.grains)} grains"), *limits.items(), start]
-    return "a valid growth case", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}, "limits": limits}
+        simulation = simulation_of(case, None)
+    limits, ends = _limits(simulation), (case.run.until or math.inf, case.run.steps or math.inf)
+    cost, costs = _cost(simulation, *ends, None, len(seeds))
+    boxes = ("boxes", f"{len(seeds)} of {len(simulation.grains)} grains")
+    rows = [boxes, *_of_each(costs, len(seeds), "box"), *limits.items(), start]
+    content = {"kind": "growth case", "case": {**content, "seeds": given}, "limits": limits, "cost": cost}
+    return "a valid growth case", rows, content
 
 
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
     from ..experiments.scattering.case import read_scattering
+    from ..experiments.scattering.cost import expected_flights
     from ..units import format_quantity
 
     case, flights = read_scattering(path)
@@ -253,7 +283,15 @@ def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
     for flight in flights:
         capture = f", b_max = {format_quantity(flight.scales.capture, 'm')}" if flight.scales.capture else ""
         rows.append((f"{flight.speed:.4g} m/s", f"from {format_quantity(flight.distance, 'm')}{capture}"))
-    return "a valid scattering case", [*rows, start], {"kind": "scattering case", "case": files.read_toml(path)}
+    number, seconds, source = expected_flights(case, flights)
+    told = report.format_wall_time(float(f"{seconds:.2g}"))
+    rows += [("flights", f"about {number:.2g}"), ("wall time", f"about {told} by one worker ({source})"), start]
+    content = {
+        "kind": "scattering case",
+        "case": files.read_toml(path),
+        "cost": {"flights": number, "seconds": seconds},
+    }
+    return "a valid scattering case", rows, content
 
 
 def describe_trajectory(path: Path) -> Description:

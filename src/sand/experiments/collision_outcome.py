@@ -74,6 +74,8 @@ class Collision:
         Relative energy error of the ledger.
     quiet : bool
         False if the simulation was stopped while contacts still changed.
+    end : str
+        Why the simulation ended: contacts no longer change, or bodies that miss each other cannot touch any more.
     """
 
     outcome: str
@@ -96,13 +98,14 @@ class Collision:
     steps: int = 0
     drift: float = 0.0
     quiet: bool = True
+    end: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Dictionary for JSON."""
         return asdict(self)
 
 
-def classify_collision(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
+def classify_collision(simulation: Simulation, start: Approach, before: int, end: str) -> Collision:
     """Classify the outcome of a collision and measure the final bodies.
 
     Parameters
@@ -113,8 +116,8 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
         Initial state.
     before : int
         Initial number of contacts.
-    quiet : bool
-        False if the simulation was stopped while contacts still changed.
+    end : str
+        Why the simulation ended; "" if it was stopped while contacts still changed.
     """
     target, projectile, initial, speed = start.target, start.projectile, start.grains, start.speed
     grains, row = simulation.grains, simulation.ledger.rows[-1]
@@ -154,7 +157,8 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
         time=simulation.time,
         steps=simulation.steps,
         drift=simulation.ledger.drift,
-        quiet=quiet,
+        quiet=bool(end),
+        end=end or "stopped while contacts still changed",
     )
 
 

@@ -26,7 +26,7 @@ CAPTURE = 0.5
 AWAKE = 3.0
 """Time for which a cluster is awake after a touch, in units of the shortest possible, `RigidLimits.longest_awake`."""
 NEAREST = 0.22
-"""Distance of the nearest two bodies, which limit the step of all, in mean distances V^(1/3); at least that of touch."""
+"""Distance of the nearest two bodies, which limit the step of all, in mean distances; at least that of touch."""
 
 Simulation = Any
 """`sand.Simulation`."""

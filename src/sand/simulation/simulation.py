@@ -231,7 +231,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.law, self._engine.parameters.settings.follow)
+        return ContactTable(self.state, self._engine.law, self._engine._current_table(self.state))
 
     @property
     def walls(self) -> tuple[WallState, ...]:
