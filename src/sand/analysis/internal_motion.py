@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..box import Box
-from .clusters import cluster_labels, unwrapped
+from .clusters import cluster_labels, in_one_piece
 
 __all__ = ["internal_kinetic_energy"]
 
@@ -38,29 +38,52 @@ def internal_kinetic_energy(grains: Any, pairs: np.ndarray, box: Box) -> tuple[n
         Internal degrees of freedom of each cluster, (K,).
     """
     labels = cluster_labels(len(grains), pairs)
-    count = int(labels.max()) + 1
-    members = np.bincount(labels, minlength=count)
-    degrees = np.where(members > 1, 6 * members - 6, 0)
-    if count == len(labels):
-        return np.zeros(count), degrees
-    mass, inertia = np.asarray(grains.mass), np.asarray(grains.inertia)
-    velocity, spin = np.asarray(grains.velocity), np.asarray(grains.spin)
+    members = np.bincount(labels)
+    return internal_energies(grains, np.asarray(pairs), box, labels), np.where(members > 1, 6 * members - 6, 0)
+
+
+def internal_energies(grains: Any, pairs: np.ndarray, box: Box, labels: np.ndarray) -> np.ndarray:
+    """The energies of `internal_kinetic_energy`, for clusters whose labels are known."""
+    members = np.bincount(labels)
+    energies = np.zeros(len(members))
+    if len(members) == len(labels):
+        return energies
+    own = np.flatnonzero(members[labels] > 1)  # single grains have none
+    numbers = np.cumsum(members > 1) - 1
+    label, count = numbers[labels[own]], int(numbers[-1]) + 1
+    mass, inertia = np.asarray(grains.mass)[own], np.asarray(grains.inertia)[own]
 
     def summed(values: np.ndarray) -> np.ndarray:
-        total = np.zeros((count, *values.shape[1:]))
-        np.add.at(total, labels, values)
-        return total
+        """Sums over the grains of each cluster, of values (…, n): (…, K)."""
+        flat = values.reshape(-1, len(own))
+        return np.array([np.bincount(label, each, count) for each in flat]).reshape(*values.shape[:-1], count)
 
-    position = unwrapped(np.asarray(grains.position), pairs, box)
-    total = summed(mass)[:, None]
-    s = position - (summed(mass[:, None] * position) / total)[labels]
-    u = velocity - (summed(mass[:, None] * velocity) / total)[labels]
-    angular = summed(mass[:, None] * np.cross(s, u) + inertia[:, None] * spin)
-    own = (mass * (s * s).sum(axis=1) + inertia)[:, None, None] * np.eye(3)
-    tensor = summed(own - mass[:, None, None] * s[:, :, None] * s[:, None, :])
-    rotation = np.linalg.solve(tensor, angular[:, :, None])[:, :, 0]
+    position, velocity, spin = np.array(grains.position), np.asarray(grains.velocity), np.asarray(grains.spin)
+    position = in_one_piece(position, np.asarray(pairs, np.int64).reshape(-1, 2), box, labels)[own].T
+    velocity, spin = velocity[own].T, spin[own].T
+    total = summed(mass)
+    s = position - (summed(mass * position) / total)[:, label]
+    u = velocity - (summed(mass * velocity) / total)[:, label]
+    angular = summed(mass * _cross(s, u) + inertia * spin)
+    diagonal = mass * _square(s) + inertia
+    tensor = np.empty((count, 3, 3))
+    for i, j in np.ndindex(3, 3):
+        products = mass * s[i] * s[j]
+        tensor[:, i, j] = summed(diagonal - products if i == j else 0.0 - products)
+    rotation = np.linalg.solve(tensor, angular.T[:, :, None])[:, :, 0]
     # as the energy of velocities relative to the rigid motion, which has no differences of large numbers
-    turning = rotation[labels]
-    v, w = u - np.cross(turning, s), spin - turning
-    energy = summed(0.5 * mass * (v * v).sum(axis=1) + 0.5 * inertia * (w * w).sum(axis=1))
-    return np.where(members > 1, energy, 0.0), degrees
+    turning = rotation.T[:, label]
+    v, w = u - _cross(turning, s), spin - turning
+    energies[members > 1] = summed(0.5 * mass * _square(v) + 0.5 * inertia * _square(w))
+    return energies
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors (3, n)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _square(a: np.ndarray) -> np.ndarray:
+    """Squares of vectors (3, n)."""
+    found: np.ndarray = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    return found

@@ -169,20 +169,23 @@ def describe_case(path: Path) -> Description:
 
 
 def _cost(
-    simulation: Any, end: float, last_step: float, condition: str | None, runs: int = 1
+    simulation: Any, end: float, last_step: float, condition: str | None, runs: int = 1, figures: int = 1
 ) -> tuple[dict[str, Any], report.Rows]:
-    """Expected steps, wall time, memory and compilation of a run, or of several like it one after the other."""
+    """Expected cost of a run, or of several like it one after the other, which draw one figure or one each."""
     from ..compiler.jit import COMPILE_TIMES
     from ..compiler.progress import compile_times
     from ..simulation.cost import expected_cost
 
     cost, missing = expected_cost(simulation, end, last_step, condition), simulation._engine.uncompiled()
+    if cost.seconds is not None:
+        parts = {name: (figures if name == "start" else runs) * value for name, value in cost.parts.items()}
+        cost = cost._replace(parts=parts, seconds=sum(parts.values()))
     known = compile_times(COMPILE_TIMES)
     compilation = sum(known.get(name, COMPILATION) for name in missing)
     names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
     rows = [
         ("steps", _steps(cost)),
-        ("wall time", _wall_time(cost, runs)),
+        ("wall time", _wall_time(cost)),
         ("memory", f"about {cost.memory / 1e6:.0f} MB" if cost.memory < 1e9 else f"about {cost.memory / 1e9:.2g} GB"),
         ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
     ]
@@ -203,12 +206,12 @@ def _steps(cost: Any) -> str:
     return f"{number} of bodies, {each}, and about {cost.contact_steps:.2g} contact steps of awake clusters"
 
 
-def _wall_time(cost: Any, runs: int) -> str:
+def _wall_time(cost: Any) -> str:
     """Expected wall time and its parts, for people."""
     if cost.seconds is None:
         return "depends on the condition"
-    stepping, output, start = (report.format_wall_time(float(f"{runs * v:.2g}")) for v in cost.parts.values())
-    total = report.format_wall_time(float(f"{runs * cost.seconds:.2g}"))
+    stepping, output, start = (report.format_wall_time(float(f"{v:.2g}")) for v in cost.parts.values())
+    total = report.format_wall_time(float(f"{cost.seconds:.2g}"))
     source = f"speed {cost.measured}" if cost.measured else "rough estimate: no run was measured on this machine"
     return f"{cost.bound or 'about'} {total}: steps {stepping}, output {output}, start and figure {start} ({source})"
 
@@ -266,7 +269,7 @@ def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     with report.naming(path):
         simulation = simulation_of(case, None)
     limits, ends = _limits(simulation), (case.run.until or math.inf, case.run.steps or math.inf)
-    cost, costs = _cost(simulation, *ends, None, len(seeds))
+    cost, costs = _cost(simulation, *ends, None, len(seeds), len(seeds))
     boxes = ("boxes", f"{len(seeds)} of {len(simulation.grains)} grains")
     rows = [boxes, *_of_each(costs, len(seeds), "box"), *limits.items(), start]
     content = {"kind": "growth case", "case": {**content, "seeds": given}, "limits": limits, "cost": cost}

@@ -1,7 +1,7 @@
 """When two bodies that have not touched cannot touch any more: a bound from their positions, velocities and forces.
 
 Each body is within a sphere of radius R about its centre of mass.  With the separation x and the relative velocity v of
-the centres, straight paths stay apart by d = |x + v t|, t = max(−x·v/v², 0), and the bodies cannot touch if d > R₁ + R₂.
+the centres, straight paths stay apart by d = |x + v t|, t = max(−x·v/v², 0): the bodies cannot touch if d > R₁ + R₂.
 
 With forces between the bodies that fall off at least as a power of the distance, the work of their attraction from now
 to infinity is at most W = Σ_ij w_ij(|x| − ρ_i − ρ_j), summed over pairs of grains at distances ρ from their centres of

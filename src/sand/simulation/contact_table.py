@@ -55,8 +55,8 @@ class Columns(dict[str, np.ndarray]):
 class ContactTable(Columns):
     """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
 
-    Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame. `table` is the table of the stages
-    with the arrays of the state.
+    Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.  `table` is the table of the
+    stages with the arrays of the state.
     """
 
     def __init__(self, state: State, law: ContactLaw, table: Any):

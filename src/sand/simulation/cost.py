@@ -99,9 +99,9 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
         return Cost(step.span, None, None, None, {}, memory, "", "")
     found = expected_steps(simulation, end, last_step, may_end_earlier=condition is not None)
     speeds, measured = _speeds(kind_of(simulation))
-    grains = len(simulation.start)
+    grains, sums = len(simulation.start), long_range_seconds(simulation)
     stepping = math.fsum(
-        getattr(found, mode) * step_seconds(simulation, mode, found.contacts) * speeds[mode] for mode in MODES
+        getattr(found, mode) * step_seconds(simulation, mode, found.contacts, sums) * speeds[mode] for mode in MODES
     )
     span = min(end, found.span)
     output = outputs(simulation, span, found.total) * (PER_OUTPUT + PER_OUTPUT_GRAIN * grains) * speeds["output"]
@@ -119,25 +119,26 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
     )
 
 
-def step_seconds(simulation: Simulation, mode: str, contacts: float) -> float:
-    """Rough wall time [s] of a step of a kind, with a number of contacts."""
-    grains, engine = len(simulation.start), simulation._engine
+def step_seconds(simulation: Simulation, mode: str, contacts: float, sums: float) -> float:
+    """Rough wall time [s] of a step of a kind, with a number of contacts; `sums` as of `long_range_seconds`."""
+    grains, respa = len(simulation.start), simulation._engine.parameters.respa
     if mode == "awake":
         return PER_AWAKE_STEP
-    sums = grains * math.fsum(_sum_seconds(simulation, numbers) for _, _, numbers in engine.long_range)
     if mode == "bodies":
         return PER_BODY_STEP + PER_GRAIN * grains + sums
     own = PER_STEP + PER_GRAIN * grains + PER_CONTACT * contacts
-    if mode == "free" or not engine.long_range or simulation.stepping.contact_stepping.far == "every step":
+    if mode == "free" or not sums or respa.max_steps == 1:
         return own + sums
-    return own + PER_CYCLE_STEP + PER_CYCLE_GRAIN * grains + sums / CYCLE
+    return own + PER_CYCLE_STEP + PER_CYCLE_GRAIN * grains + sums / min(CYCLE, respa.max_steps)
 
 
-def _sum_seconds(simulation: Simulation, numbers: Any) -> float:
-    """Rough wall time [s] of one sum of a long-range force, for each grain."""
-    waves = getattr(numbers, "waves", None)
-    pairs = _pairs_per_grain(simulation)
-    return PER_PAIR * pairs if waves is None else PER_EWALD_PAIR * pairs + PER_WAVE * waves.weight.size
+def long_range_seconds(simulation: Simulation) -> float:
+    """Rough wall time [s] of one sum of all long-range forces on all grains."""
+    sums = [numbers for _, _, numbers in simulation._engine.long_range]
+    pairs = _pairs_per_grain(simulation) if sums else 0.0
+    waves = [getattr(numbers, "waves", None) for numbers in sums]
+    each = [PER_PAIR * pairs if q is None else PER_EWALD_PAIR * pairs + PER_WAVE * q.weight.size for q in waves]
+    return len(simulation.start) * math.fsum(each)
 
 
 def outputs(simulation: Simulation, span: float, steps: float) -> float:
@@ -188,6 +189,7 @@ class StepTimer:
     def __init__(self, simulation: Simulation):
         self._simulation, self._calls = simulation, 0
         self._rigid = isinstance(simulation.stepping, RigidClusters)
+        self._long_range = long_range_seconds(simulation)
         # of each kind: number of steps, their wall time [s], and the rough estimate of that [s]
         self._sums = {mode: np.zeros(3) for mode in MODES}
 
@@ -216,7 +218,8 @@ class StepTimer:
         else:
             found = {"contact" if contacts else "free": (steps, seconds)}
         for mode, (number, spent) in found.items():
-            self._sums[mode] += number, spent, number * step_seconds(self._simulation, mode, contacts)
+            rough = step_seconds(self._simulation, mode, contacts, self._long_range)
+            self._sums[mode] += number, spent, number * rough
 
     def record(self) -> None:
         """Add the measured speeds to the table, if there were enough steps and the table can be written."""

@@ -222,9 +222,11 @@ class Engine:
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
+        self._copy_present = (None,)  # frees the arrays of the copy before
+        self._copy_table.follow(self._current_table(regular))
         self._state = regular.copy()
-        self._current_table(regular)
-        self._use_copy_table(self._state)
+        self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
+        _set_arrays(self._copy_table, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
         try:
             stop = self._drive(time, regular.steps + most_steps, shorten=True)
@@ -445,12 +447,6 @@ class Engine:
             _set_arrays(self._table, present)
             self._present = present
         return self._table
-
-    def _use_copy_table(self, state: State) -> None:
-        """Give the table of copies the arrays of a copy of the state, so that the other table keeps its own."""
-        self._copy_table.follow(self._table)
-        self._copy_present = (state.grains.arrays, *ARRAYS(state))
-        _set_arrays(self._copy_table, self._copy_present)
 
     def _call_table(self, until: float, last: float, shorten: bool) -> tuple[Table, Any]:
         """The table for one call of the driver, and its task queue."""

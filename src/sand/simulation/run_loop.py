@@ -11,7 +11,7 @@ from ..integrate.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, Condition, OwnCondition
 from .cost import StepTimer
-from .ledger import COUNTED, count_row
+from .ledger import COUNTED
 from .observers import call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome
 from .pace import RunTimeEstimate
@@ -124,7 +124,7 @@ def _is_met(simulation: Simulation, condition: Condition | OwnCondition) -> bool
         holds = condition.holds(simulation)
     else:
         holds = condition.holds(
-            count_row(simulation.state) if COUNTED.issuperset(condition.names) else simulation._log_row()
+            simulation._count_row() if COUNTED.issuperset(condition.names) else simulation._log_row()
         )
     if holds:
         simulation._met = (key_of(condition), simulation.steps)

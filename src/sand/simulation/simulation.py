@@ -23,7 +23,7 @@ from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import CONTACTS, LATE, OUTSIDE, State
+from ..state.state import BROKEN, CONTACTS, LATE, MADE, OUTSIDE, State
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
 from .cadence import Chosen, chosen_cadence
@@ -33,7 +33,7 @@ from .contact_table import ContactTable
 from .cost import StepTimer
 from .displays import DISPLAYS
 from .driven import read_driven
-from .ledger import Ledger, kinetic_energies, log_row
+from .ledger import Ledger, count_row, kinetic_energies, labels_in, log_row
 from .observers import Observer
 from .outcome import Outcome, Result
 from .run_loop import run_loop
@@ -150,6 +150,7 @@ class Simulation(ReadOnlySettings):
         self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
         self._clock = WallClock()
         self._has_begun = restart is not None
+        self._clusters: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))  # engine, counts, and labels for these
         self._frame_times: list[float] = []  # [s], of all frames so far
         self._chosen: Chosen | None = None  # cadence of frames of the present or last run, if the user gives none
         self._met: tuple[Any, int] | None = None  # the condition that was met, and the step
@@ -516,8 +517,20 @@ class Simulation(ReadOnlySettings):
 
     def _log_row(self) -> dict[str, float]:
         energies = self._engine.contact_energies(), self._engine.force_energies()
-        row = log_row(self.state, *energies, wall_columns(self._walls))
+        row = log_row(self.state, self._labels(), *energies, wall_columns(self._walls))
         return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
+
+    def _labels(self) -> np.ndarray:
+        """Cluster of each grain (N,), found anew after contacts have formed or broken."""
+        state, engine = self.state, self._engine
+        key = (len(state.grains), *(int(state.count[k]) for k in (CONTACTS, MADE, BROKEN)))
+        if self._clusters[:2] != (engine, key):
+            self._clusters = engine, key, labels_in(state)
+        return self._clusters[2]
+
+    def _count_row(self) -> dict[str, float]:
+        """The part of a row of the ledger that needs no energies."""
+        return count_row(self.state, self._labels())
 
     def _record_output(self, with_frame: bool = True) -> None:
         """Add a row to the ledger, write it, with a frame or without, and call the observers."""
