@@ -117,7 +117,7 @@ class Chosen(NamedTuple):
 
 
 def chosen_cadence(time: float, end: float, before: Chosen | None = None) -> Chosen | None:
-    """Choose a cadence for a run from a time to an end [s]: `FRAMES` frames; None if the end is not a time.
+    """Choose a cadence for a run from a time to an end [s]: about `FRAMES` frames; None if the end is not a time.
 
     The cadence chosen for an earlier run ends with that run.  It is kept if the run was interrupted and goes on to the
     same end, so that an interruption changes no frame.
@@ -126,7 +126,9 @@ def chosen_cadence(time: float, end: float, before: Chosen | None = None) -> Cho
         return before
     if not 0.0 < end - time < math.inf:
         return None
-    return Chosen(max((end - time) / FRAMES, SHORTEST_DURATION), end)
+    # a whole number of them from time 0 to the end, so that the last is not shorter; the factor allows for rounding
+    number = math.ceil(FRAMES * end / (end - time) * (1.0 - 1e-9))
+    return Chosen(max(end / number, SHORTEST_DURATION), end)
 
 
 class Schedule:
