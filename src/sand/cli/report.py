@@ -330,17 +330,20 @@ def results(summary: dict[str, Any]) -> Rows:
 
 def wall_time(summary: dict[str, Any]) -> str:
     """Wall time of a run and its parts, and the speed of its steps; older summaries lack the parts."""
-    total, parts = format_wall_time(summary["wall_seconds"]), summary.get("wall_times", {})
-    rate = summary["ns_per_grain_step"]
+    total, rate = format_wall_time(summary["wall_seconds"]), summary["ns_per_grain_step"]
     # steps of bodies have no cost of their own
-    speed = "" if rate is None or "rigid_clusters" in summary else f", {rate:.3g} ns per grain and step"
-    if not parts:
-        return total + speed
-    others = {"output": "output", "compilation": "compiled code", "start": "start", "other": "other"}
-    shares = [f"{name} {format_wall_time(parts[key])}" for key, name in others.items() if parts[key] >= 0.005]
-    return f"{total}: " + ", ".join(
-        [f"steps {format_wall_time(parts['stepping'])}{speed and f' ({speed[2:]})'}", *shares]
-    )
+    speed = "" if rate is None or "rigid_clusters" in summary else f"{rate:.3g} ns per grain and step"
+    if "wall_stepping" not in summary:
+        return f"{total}, {speed}" if speed else total
+    steps = f"steps {format_wall_time(summary['wall_stepping'])}" + (f" ({speed})" if speed else "")
+    names = {"output": "output", "compilation": "compiled code", "start": "start", "other": "other"}
+    parts = {name: summary[f"wall_{part}"] for part, name in names.items()}
+    shown = [
+        f"{name} {format_wall_time(seconds)}"
+        for name, seconds in parts.items()
+        if seconds >= 0.01 * summary["wall_seconds"]
+    ]
+    return f"{total}: " + ", ".join([steps, *shown])
 
 
 def awake_share(rigid: dict[str, Any]) -> str:

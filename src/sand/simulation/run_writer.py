@@ -295,7 +295,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "seed": simulation.seed,
         "choices": simulation.choices,
         "wall_seconds": simulation.wall_seconds,
-        "wall_times": simulation.wall_times,
+        **{f"wall_{part}": seconds for part, seconds in simulation.wall_times.items()},
         "ns_per_grain_step": 1e9 * simulation.wall_times["stepping"] / grain_steps if grain_steps else None,
         "versions": versions(),
         "source_digest": cache_folder().name,
