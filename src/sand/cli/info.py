@@ -287,8 +287,8 @@ def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
         capture = f", b_max = {format_quantity(flight.scales.capture, 'm')}" if flight.scales.capture else ""
         rows.append((f"{flight.speed:.4g} m/s", f"from {format_quantity(flight.distance, 'm')}{capture}"))
     number, seconds, source = expected_flights(case, flights)
-    told = report.format_wall_time(float(f"{seconds:.2g}"))
-    rows += [("flights", f"about {number:.2g}"), ("wall time", f"about {told} by one worker ({source})"), start]
+    took = report.format_wall_time(float(f"{seconds:.2g}"))
+    rows += [("flights", f"about {number:.2g}"), ("wall time", f"about {took} by one worker ({source})"), start]
     content = {
         "kind": "scattering case",
         "case": files.read_toml(path),
