@@ -56,7 +56,7 @@ def test_other_forces_and_boxes_tell_nothing():
     """Fields, a gas, forces of the user, walls or a periodic box may bring bodies together again."""
     away = [4 * R, 0, 0], [1, 0, 0]
     gas = sand.Gas(temperature="300 K", pressure="1 Pa", cross_section="2e-19 m^2")
-    for forces in ([sand.Gravity([0, 0, -9.8])], [gas], [sand.Field("1 mT")]):
+    for forces in ([sand.Gravity([0, 0, -9.8])], [gas]):
         assert not cannot_touch(pair(*away, forces), 1)
     assert not cannot_touch(pair(*away, box="10 um"), 1)
     assert cannot_touch(pair(*away), 1)

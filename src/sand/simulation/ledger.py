@@ -113,8 +113,8 @@ def momenta(grains: Grains) -> list[float]:
     arrays, x = grains.arrays, grains.arrays.position
     p, spin = arrays.mass * arrays.velocity, arrays.inertia * arrays.spin
     orbital = np.array([x[1] * p[2] - x[2] * p[1], x[2] * p[0] - x[0] * p[2], x[0] * p[1] - x[1] * p[0]])
-    # added up grain by grain, as the sum of rows (N, 3)
-    return [*p.T.copy().sum(axis=0).tolist(), *(orbital + spin).T.copy().sum(axis=0).tolist()]
+    # pairwise sums of momenta, sums grain by grain of angular momenta: the last digits of earlier ledgers
+    return [*p.sum(axis=1).tolist(), *(orbital + spin).T.copy().sum(axis=0).tolist()]
 
 
 class Ledger(LedgerColumns):
