@@ -281,8 +281,13 @@ class Grains:
 
     def copy(self) -> Grains:
         """Return an independent copy."""
-        other = copy.copy(self)
-        other.arrays = GrainArrays(*(a.copy() for a in self.arrays))
+        return self.with_arrays(GrainArrays(*(a.copy() for a in self.arrays)))
+
+    def with_arrays(self, arrays: GrainArrays) -> Grains:
+        """Return grains of the same materials with other arrays."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        object.__setattr__(other, "arrays", arrays)
         return other
 
 

@@ -81,7 +81,7 @@ def scatter(
 
     hidden = quiet or as_json
     with (
-        report.progress_bar(1.0, hidden, bar_format="{percentage:3.0f}% {desc}") as bar,
+        report.progress_bar(1.0, hidden, bar_format=report.LAYOUT) as bar,
         running_job(folder, quiet=quiet, **execution) as (executor, _),
     ):
 

@@ -101,8 +101,9 @@ PLANNED_END = {"until": float, "last_step": int}
 """Numbers of `meta.json` that may be null."""
 TABLES = {"choices": dict, "case": dict, "ledger": list}
 """Tables of `meta.json`."""
-CHANGES = {"case_written": dict, "updaters": list, "own": dict}
-"""Entries of `meta.json` that a run may lack: the case in case.toml, names of updaters, units of own quantities."""
+CHANGES = {"case_written": dict, "updaters": list, "own": dict, "wall_times": dict}
+"""Entries of `meta.json` that a run may lack: the case in case.toml, names of updaters, units of own quantities, and
+parts of the wall time in older files."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
@@ -152,6 +153,13 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
     for name, kind in CHANGES.items():
         if name in meta and not isinstance(meta[name], kind):
             raise BadInput(f"its meta.json has {name} = {meta[name]!r}, which is not a {kind.__name__}")
+    chosen = meta.get("chosen_cadence")
+    if chosen is not None and not (
+        isinstance(chosen, list)
+        and len(chosen) == 2
+        and all(isinstance(each, (int, float)) and 0.0 < each < 1e300 for each in chosen)
+    ):
+        raise BadInput(f"its meta.json has chosen_cadence = {chosen!r}, which is not two times above 0")
     for name, table in TABLES.items():
         if not isinstance(meta.get(name), table):
             raise BadInput(f"its meta.json has {name} = {meta.get(name)!r}, which is not a {table.__name__}")

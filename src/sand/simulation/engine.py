@@ -87,6 +87,12 @@ ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
 """The arrays of a state that stages take, besides those of the grains."""
 
 
+def _set_arrays(table: Table, present: tuple) -> None:
+    """Give a table the arrays of a state."""
+    for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
+        table.set(name, value)
+
+
 @dataclass
 class Engine:
     """The state of a simulation and the compiled driver that advances it.
@@ -132,6 +138,8 @@ class Engine:
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
     _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
+    _copy_table: Table = field(init=False)  # the table of the copy that is stepped to times of output
+    _copy_present: tuple = field(init=False, default=(None,))  # arrays of the state that it has
     _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
@@ -142,6 +150,7 @@ class Engine:
         for name, value in self.parameters._asdict().items():
             self._table.set(name, value)
         self._table.set("scratch", np.zeros(SCRATCH))
+        self._copy_table = Table(PARTS)
         if uses_task_queue(len(self._state.grains)):
             self._workers = WorkerThreads(take_blocks)
 
@@ -215,7 +224,11 @@ class Engine:
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
+        self._copy_present = (None,)  # frees the arrays of the copy before
+        self._copy_table.follow(self._current_table(regular))
         self._state = regular.copy()
+        self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
+        _set_arrays(self._copy_table, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
         try:
             stop = self._drive(time, regular.steps + most_steps, shorten=True)
@@ -253,6 +266,11 @@ class Engine:
     def clock(self) -> np.ndarray:
         """Times and extremes of the regular state, `State.clock`."""
         return self._state.clock
+
+    @property
+    def awake_work(self) -> tuple[int, float]:
+        """Contact steps within steps of bodies, and the wall time [s] of all work on awake clusters."""
+        return 0, 0.0
 
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
@@ -430,9 +448,10 @@ class Engine:
     def _current_table(self, state: State) -> Table:
         """The table with the present arrays of the state."""
         present = (state.grains.arrays, *ARRAYS(state))
+        if all(map(operator.is_, present, self._copy_present)):
+            return self._copy_table
         if not all(map(operator.is_, present, self._present)):
-            for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
-                self._table.set(name, value)
+            _set_arrays(self._table, present)
             self._present = present
         return self._table
 
@@ -486,7 +505,8 @@ class Engine:
         try:
             if self._program is None:
                 self._program = build_program(self._components, self.parameters, table)
-                table.set("program", self._program)
+                for each in (self._table, table):
+                    each.set("program", self._program)
             if self._workers is not None and benefits_from_workers(
                 len(self._components.pair_forces), int(state.count[CONTACTS])
             ):

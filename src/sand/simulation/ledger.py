@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
-from ..analysis.internal_motion import internal_kinetic_energy
+from ..analysis.clusters import labels_of, mean_size
+from ..analysis.internal_motion import internal_energies
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
@@ -41,6 +41,7 @@ WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
 def log_row(
     state: State,
     lost: Sequence[float],
+    labels: np.ndarray,
     of_contacts: Sequence[float],
     forces: dict[str, float],
     walls: Sequence[str] = (),
@@ -51,6 +52,8 @@ def log_row(
     ----------
     lost : Sequence[float]
         Losses [J] up to this time, see `Engine.losses`.
+    labels : ndarray
+        Cluster of each grain (N,).
     of_contacts : Sequence[float]
         Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
     forces : dict[str, float]
@@ -61,7 +64,7 @@ def log_row(
     contacts = int(state.count[CONTACTS])
     pairs = state.contacts.pair[:, :contacts].T
     energies = [*map(math.fsum, kinetic_energies(state.grains)), *of_contacts]
-    counts = count_row(state)
+    counts = count_row(state, labels)
     row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, lost, strict=True))
@@ -71,15 +74,20 @@ def log_row(
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
         CORRECTION: float(state.clock[CORRECTED]),
-        INTERNAL: math.fsum(internal_kinetic_energy(state.grains, pairs, state.box)[0]),
+        INTERNAL: math.fsum(internal_energies(state.grains, pairs, state.box, labels)),
     }
     return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
-def count_row(state: State) -> dict[str, float]:
-    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters."""
+def labels_in(state: State) -> np.ndarray:
+    """Cluster of each grain (N,)."""
+    return labels_of(len(state.grains), state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64))
+
+
+def count_row(state: State, labels: np.ndarray) -> dict[str, float]:
+    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, given their labels."""
     contacts = int(state.count[CONTACTS])
-    labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
+    sizes = np.bincount(labels)
     at_rest = state.at_rest
     return {
         "step": state.steps,
@@ -88,9 +96,9 @@ def count_row(state: State) -> dict[str, float]:
         "made": int(state.count[MADE]),
         "moved": int(state.count[SLIPPED]),
         "broken": int(state.count[BROKEN]),
-        "clusters": int(labels.max()) + 1,
-        "mean_cluster_size": mean_cluster_size(labels),
-        "largest_cluster": int(cluster_sizes(labels).max()),
+        "clusters": len(sizes),
+        "mean_cluster_size": mean_size(sizes),
+        "largest_cluster": int(sizes.max()),
         **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
     }
 
@@ -105,9 +113,11 @@ def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:
 
 def momenta(grains: Grains) -> list[float]:
     """Momentum [kg m/s] and angular momentum about the origin [J s], spins included: six numbers."""
-    p = grains.mass[:, None] * grains.velocity
-    angular = np.cross(grains.position, p) + grains.inertia[:, None] * grains.spin
-    return [*p.sum(axis=0).tolist(), *angular.sum(axis=0).tolist()]
+    arrays, x = grains.arrays, grains.arrays.position
+    p, spin = arrays.mass * arrays.velocity, arrays.inertia * arrays.spin
+    orbital = np.array([x[1] * p[2] - x[2] * p[1], x[2] * p[0] - x[0] * p[2], x[0] * p[1] - x[1] * p[0]])
+    # pairwise sums of momenta, sums grain by grain of angular momenta: the last digits of earlier ledgers
+    return [*p.sum(axis=1).tolist(), *(orbital + spin).T.copy().sum(axis=0).tolist()]
 
 
 class Ledger(LedgerColumns):

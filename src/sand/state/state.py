@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..box import Box
 from ..errors import BadInput
 from ..grains import GrainArrays, Grains
 from ..material import Material
-from ..numerics.simd import all_aligned
+from ..numerics.simd import aligned_copies, all_aligned
 from ..own_quantities import OwnQuantities
 from .arrays import (
     GROWTH,
@@ -182,9 +183,18 @@ class State:
 
     def copy(self) -> State:
         """Independent copy (snapshot)."""
-        copied = {name: type(group)(*(a.copy() for a in group)) for name in GROUPS for group in [getattr(self, name)]}
-        single = {name: getattr(self, name).copy() for name in ("clock", "count", "lost", "cutoff", "order")}
-        return replace(self, grains=self.grains.copy(), **copied, **single)  # __post_init__ aligns the arrays
+        groups = {name: getattr(self, name) for name in GROUPS}
+        single = ("clock", "count", "lost", "cutoff", "order")
+        arrays = [*self.grains.arrays, *(array for group in groups.values() for array in group)]
+        copies = iter(aligned_copies([*arrays, *(getattr(self, name) for name in single)]))
+        other = object.__new__(type(self))  # `replace` would look at the alignment of each array again
+        vars(other).update(vars(self))
+        other.grains = self.grains.with_arrays(type(self.grains.arrays)(*islice(copies, len(self.grains.arrays))))
+        for name, group in groups.items():
+            setattr(other, name, type(group)(*islice(copies, len(group))))
+        for name in single:
+            setattr(other, name, next(copies))
+        return other
 
     def _uniform_arrays(self) -> tuple[str, ...]:
         """Names of arrays with identical columns."""
