@@ -29,8 +29,9 @@ def command(
 ) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 
-    Results are S(t) with its exponent z, moments against size, and the fractal dimension, each with an error from the
-    scatter between boxes. Two DIRs are also compared with each other.
+    Results are S(t) with its exponent z, moments against size, the fractal dimension, and the temperatures of single
+    grains and of clusters, each with an error from the scatter between boxes. Two DIRs are also compared with each
+    other.
     """
     from ..experiments.growth_report import NAMES, compare_growth, ensemble_summary, read_ensemble, write_analysis
 
@@ -74,6 +75,7 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
             ("moments", _law(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
             ("", _law(one, "moment_without_rings", "without rings N^") if one["moment"] else ""),
             ("D_f", _law(one, "dimension", "", " from N(r_g)")),
+            *_temperatures(one["temperatures"]),
         ]
         report.show(one["name"], [row for row in rows if row[1]])
     comparison = content["comparison"]
@@ -86,6 +88,21 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
         report.show(f"{comparison['first']} and {comparison['second']}", rows)
     if folder is not None:
         report.show("files", [("folder", str(folder))])
+
+
+def _temperatures(kinds: dict[str, Any]) -> list[tuple[str, str]]:
+    """Temperatures of single grains and of clusters, a line each."""
+    rows = []
+    for kind, name in (("single", "single grains"), ("clusters", "clusters")):
+        found = kinds.get(kind, {})
+        if found.get("rotation") is None:
+            continue
+        translation, rotation, median = (
+            f"{found[key]:.3g}{_error(math.nan if found[f'{key}_error'] is None else found[f'{key}_error'])} K"
+            for key in ("translation", "rotation", "rotation_median")
+        )
+        rows.append((name, f"translation {translation}, rotation {rotation} (median {median})"))
+    return rows
 
 
 def _error(error: float) -> str:

@@ -1,4 +1,4 @@
-"""Figure of an ensemble of growth simulations: S(t), moments and sizes of aggregates, with the paper's power laws."""
+"""Figure of an ensemble of growth simulations: S(t), moments, sizes and temperatures, with the paper's power laws."""
 
 from __future__ import annotations
 
@@ -16,28 +16,32 @@ from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_
 COLOURS = (RED, BLUE, GREEN, PURPLE)
 PAPER_EXPONENTS = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
 """Exponents of Dominik & Nübold (2002): growth of S (section 3.3), and μ(N) (Figure 1)."""
+TEMPERATURE_STYLES = (("translation", "o-"), ("rotation, mean", "^--"), ("rotation, median", "v:"))
+"""Label and line of each temperature."""
 LEGEND_ROW = 0.1
 """Height of a row of the legend, relative to the range of the data."""
 
 
 def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figure:
-    """Figure of S(t), μ(N) and N(r_g) of one or more ensembles.
+    """Figure of S(t), μ(N), N(r_g) and the temperatures of bodies of one or more ensembles.
 
     Parameters
     ----------
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
         For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
-        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain.
+        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain, and `temperatures` (K, 4), times
+        [s] and `BodyTemperatures` [K].
     """
     with plot_style():
-        figure = Figure(figsize=(9.6, 3.3), layout="constrained")
-        left, middle, right = figure.subplots(1, 3)
+        figure = Figure(figsize=(9.6, 6.2), layout="constrained")
+        (left, middle), (right, last) = figure.subplots(2, 2)
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _draw_growth(left, name, growth, size, colour)
             _draw_moments(middle, growth, rows, colour)
             _draw_dimension(right, growth, rows, colour)
-        for axes in (left, middle, right):
+            _draw_temperatures(last, name, rows["temperatures"], size, colour)
+        for axes in (left, middle, right, last):
             axes.set(xscale="log", yscale="log")
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
@@ -49,11 +53,13 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
         left.legend(loc="upper left")
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
-        for axes, corner in ((middle, "lower right"), (right, "upper left")):
+        last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
+        corners = ((middle, "lower right", "no aggregates"), (right, "upper left", "no aggregates"))
+        for axes, corner, text in (*corners, (last, "best", "all bodies are at rest")):
             if axes.get_legend_handles_labels()[0]:
                 axes.legend(loc=corner)
             else:
-                axes.text(0.5, 0.5, "no aggregates", ha="center", color=MUTED, transform=axes.transAxes)
+                axes.text(0.5, 0.5, text, ha="center", color=MUTED, transform=axes.transAxes)
     return figure
 
 
@@ -110,6 +116,15 @@ def _draw_dimension(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) 
     error = "" if np.isnan(fit.error) else f" ± {fit.error:.2f}"
     text = f"$D_f$ = {fit.value:.2f}{error}"
     axes.plot((n / fit.prefactor) ** (1.0 / fit.value), n, color=TEXT_COLOUR, ls="--", lw=0.9, label=text)
+
+
+def _draw_temperatures(axes: Axes, name: str, rows: np.ndarray, size: float, colour: str) -> None:
+    """Temperatures of translation and rotation over time, of all bodies of the ensemble."""
+    for column, (label, style) in enumerate(TEMPERATURE_STYLES, 1):
+        positive = rows[:, column] > 0.0
+        if positive.any():
+            time, values = rows[positive, 0] / size, rows[positive, column]
+            axes.plot(time, values, style, color=colour, ms=3, lw=1.0, label=f"{name}: {label}")
 
 
 def _with_error(law: Any) -> str:

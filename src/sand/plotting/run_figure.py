@@ -15,7 +15,17 @@ from matplotlib.figure import Figure
 from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
-from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
+from .panels import (
+    draw_balance,
+    draw_clusters,
+    draw_energies,
+    draw_losses,
+    draw_temperatures,
+    draw_time,
+    energy_unit,
+    has_temperatures,
+    time_unit,
+)
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
 from .style import MUTED, RED, format_number, format_si, panel_letter, plot_style
 
@@ -24,6 +34,8 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
+LETTERS = "abcdefg"
+"""Letters of the panels."""
 MIN_GRAIN_RADIUS = 11.0
 """Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
 _METADATA: dict[str, dict[str, Any]] = {
@@ -49,8 +61,9 @@ class RunFigure(Figure):
 def run_figure(simulation: Simulation) -> Figure:
     """Figure of a run so far.
 
-    Left, over time: clusters (Eq. 17), energies, losses by channel, and the energy balance. Right: the grains at the
-    present time with their moments, coloured by cluster; if they are small, the largest clusters again, enlarged.
+    Left, over time: clusters (Eq. 17), energies, losses by channel, the temperatures of the bodies of a run that began
+    with ten or more, and the energy balance. Right: the grains at the present time with their moments, coloured by
+    cluster; if they are small, the largest clusters again, enlarged.
     Energies are in N k_B T₀, or in joules if the grains were initially at rest.
 
     The left half is empty if the ledger has no row, the right half if no position is finite.
@@ -62,7 +75,8 @@ def run_figure(simulation: Simulation) -> Figure:
         if simulation.ledger.rows:
             _draw_history(figure, simulation)
         if scene.label.size:
-            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size)
+            letters = LETTERS[4 + has_temperatures(simulation.ledger) :]
+            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size, letters)
     return figure
 
 
@@ -114,20 +128,24 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    gap = 4 * _GAP / (_TOP - _BOTTOM - 3 * _GAP)  # relative to the mean height of the four panels
+    heights = [1.0, 1.35, 1.1, *([0.8] if has_temperatures(ledger) else []), 0.5]
+    count = len(heights)
+    gap = count * _GAP / (_TOP - _BOTTOM - (count - 1) * _GAP)  # relative to the mean height of the panels
     place = {"left": _LEFT[0], "right": _LEFT[1], "bottom": _BOTTOM, "top": _TOP, "hspace": gap}
-    panels = list(figure.subplots(4, 1, height_ratios=(1.0, 1.35, 1.1, 0.5), gridspec_kw=place))
+    panels = list(figure.subplots(count, 1, height_ratios=heights, gridspec_kw=place))
     draw_clusters(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
-    draw_balance(panels[3], ledger, time, unit)
+    if has_temperatures(ledger):
+        draw_temperatures(panels[3], ledger, time)
+    draw_balance(panels[-1], ledger, time, unit)
     draw_time(panels, time, ledger)
-    for name, axes in zip("abcd", panels, strict=True):
+    for name, axes in zip(LETTERS, panels, strict=False):
         axes.yaxis.set_label_coords(-0.138, 0.5)
         panel_letter(axes, name, -0.185)
 
 
-def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
+def _draw_grains(figure: Figure, scene: Scene, lost: int, letters: str) -> None:
     """All grains in the box, and below it the largest clusters if grains are small; `lost` grains are not drawn."""
     full = (0.03, 0.85)
     window = view_window(scene, _pixels(full[1])[0] / _pixels(full[1])[1])
@@ -137,14 +155,14 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
     bottom, height = (full[0] + strip + 0.02, full[1] - strip - 0.02) if enlarge else full
     axes = _panel(figure, _RIGHT, bottom, height)
     draw_scene(axes, scene, _pixels(height))
-    panel_letter(axes, "e", 0.0)
+    panel_letter(axes, letters[0], 0.0)
     axes.text(
         0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=7.5, color=MUTED, va="bottom", ha="left"
     )
     if enlarge:
         axes = _panel(figure, _RIGHT, full[0], strip)
         draw_largest(axes, scene, _pixels(strip))
-        panel_letter(axes, "f", 0.0)
+        panel_letter(axes, letters[1], 0.0)
 
 
 def _caption(scene: Scene, lost: int) -> str:

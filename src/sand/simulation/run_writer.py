@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.ledger_columns import TEMPERATURES
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
@@ -283,6 +284,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "contacts": last["contacts"],
         **{f"contacts_{name}": last[name] for name in ("made", "moved", "broken")},
         **{name: last[name] for name in ("clusters", "mean_cluster_size", "largest_cluster")},
+        **{name: last.get(name) for name in TEMPERATURES},
         **rigid_clusters(simulation, ledger),
         "dissipated": ledger.dissipated,
         "drift": result.drift,
