@@ -1,6 +1,7 @@
 """Runs with rigid clusters: motion of bodies, conservation, rest and waking, restart, and what is refused."""
 
 import dataclasses
+import itertools
 import json
 import math
 import warnings
@@ -462,12 +463,13 @@ def gaps(grains, step, steps):
 
 
 def compare_first_touches(seed, count):
-    """Number of pairs that touch: all those whose gap closes, when it closes, to 0.5 nm.
+    """Number of pairs that touch: all those whose gap closes, when it closes, to 0.15 nm.
 
-    The rotor errs by (0.3)²/24 of the angle turned, here up to 5 rad: 0.02 rad of 2e-8 m, 0.4 nm; bodies move by 0.1 nm
-    in a step of the brute force.  Those that only graze each other, by less than this, may touch or not.
+    Bodies move by 0.1 nm in a step of the brute force, and the rotor errs by less than 0.1²/12 of the angle turned,
+    here up to 5 rad, times β/|Ω| (`test_errors_of_a_tumbling_body_…`), some 0.1 for trimers: 4e-4 rad of 2e-8 m, 0.01
+    nm.  Those that only graze each other, by less than this, may touch or not.
     """
-    grains, step, error = tumbling_pairs(seed, count), 5e-11, 5e-10
+    grains, step, error = tumbling_pairs(seed, count), 5e-11, 1.5e-10
     gap = gaps(grains, step, 1600)
     sim = sand.Simulation(grains, [contact()], stepping=sand.RigidClusters(), frame_every=1.0)
     sim.run(until=8e-8)
@@ -489,6 +491,44 @@ def compare_first_touches(seed, count):
 def test_tumbling_pairs_touch_first_where_brute_force_has_it():
     """40 pairs of tumbling trimers, 80 ns: no touch is missed or invented, and all are where free tops have them."""
     assert compare_first_touches(1, 40) > 10
+
+
+@pytest.mark.compiled("contacts")
+def test_errors_of_a_tumbling_cluster_fall_with_the_square_of_the_step_fraction():
+    """An L of six grains, near its intermediate axis, turns 9.5 times at rest; the exact rotor: Euler's equations.
+
+    In steps of at most 0.3 rad pieces of the rotation are shorter than asked for with η = 0.2 and 0.1, and twice and
+    four times as short with 0.05 and 0.025: errors fall by four, ± 10 % since steps hold whole numbers of pieces.  The
+    largest is 60 rad of 0.3²·β/12, β = 0.04 of the rate (`test_errors_of_a_tumbling_body_…`), 0.02 of the size.
+    """
+    corner = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [0, 1, 0], [0, 2, 0]], float)
+    s = rest_distance(sand.IRON, 1e-8, 1e-8) * (corner - corner.mean(axis=0))
+    axes = np.linalg.eigh((s**2).sum() * np.eye(3) - s.T @ s)[1]
+    spin = 5e6 * axes @ [0.01, 1.0, 0.01]
+    errors = []
+    for fraction in (0.2, 0.1, 0.05, 0.025):
+        grains = sand.Grains(s, 1e-8, "iron", velocity=np.cross(spin, s), spin=[spin] * 6)
+        stepping = sand.RigidClusters(step_fraction=fraction)
+        sim = sand.Simulation(grains, [contact()], stepping=stepping, frame_every=1.0)
+        at_rest(sim)
+        start, began, bodies = sim.grains.position.copy(), sim.time, sim.regular_state.bodies
+        inertia = bodies.inertia[:, 0]
+        frame = Rotation.from_quat(bodies.orientation[:, 0])
+
+        def rate(_, y, inertia=inertia):
+            angular, turn = y[:3], y[3:].reshape(3, 3)
+            return np.concatenate([np.cross(angular, angular / inertia), (np.cross(turn, angular / inertia)).ravel()])
+
+        begin = np.concatenate([bodies.angular_momentum[:, 0].copy(), frame.as_matrix().ravel()])
+        sim.run(until=began + 12e-6)
+        found = solve_ivp(rate, (0.0, sim.time - began), begin, method="DOP853", rtol=1e-12, atol=1e-40)
+        turn = found.y[3:, -1].reshape(3, 3) @ frame.as_matrix().T
+        centre = start.mean(axis=0)
+        exact = (start - centre) @ turn.T + centre
+        errors.append(np.linalg.norm(sim.grains.position - exact, axis=1).max() / 6e-8)
+    assert errors[0] < 0.02
+    for coarse, fine in itertools.pairwise(errors[1:]):
+        assert coarse / fine == pytest.approx(4.0, rel=0.1, abs=0.0)
 
 
 @pytest.mark.validate

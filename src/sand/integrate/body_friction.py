@@ -28,7 +28,7 @@ from ..forces.gas.drag import decayed_fraction, rotation_friction, thermal_sprea
 from ..numerics.quaternion import turned, turned_back
 from ..numerics.random import normal_vector
 from ..numerics.vec import accrue, add, axpy, dot, load, load4, norm, put, scale, sub
-from ..state.state import BODIES
+from ..state.state import BODIES, STEPS, SUBSTEPS
 from .rigid_body import move_body, place_grains, takes_one_step
 
 STREAM1, STREAM2 = 32, 33
@@ -154,7 +154,7 @@ def kick_body(grains, bodies, b, seed, number, elapsed, gas):
 
 
 @loop
-def drift_bodies_in_gas(grains, bodies, count, span, number, gas, dt, is_wrapped):
+def drift_bodies_in_gas(grains, bodies, count, span, gas, dt, is_wrapped, piece):
     """Half a drift, friction and noise of dt [s], and half a drift, of the bodies that `rigid_body.drift_bodies` moves.
 
     Returns
@@ -162,12 +162,12 @@ def drift_bodies_in_gas(grains, bodies, count, span, number, gas, dt, is_wrapped
     float
         Kinetic energy [J] transferred to the gas.
     """
-    transferred = 0.0
+    transferred, number = 0.0, count[STEPS] + count[SUBSTEPS]
     for b in range(count[BODIES]):
         if takes_one_step(bodies, bodies.member[bodies.start[b]]):
-            move_body(bodies, b, span, 0.5 * dt)
+            move_body(bodies, b, span, 0.5 * dt, piece)
             transferred += kick_body(grains, bodies, b, gas.seed, number, dt, gas.gas)
-            move_body(bodies, b, span, 0.5 * dt)
+            move_body(bodies, b, span, 0.5 * dt, piece)
             place_grains(grains, bodies, b, span, is_wrapped)
     return transferred
 

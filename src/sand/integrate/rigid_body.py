@@ -1,12 +1,17 @@
 """Motion of rigid bodies: the symplectic rotor, and the loops over the bodies of a state.
 
-The rotor is that of Dullweber, Leimkuhler & McLachlan (1997) with quaternions (NO_SQUISH, Miller et al. 2002): a step t
-is the product of rotations about the principal axes of the body,
+The kinetic energy of a rotor with angular momentum L in its own frame is that of a sphere and two terms more,
 
-    Φ₁(t/2) Φ₂(t/2) Φ₃(t) Φ₂(t/2) Φ₁(t/2),   Φ_k(t): q → q exp(a e_k/2), L → Rot(e_k, −a) L, a = t L_k/I_k
+    |L|²/2I₂ + ½ (1/I₁ − 1/I₂) L₁² + ½ (1/I₃ − 1/I₂) L₃².
 
-with the angular momentum L in the body.  It is symplectic, of second order, keeps |L| and, in the laboratory frame, L
-to rounding, and is exact for a sphere.  One step of a body is kick, drift, kick:
+Each alone generates an exact rotation.  That of the sphere commutes with the others, so that it is applied once, Φ₀(t);
+the others are applied in n pieces (a symmetric top and one more axis, as Touma & Wisdom 1994, with quaternions as
+Miller et al. 2002; both cited from memory):
+
+    Φ₀(t) [Φ₁(t/2n) Φ₃(t/n) Φ₁(t/2n)]ⁿ,   Φ_k(t): q → q exp(a e_k/2), L → Rot(e_k, −a) L, a = t (1/I_k − 1/I₂) L_k
+
+It is symplectic, of second order, keeps |L| and, in the laboratory frame, L to rounding, and is exact for a sphere and
+for symmetric bodies such as straight chains.  One step of a body is kick, drift, kick:
 
     P += ½h F, L += ½h RᵀT;   X += h P/M, rotor(h);   new F and T;   P += ½h F, L += ½h RᵀT
 """
@@ -19,8 +24,9 @@ from ..numerics.quaternion import normalised, turned, turned_back
 from ..numerics.vec import accrue, add, axpy, cross, dot, load, load4, norm, put, put4, scale, sub
 from ..state.state import BODIES
 
-LARGEST_PIECE = 0.3
-"""Free rotation is computed in pieces of at most this angle [rad]."""
+LARGEST_PIECE = 0.1
+"""Free rotation is computed in pieces t with t |L| √(…) at most this, see `parting_rate`, and at most η, so that its
+error falls as η²."""
 
 
 @formula
@@ -45,16 +51,6 @@ def _about_first(q, angular, angle):
 
 
 @formula
-def _about_second(q, angular, angle):
-    """As `_about_first`, about the second axis."""
-    s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
-    sine, cosine = 2.0 * s * c, c * c - s * s
-    x, y, z, w = q
-    turned_q = (c * x - s * z, c * y + s * w, c * z + s * x, c * w - s * y)
-    return turned_q, (cosine * angular[0] - sine * angular[2], angular[1], cosine * angular[2] + sine * angular[0])
-
-
-@formula
 def _about_third(q, angular, angle):
     """As `_about_first`, about the third axis."""
     s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
@@ -65,8 +61,8 @@ def _about_third(q, angular, angle):
 
 
 @formula
-def free_rotation(q, angular, inertia, t):
-    """One step of the free rotor.
+def asymmetric_rotation(q, angular, inertia, t):
+    """A step of a free rotor but for the rotation of a sphere with I₂, which commutes with it: Φ₁(t/2) Φ₃(t) Φ₁(t/2).
 
     Parameters
     ----------
@@ -84,12 +80,21 @@ def free_rotation(q, angular, inertia, t):
     tuple
         New orientation and angular momentum.
     """
-    q, angular = _about_first(q, angular, 0.5 * t * angular[0] / inertia[0])
-    q, angular = _about_second(q, angular, 0.5 * t * angular[1] / inertia[1])
-    q, angular = _about_third(q, angular, t * angular[2] / inertia[2])
-    q, angular = _about_second(q, angular, 0.5 * t * angular[1] / inertia[1])
-    q, angular = _about_first(q, angular, 0.5 * t * angular[0] / inertia[0])
+    first, third = t * (1.0 / inertia[0] - 1.0 / inertia[1]), t * (1.0 / inertia[2] - 1.0 / inertia[1])
+    q, angular = _about_first(q, angular, 0.5 * first * angular[0])
+    q, angular = _about_third(q, angular, third * angular[2])
+    q, angular = _about_first(q, angular, 0.5 * first * angular[0])
     return normalised(q), angular
+
+
+@formula
+def parting_rate(inertia):
+    """√((1/I₁ − 1/I₂)(1/I₂ − 1/I₃)) [1/(kg m²)]: times |L|, the rate at which motions about the second axis part.
+
+    It is 0 for symmetric bodies, for which a step of any length is exact.  A piece t of `asymmetric_rotation` errs by
+    about t³|L|³ (1/I₁ − 1/I₂)(1/I₂ − 1/I₃) times the larger of the two differences.
+    """
+    return math.sqrt((1.0 / inertia[0] - 1.0 / inertia[1]) * (1.0 / inertia[1] - 1.0 / inertia[2]))
 
 
 @formula
@@ -157,8 +162,11 @@ def place_velocities(grains, bodies, b):
 
 
 @loop
-def move_body(bodies, b, span, dt):
-    """Move and turn body b by a step of dt [s]; its grains stay where they are."""
+def move_body(bodies, b, span, dt, piece):
+    """Move and turn body b by a step of dt [s]; its grains stay where they are.
+
+    Pieces of the rotation are at most `piece`, in units of the time in which motions about the second axis part.
+    """
     first = bodies.member[bodies.start[b]]
     momentum, mass = load(bodies.momentum, first), bodies.mass[first]
     centre = nearest_image(axpy(dt / mass, momentum, load(bodies.centre, first)), span)
@@ -167,12 +175,12 @@ def move_body(bodies, b, span, dt):
         load(bodies.angular_momentum, first),
         load(bodies.inertia, first),
     )
-    if bodies.start[b + 1] - bodies.start[b] == 1:
-        q = free_sphere(q, angular, inertia[0], dt)
-    else:
-        pieces = int(dt * norm(spin_of(bodies, first)) / LARGEST_PIECE) + 1
+    if bodies.start[b + 1] - bodies.start[b] > 1:
+        # a number that free rotation keeps: pieces of changing length would change the energy
+        pieces = int(dt * norm(angular) * parting_rate(inertia) / piece) + 1
         for _ in range(pieces):
-            q, angular = free_rotation(q, angular, inertia, dt / pieces)
+            q, angular = asymmetric_rotation(q, angular, inertia, dt / pieces)
+    q = free_sphere(q, angular, inertia[1], dt)
     put(bodies.centre, first, centre)
     put4(bodies.orientation, first, q)
     put(bodies.angular_momentum, first, angular)
@@ -205,11 +213,14 @@ def takes_one_step(bodies, first):
 
 
 @loop
-def drift_bodies(grains, bodies, count, span, dt, is_wrapped):
-    """Move and turn all bodies with one step by dt [s], with their grains; `is_wrapped` as in `place_grains`."""
+def drift_bodies(grains, bodies, count, span, dt, is_wrapped, piece):
+    """Move and turn all bodies with one step by dt [s], with their grains.
+
+    `is_wrapped` as in `place_grains`, `piece` as in `move_body`.
+    """
     for b in range(count[BODIES]):
         if takes_one_step(bodies, bodies.member[bodies.start[b]]):
-            move_body(bodies, b, span, dt)
+            move_body(bodies, b, span, dt, piece)
             place_grains(grains, bodies, b, span, is_wrapped)
 
 

@@ -33,7 +33,6 @@ from ..state.state import (
     STAGE,
     STEP,
     STEPS,
-    SUBSTEPS,
     TIME,
 )
 from .body_friction import drift_bodies_in_gas
@@ -43,14 +42,23 @@ from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
 from .parts import Stop
 from .respa import add_long_range_loads
-from .rigid_body import contact_loads_bound, drift_bodies, kick_bodies, move_velocities, spin_of, sum_body_loads
+from .rigid_body import (
+    LARGEST_PIECE,
+    contact_loads_bound,
+    drift_bodies,
+    kick_bodies,
+    move_velocities,
+    spin_of,
+    sum_body_loads,
+)
 from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
 from .step_control import is_close, is_past
 from .substeps import AFTER_ALL, AFTER_SUBSTEPS, choose_shared_step, squared_rate
 from .task_queue import join_workers
 
-LARGEST_TURN = 1.0
-"""Largest rotation of a body in one step [rad], so that loads that turn with it are averaged over six directions."""
+LARGEST_TURN, TURN_PER_FRACTION = 1.0, 10.0
+"""Largest rotation of a body in one step [rad], so that loads that turn with it are averaged over six directions, and
+the same in units of η, so that errors fall as η²."""
 LARGEST_FLIGHT = 0.2
 """Largest flight of a grain in one step, in units of the gap of the pair list, so that no pair is missed."""
 
@@ -92,7 +100,7 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
         if bodies.asleep[first] == 1:
             spin = spin_of(bodies, first)
             rate = squared_rates(grains, bodies, criteria, limits, b)
-            rate = max(rate, dot(spin, spin) * (limits.step_fraction / LARGEST_TURN) ** 2)
+            rate = max(rate, dot(spin, spin) * max(limits.step_fraction / LARGEST_TURN, 1.0 / TURN_PER_FRACTION) ** 2)
             bodies.rate[first] = rate
             square = max(square, rate)
         for k in range(bodies.start[b], bodies.start[b + 1]):
@@ -142,21 +150,22 @@ def any_has_to_wake(bodies, count):
 
 
 @caller
-def drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table, h):
+def drift_with_work(
+    clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, limits, program, table, h
+):  # fmt: skip
     """Move the bodies at rest without substeps; log the work of external forces of time or position, and of a gas.
 
     Grains of awake clusters stay where they are; the change of their energies with time is part of the work.
     """
     start, end, gained = clock[TIME], clock[TIME] + h, 0.0
+    is_wrapped, piece = not external_work.position_dependent, min(LARGEST_PIECE, limits.step_fraction)
     if external_work.time_dependent:
         gained += sum_external(scratch, forces, program, table, end, ENERGY)
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
     if gas.gas.on:
-        lost[GAS] += drift_bodies_in_gas(
-            grains, bodies, count, span, count[STEPS] + count[SUBSTEPS], gas, h, not external_work.position_dependent
-        )
+        lost[GAS] += drift_bodies_in_gas(grains, bodies, count, span, gas, h, is_wrapped, piece)
     else:
-        drift_bodies(grains, bodies, count, span, h, not external_work.position_dependent)
+        drift_bodies(grains, bodies, count, span, h, is_wrapped, piece)
     if external_work.time_dependent:
         gained += sum_external(scratch, forces, program, table, end, ENERGY)
         gained -= sum_external(scratch, forces, program, table, start, ENERGY)
@@ -242,7 +251,9 @@ def first_half(
     if takes_substeps:
         return Stop.SUBSTEPS.value
     kick_bodies(bodies, count, 0.5 * h)
-    drift_with_work(clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table, h)
+    drift_with_work(
+        clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, flight_limits, program, table, h
+    )  # fmt: skip
     count[STAGE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
@@ -297,8 +308,8 @@ def body_steps_until(
             )  # fmt: skip
         elif count[STAGE] == AFTER_SUBSTEPS:
             drift_with_work(
-                clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, program, table,
-                clock[STEP]
+                clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, flight_limits, program,
+                table, clock[STEP]
             )  # fmt: skip
             count[STAGE] = AFTER_ALL
         if stop == Stop.NONE.value:

@@ -23,7 +23,7 @@ from ..compiler.stage import stage
 from ..numerics.vec import add, load, norm, sub
 from ..state.state import BODIES, PAIRS, STEP
 from .body_touches import reach_of_pair
-from .rigid_body import kick_bodies, sum_body_loads
+from .rigid_body import kick_bodies, move_velocities, sum_body_loads
 
 AFTER_SUBSTEPS, AFTER_ALL = 2, 3
 """Values of `STAGE` when the quick bodies have arrived at the end of the step, and when all others have, too."""
@@ -106,6 +106,13 @@ def kick_by_slow_loads(grains, bodies, clock, count):
     """Kick all bodies at rest for half a step, the quick ones by the loads that do not act in substeps."""
     sum_body_loads(grains, bodies, count, False)
     kick_bodies(bodies, count, 0.5 * clock[STEP])
+    return 0
+
+
+@stage("the velocities of grains of bodies at rest")
+def place_all_velocities(grains, bodies, count):
+    """Velocities and spins of the grains of all bodies at rest, from momentum and angular momentum of these."""
+    move_velocities(grains, bodies, count)
     return 0
 
 

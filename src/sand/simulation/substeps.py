@@ -11,7 +11,7 @@ import numpy as np
 from ..compiler.stage import Stage
 from ..contact.gather import resort_contacts_by_grain
 from ..integrate.parts import Stop
-from ..integrate.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads
+from ..integrate.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
 from ..state.arrays import SAVED_BODIES, body_arrays
 from ..state.state import (
     BROKEN,
@@ -69,8 +69,8 @@ class SubstepEngine(RigidEngine):
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """As `RigidEngine._drivers`, with the stages of substeps."""
         vectors = np.zeros((3, 1))
-        own = [(kick_by_slow_loads, ()), (find_slow_rate, (vectors, vectors, np.zeros(1)))]
-        return [*super()._drivers(), *own]
+        plain = [(each, ()) for each in (kick_by_slow_loads, place_all_velocities)]
+        return [*super()._drivers(), *plain, (find_slow_rate, (vectors, vectors, np.zeros(1)))]
 
     def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """As `RigidEngine._call_driver`, with substeps."""
@@ -114,6 +114,8 @@ class SubstepEngine(RigidEngine):
             kick_by_slow_loads.run(self._current_table(state))
             for name in ("momentum", "angular_momentum"):
                 getattr(bodies, name).take(index, axis=1, out=getattr(own.bodies, name))
+            # a body may wake before its first substep: then the velocities of its grains are all that remains
+            place_all_velocities.run(part._current_table(own))
             part.kick_awake(own.bodies.excluded_force, own.bodies.excluded_torque, step)
             stop = part._drive(state.time + step, math.inf, shorten=True)
         finally:
