@@ -1,6 +1,8 @@
 """Energies and temperatures of bodies: clusters of grains in contact, and single grains."""
 
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,8 +10,15 @@ from scipy.stats import gamma
 
 import sand
 from sand.analysis.body_motion import MEDIAN_ENERGY, BodyMotion, body_motion, body_temperatures
+from sand.analysis.ledger_columns import TEMPERATURES, LedgerColumns
 from sand.box import Box
+from sand.cli.main import main
 from sand.constants import BOLTZMANN
+from sand.plotting.panels import has_temperatures
+from sand.plotting.plots import history_figure
+from sand.plotting.run_figure import run_figure
+from sand.simulation.ledger import Ledger
+from sand.viewer.series import series_from_ledger
 
 BOX = Box.periodic(1e-6)
 SIZES = (1, 4, 2, 1, 7)
@@ -160,3 +169,74 @@ def test_a_frame_has_the_temperatures_of_its_state():
     found = body_motion(Stored(), pairs, BOX)
     for name in ("translation", "rotation", "internal"):
         assert getattr(found, name) == pytest.approx(getattr(exact, name), rel=1e-5, abs=1e-30)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.parametrize("stepping", [sand.Verlet(), sand.RigidClusters()], ids=["grains", "rigid"])
+def test_ledger_and_summary(tmp_path, stepping):
+    """The columns of a row are the temperatures of the bodies of its frame, to float32 of the frame; so is the summary.
+
+    A chain of three, a pair across the boundary and twelve single grains; rigid clusters have the same numbers as
+    single grains, because only velocities enter.
+    """
+    rng = np.random.default_rng(2)
+    line, across = [[-2e-8, 0, 0], [0, 0, 0], [2e-8, 0, 0]], [[4.95e-7, 1e-7, 0], [-4.85e-7, 1e-7, 0]]
+    place = np.array([*line, *across, *([3e-7, -4e-7 + 6e-8 * k, 2e-7] for k in range(12))])
+    kicks = {"velocity": 0.2 * rng.normal(size=(17, 3)), "spin": 3e7 * rng.normal(size=(17, 3))}
+    grains = sand.Grains(place, 1.005e-8, sand.IRON, **kicks)
+    contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns")
+    sim = sand.Simulation(grains, [contact], box="1 um", stepping=stepping, out=tmp_path / "run", frame_every="1 ns")
+    sim.run(until="3 ns")
+    run = sand.open(tmp_path / "run")
+    assert run.frames[0].pair.shape[0] == 3
+    for frame, row in zip(run.frames, sim.ledger.rows, strict=True):
+        found = body_temperatures(body_motion(frame, frame.pair, frame.box))
+        assert [row[name] for name in TEMPERATURES] == pytest.approx(list(found), rel=1e-5, abs=0.0)
+    assert [run.summary[name] for name in TEMPERATURES] == [sim.ledger.rows[-1][name] for name in TEMPERATURES]
+    assert has_temperatures(sim.ledger) and len(run_figure(sim).axes) == 8
+
+
+def ledger_rows(bodies=12):
+    """Rows of a ledger with temperatures of 100, 200 and 150 K, growing."""
+    blank = dict.fromkeys(Ledger().columns, 0.0) | {"clusters": bodies, "mean_cluster_size": 1.0, "largest_cluster": 1}
+    told = dict(zip(TEMPERATURES, (100.0, 200.0, 150.0), strict=True))
+    return [blank | {"step": k, "time": 1e-9 * k} | {name: v * (k + 1) for name, v in told.items()} for k in range(4)]
+
+
+def test_curves_are_the_columns():
+    """The figure and the page draw the three columns; with nine bodies they are not in the overview."""
+    ledger = LedgerColumns.from_rows(ledger_rows())
+    lines = history_figure(ledger, "temperatures", 12, 100.0).axes[0].get_lines()
+    (plot,) = (plot for plot in series_from_ledger(ledger)["plots"] if plot["id"] == "temperatures")
+    for line, drawn, name in zip(lines, plot["lines"], TEMPERATURES, strict=True):
+        assert line.get_ydata().tolist() == drawn["values"] == ledger[name].tolist()
+        assert line.get_label() == drawn["label"]
+    assert has_temperatures(ledger) and not has_temperatures(LedgerColumns.from_rows(ledger_rows(9)))
+
+
+def test_ledgers_of_earlier_versions():
+    """Without the columns: no panel, a figure that says so, and a ledger that goes on without them."""
+    earlier = LedgerColumns.from_rows(
+        [{k: v for k, v in row.items() if k not in TEMPERATURES} for row in ledger_rows()]
+    )
+    assert not has_temperatures(earlier)
+    assert "temperatures" not in {plot["id"] for plot in series_from_ledger(earlier)["plots"]}
+    (text,) = history_figure(earlier, "temperatures", 12, 100.0).axes[0].texts
+    assert "earlier version" in text.get_text()
+    ledger = Ledger()
+    ledger.from_array(np.array([[row[name] for name in earlier.columns] for row in earlier.rows]), earlier.columns)
+    assert ledger.columns == earlier.columns and ledger.add(ledger_rows()[-1] | {"time": 1.0})
+    assert ledger.to_array().shape == (5, len(earlier.columns))
+
+
+@pytest.mark.compiled("dipoles")
+def test_a_run_of_an_earlier_version_goes_on(tmp_path, capsys):
+    """Its checkpoint has no such columns; it runs on, and `sand info` and `sand plot` work with it."""
+    folder = tmp_path / "run"
+    shutil.copytree(Path(__file__).parents[1] / "reference" / "run-v10", folder)
+    sand.resume(folder).run(steps=20)
+    assert not set(TEMPERATURES) & set(sand.open(folder).ledger)
+    assert set(TEMPERATURES) <= set(sand.open(folder).summary)
+    for words in (["info", str(folder)], ["plot", str(folder), "--what", "temperatures"]):
+        assert main(words) == 0
+    assert "None" not in capsys.readouterr().out
