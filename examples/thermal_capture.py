@@ -1,9 +1,9 @@
-"""Mean capture rate of two magnetic iron grains whose translation and rotation have temperatures of their own, as a table.
+"""Mean capture rate of two magnetic iron grains whose translation and rotation have different temperatures, as a table.
 
 Run it with:  python examples/thermal_capture.py [RELATIVE_ERROR] [T:E ...]
 Each T:E is a temperature of translation [K] and a mean energy of rotation of each grain [k_B times 1 K]: 100:50 is
-k_B T/2 at 100 K, the spin of Dominik & Nübold (2002); 100:150 is equipartition.  RELATIVE_ERROR of each cross-section is
-0.02 by default; four minutes on one core.
+k_B T/2 at 100 K, the spin of Dominik & Nübold (2002); 100:150 is equipartition.  RELATIVE_ERROR of each cross-section
+is 0.02 by default; four minutes on one core.
 """
 
 import csv
