@@ -70,10 +70,10 @@ def ensemble_summary(one: Ensemble) -> dict[str, Any]:
 
 def _described(found: Temperatures) -> dict[str, Any]:
     """Temperatures of one kind of bodies as an entry of analysis.json; None where unknown."""
-    told: dict[str, Any] = {"bodies": found.bodies}
+    entry: dict[str, Any] = {"bodies": found.bodies}
     for name, value, error in zip(found.value._fields, found.value, found.error, strict=True):
-        told[name], told[f"{name}_error"] = (None if np.isnan(number) else number for number in (value, error))
-    return told
+        entry[name], entry[f"{name}_error"] = (None if np.isnan(number) else number for number in (value, error))
+    return entry
 
 
 def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
