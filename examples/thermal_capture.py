@@ -3,7 +3,7 @@
 Run it with:  python examples/thermal_capture.py [RELATIVE_ERROR] [T:E ...]
 Each T:E is a temperature of translation [K] and a mean energy of rotation of each grain [k_B times 1 K]: 100:50 is
 k_B T/2 at 100 K, the spin of Dominik & Nübold (2002); 100:150 is equipartition.  RELATIVE_ERROR of each cross-section
-is 0.02 by default; four minutes on one core.
+is 0.02 by default; ten minutes on one core.
 """
 
 import csv
@@ -24,7 +24,7 @@ MASS = sand.IRON.density * 4.0 / 3.0 * math.pi * 1e-24
 REDUCED = theory.reduced_mass(MASS)
 NODES = 6
 """Speeds of each mean."""
-DEFAULT = ("100:50", "100:150", "100:300", "100:1000", "100:3750")
+DEFAULT = ("100:50", "100:150", "100:250", "100:500", "100:1000", "100:2000", "100:3700")
 
 
 def mean_rate(temperature, energy, relative_error):

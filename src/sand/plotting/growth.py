@@ -54,8 +54,10 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
         last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
+        low, high = last.get_ylim()
+        last.set_ylim(low, low * (high / low) ** (1.0 + LEGEND_ROW * (3 * len(ensembles) + 1)))
         corners = ((middle, "lower right", "no aggregates"), (right, "upper left", "no aggregates"))
-        for axes, corner, text in (*corners, (last, "best", "all bodies are at rest")):
+        for axes, corner, text in (*corners, (last, "upper left", "all bodies are at rest")):
             if axes.get_legend_handles_labels()[0]:
                 axes.legend(loc=corner)
             else:

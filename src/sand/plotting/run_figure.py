@@ -128,7 +128,7 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    heights = [1.0, 1.35, 1.1, *([0.8] if has_temperatures(ledger) else []), 0.5]
+    heights = [1.0, 1.25, 1.0, 0.8, 0.6] if has_temperatures(ledger) else [1.0, 1.35, 1.1, 0.5]
     count = len(heights)
     gap = count * _GAP / (_TOP - _BOTTOM - (count - 1) * _GAP)  # relative to the mean height of the panels
     place = {"left": _LEFT[0], "right": _LEFT[1], "bottom": _BOTTOM, "top": _TOP, "hspace": gap}
