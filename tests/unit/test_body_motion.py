@@ -10,10 +10,11 @@ from scipy.stats import gamma
 
 import sand
 from sand.analysis.body_motion import MEDIAN_ENERGY, BodyMotion, body_motion, body_temperatures
-from sand.analysis.ledger_columns import TEMPERATURES, LedgerColumns
+from sand.analysis.ledger_columns import LedgerColumns
 from sand.box import Box
 from sand.cli.main import main
 from sand.constants import BOLTZMANN
+from sand.io.ledger_table import TEMPERATURES
 from sand.plotting.panels import has_temperatures
 from sand.plotting.plots import history_figure
 from sand.plotting.run_figure import run_figure

@@ -19,8 +19,6 @@ ALWAYS_LOST = (
 )
 AWAKE = "awake"
 """Column of the number of grains of awake clusters; only with rigid clusters."""
-TEMPERATURES = ("temperature_translation", "temperature_rotation", "temperature_rotation_median")
-"""Columns of the temperatures of bodies, clusters and single grains alike [K], as in `BodyTemperatures`."""
 ROUNDING = 4.0 * np.finfo(float).eps
 """Relative change of the total energy that is attributed to rounding. Bodies at rest of up to 64,000 grains change by
 one unit in the last place."""

@@ -16,9 +16,9 @@ from typing import Any
 
 import click
 
-from ..analysis.ledger_columns import TEMPERATURES
 from ..config.commands import command_for
 from ..errors import BadInput, FilesFailed
+from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml
 
 Rows = list[tuple[str, str]]

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
-from ..analysis.ledger_columns import AWAKE, LOSSES, TEMPERATURES
+from ..analysis.ledger_columns import AWAKE, LOSSES
 from ..constants import BOLTZMANN
+from ..io.ledger_table import TEMPERATURES
 from ..state.state import DAMPING, LOST
 from .style import (
     BLUE,

@@ -10,11 +10,12 @@ import numpy as np
 
 from ..analysis.body_motion import body_motion, body_temperatures
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
-from ..analysis.ledger_columns import AWAKE, LOSSES, TEMPERATURES, LedgerColumns, dissipated_in
+from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
 from ..errors import BadInput
 from ..grains import Grains
+from ..io.ledger_table import TEMPERATURES
 from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from .walls import wall_row
 

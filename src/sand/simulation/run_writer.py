@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.ledger_columns import TEMPERATURES
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
 from ..io.checkpoint import write_checkpoint
 from ..io.damage import sealed
-from ..io.ledger_table import LedgerFile, keep_if_damaged
+from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
