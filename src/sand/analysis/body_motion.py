@@ -59,7 +59,11 @@ def body_motion(grains: Any, pairs: np.ndarray, box: Box) -> BodyMotion:
     BodyMotion
         Of each body, (K,).
     """
-    labels = cluster_labels(len(grains.position), pairs)
+    return motion_of(grains, pairs, box, cluster_labels(len(grains.position), pairs))
+
+
+def motion_of(grains: Any, pairs: np.ndarray, box: Box, labels: np.ndarray) -> BodyMotion:
+    """As `body_motion`, with the cluster of each grain (N,), which is known."""
     mass, inertia = np.asarray(grains.mass, float), _inertia(grains)
     velocity, spin = np.asarray(grains.velocity, float), np.asarray(grains.spin, float)
     count = np.bincount(labels)
