@@ -9,6 +9,7 @@ import tomli_w
 
 import sand
 from sand.cli.main import main
+from sand.constants import BOLTZMANN
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 
@@ -139,6 +140,12 @@ def test_missing_results_give_a_reason(ensembles):
         growth_of([synthetic_box(2, 0.6, 1.4, 1), synthetic_box(2, 0.6, 1.4, 2, grains=10)])
 
 
+def median_rotation(box, chosen):
+    """Median energy of rotation of the chosen bodies of all frames read, over 1.183 k_B [K]."""
+    energies = np.concatenate([motion.rotation[chosen(motion.grains)] for _, motion in box.bodies])
+    return np.median(energies) / (1.1829869421876689 * BOLTZMANN)
+
+
 @pytest.mark.compiled("dipoles")
 def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     """`sand grow` writes what `grow` does; `sand analyse` reports, compares, writes tables and a figure."""
@@ -150,6 +157,12 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     assert main(["analyse", *words, "--out", "told", "--json"]) == 0
     message = json.loads(capsys.readouterr().out)
     assert message["comparison"]["sigma"] > 3
+    boxes = [read_box(one) for one in boxes_in(ensembles / "magnetic")]
+    for kind, chosen in (("single", lambda n: n == 1), ("clusters", lambda n: n > 1)):
+        heat = [median_rotation(box, chosen) for box in boxes]
+        found = message["ensembles"][0]["temperatures"][kind]
+        assert found["rotation_median"] == pytest.approx(np.mean(heat), rel=1e-12, abs=0.0)
+        assert found["rotation_median_error"] == pytest.approx(np.std(heat, ddof=1) / 3**0.5, rel=1e-12, abs=0.0)
     assert message == json.loads((tmp_path / "told" / "analysis.json").read_text())
     assert [one["boxes"] for one in message["ensembles"]] == [3, 3]
     assert message["ensembles"][0]["mean_size"] > 1.5 * message["ensembles"][1]["mean_size"]
@@ -162,7 +175,7 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     assert "--overwrite" in capsys.readouterr().err
     assert main(["analyse", str(ensembles / "magnetic" / "seed-1"), "--window", "1.2", "4"]) == 0
     shown = capsys.readouterr().out
-    assert "1 of 30 grains" in shown and "nan" not in shown
+    assert "1 of 30 grains" in shown and "nan" not in shown and "single grains  translation" in shown
 
 
 @pytest.mark.compiled("dipoles")

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..box import Box
+from .body_motion import body_motion
 from .clusters import cluster_labels, in_one_piece
 
 __all__ = ["internal_kinetic_energy"]
@@ -24,9 +25,22 @@ class RigidMotion(NamedTuple):
 
 def rigid_motion(grains: Any, pairs: np.ndarray, box: Box) -> RigidMotion:
     """The rigid motion of each cluster; arguments as for `internal_kinetic_energy`."""
-    labels, pairs = cluster_labels(len(grains), pairs), np.asarray(pairs, np.int64).reshape(-1, 2)
-    position = in_one_piece(np.array(grains.position), pairs, box, labels)
-    return _motion_of(grains, position, np.arange(len(labels)), labels)
+    label, pairs = cluster_labels(len(grains), pairs), np.asarray(pairs, np.int64).reshape(-1, 2)
+    mass, inertia = np.asarray(grains.mass), np.asarray(grains.inertia)
+    count = int(label.max()) + 1
+
+    def summed(values: np.ndarray) -> np.ndarray:
+        """Sums over the grains of each cluster, of values (…, n): (…, K)."""
+        flat = values.reshape(-1, len(label))
+        return np.array([np.bincount(label, each, count) for each in flat]).reshape(*values.shape[:-1], count)
+
+    position = in_one_piece(np.array(grains.position), pairs, box, label).T
+    velocity, total = np.asarray(grains.velocity).T, summed(mass)
+    s = position - (summed(mass * position) / total)[:, label]
+    u = velocity - (summed(mass * velocity) / total)[:, label]
+    angular = summed(mass * np.cross(s, u, axis=0) + inertia * np.asarray(grains.spin).T)
+    tensor = summed(mass * (s * s).sum(axis=0) + inertia) * np.eye(3)[:, :, None] - summed(mass * s[:, None] * s[None])
+    return RigidMotion(label, np.linalg.solve(tensor.T, angular.T[:, :, None])[:, :, 0].T, s, u)
 
 
 @checked
@@ -53,58 +67,5 @@ def internal_kinetic_energy(grains: Any, pairs: np.ndarray, box: Box) -> tuple[n
     degrees : ndarray
         Internal degrees of freedom of each cluster, (K,).
     """
-    labels = cluster_labels(len(grains), pairs)
-    members = np.bincount(labels)
-    return internal_energies(grains, np.asarray(pairs), box, labels), np.where(members > 1, 6 * members - 6, 0)
-
-
-def internal_energies(grains: Any, pairs: np.ndarray, box: Box, labels: np.ndarray) -> np.ndarray:
-    """The energies of `internal_kinetic_energy`, for clusters whose labels are known."""
-    members = np.bincount(labels)
-    energies = np.zeros(len(members))
-    if len(members) == len(labels):
-        return energies
-    own = np.flatnonzero(members[labels] > 1)  # single grains have none
-    label = (np.cumsum(members > 1) - 1)[labels[own]]
-    position = in_one_piece(np.array(grains.position), np.asarray(pairs, np.int64).reshape(-1, 2), box, labels)
-    motion = _motion_of(grains, position, own, label)
-    # as the energy of velocities relative to the rigid motion, which has no differences of large numbers
-    turning = motion.spin[:, label]
-    v, w = motion.velocity - _cross(turning, motion.offset), np.asarray(grains.spin)[own].T - turning
-    mass, inertia = np.asarray(grains.mass)[own], np.asarray(grains.inertia)[own]
-    energies[members > 1] = np.bincount(label, 0.5 * mass * _square(v) + 0.5 * inertia * _square(w))
-    return energies
-
-
-def _motion_of(grains: Any, position: np.ndarray, own: np.ndarray, label: np.ndarray) -> RigidMotion:
-    """The rigid motion of clusters of the grains `own`, whose positions (N, 3) do not cross the box."""
-    mass, inertia = np.asarray(grains.mass)[own], np.asarray(grains.inertia)[own]
-    count = int(label.max()) + 1
-
-    def summed(values: np.ndarray) -> np.ndarray:
-        """Sums over the grains of each cluster, of values (…, n): (…, K)."""
-        flat = values.reshape(-1, len(own))
-        return np.array([np.bincount(label, each, count) for each in flat]).reshape(*values.shape[:-1], count)
-
-    velocity, spin, position = np.asarray(grains.velocity)[own].T, np.asarray(grains.spin)[own].T, position[own].T
-    total = summed(mass)
-    s = position - (summed(mass * position) / total)[:, label]
-    u = velocity - (summed(mass * velocity) / total)[:, label]
-    angular = summed(mass * _cross(s, u) + inertia * spin)
-    diagonal = mass * _square(s) + inertia
-    tensor = np.empty((count, 3, 3))
-    for i, j in np.ndindex(3, 3):
-        products = mass * s[i] * s[j]
-        tensor[:, i, j] = summed(diagonal - products if i == j else 0.0 - products)
-    return RigidMotion(label, np.linalg.solve(tensor, angular.T[:, :, None])[:, :, 0].T, s, u)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (3, n)."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def _square(a: np.ndarray) -> np.ndarray:
-    """Squares of vectors (3, n)."""
-    found: np.ndarray = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    return found
+    motion = body_motion(grains, pairs, box)
+    return motion.internal, np.where(motion.grains > 1, 6 * motion.grains - 6, 0)

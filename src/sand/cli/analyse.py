@@ -44,9 +44,9 @@ def command(
 ) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 
-    Results are S(t) with its exponent z and local degree λ(S) = d ln(dS/dt)/d ln S, moments against size, and the
-    fractal dimension, each with an error from the scatter between boxes; that of z includes the unknown kernel. Two
-    DIRs are also compared with each other.
+    Results are S(t) with its exponent z and local degree λ(S) = d ln(dS/dt)/d ln S, moments against size, the fractal
+    dimension, and the temperatures of single grains and of clusters, each with an error from the scatter between boxes;
+    that of z includes the unknown kernel. Two DIRs are also compared with each other.
     """
     from ..experiments.growth_report import NAMES, compare_growth, ensemble_summary, read_ensemble, write_analysis
 
@@ -89,6 +89,7 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
             ("moments", _law(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
             ("", _law(one, "moment_without_rings", "without rings N^") if one["moment"] else ""),
             ("D_f", _law(one, "dimension", "", " from N(r_g)")),
+            *_temperatures(one["temperatures"]),
         ]
         report.show(one["name"], [row for row in rows if row[1]])
     comparison = content["comparison"]
@@ -117,6 +118,21 @@ def _local_degrees(one: dict[str, Any]) -> str:
         f"{found['degree']:.2f}{_error(found['error'])} (S {found['low_size']:.3g} to {found['high_size']:.3g})"
         for found in one["local_degrees"]
     )
+
+
+def _temperatures(kinds: dict[str, Any]) -> list[tuple[str, str]]:
+    """Temperatures of single grains and of clusters, a line each."""
+    rows = []
+    for kind, name in (("single", "single grains"), ("clusters", "clusters")):
+        found = kinds.get(kind, {})
+        if found.get("rotation") is None:
+            continue
+        translation, rotation, median = (
+            f"{found[key]:.3g}{_error(math.nan if found[f'{key}_error'] is None else found[f'{key}_error'])} K"
+            for key in ("translation", "rotation", "rotation_median")
+        )
+        rows.append((name, f"translation {translation}, rotation {rotation} (median {median})"))
+    return rows
 
 
 def _error(error: float) -> str:

@@ -146,10 +146,11 @@ def command(
 ) -> None:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
-    WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
-    a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with the
-    moment of their cluster), field_alignment, material, at_rest (with rigid clusters), or an own quantity of the run,
-    such as temperature. As a colour of grains, size is the number of grains in their cluster.
+    WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
+    QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
+    alignment (of moments with the moment of their cluster), field_alignment, material, at_rest (with rigid clusters),
+    or an own quantity of the run, such as temperature. As a colour of grains, size is the number of grains in their
+    cluster.
     """
     from ..io.run_folder import make_folder, replace_file
 

@@ -18,6 +18,7 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput, FilesFailed
+from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml
 
 Rows = list[tuple[str, str]]
@@ -326,6 +327,7 @@ def results(summary: dict[str, Any]) -> Rows:
             f"{summary['contacts']} ({summary['contacts_made']} made, {summary['contacts_moved']} moved, "
             f"{summary['contacts_broken']} broken)",
         ),
+        *temperatures(summary),
         ("energy drift", f"{summary['drift']:.2g} of the dissipated and kinetic energy"),
         ("wall time", wall_time(summary)),
     ]
@@ -362,6 +364,15 @@ def clusters(row: dict[str, Any]) -> str:
     return (
         f"{int(row['clusters'])}, mean size S = {row['mean_cluster_size']:.4g}, largest {int(row['largest_cluster'])}"
     )
+
+
+def temperatures(row: dict[str, Any]) -> Rows:
+    """Temperatures of the bodies at one time, from a summary or a row of the ledger; none from older ones."""
+    found = [row.get(name) for name in TEMPERATURES]
+    if row["clusters"] < 2 or None in found:
+        return []
+    translation, rotation, median = (f"{value:.3g} K" for value in found)
+    return [("bodies", f"translation {translation}, rotation {rotation} (median {median})")]
 
 
 def format_wall_time(seconds: float) -> str:

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..analysis.body_motion import body_temperatures
 from ..analysis.fits import separation
 from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
-from .growth import BoxResult, GrowthResult, all_aggregates, boxes_in, growth_of, read_box
+from .growth import BoxResult, GrowthResult, Temperatures, all_aggregates, boxes_in, growth_of, joined, read_box
 
 NAMES = ("analysis.json", "growth.csv", "degrees.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
@@ -64,7 +65,16 @@ def ensemble_summary(one: Ensemble) -> dict[str, Any]:
         **{name: None if law is None else law._asdict() for name, law in laws.items()},
         "local_degrees": None if growth.local_degrees is None else [one._asdict() for one in growth.local_degrees],
         "missing": growth.missing,
+        "temperatures": {kind: _described(found) for kind, found in growth.temperatures.items()},
     }
+
+
+def _described(found: Temperatures) -> dict[str, Any]:
+    """Temperatures of one kind of bodies as an entry of analysis.json; None where unknown."""
+    entry: dict[str, Any] = {"bodies": found.bodies}
+    for name, value, error in zip(found.value._fields, found.value, found.error, strict=True):
+        entry[name], entry[f"{name}_error"] = (None if np.isnan(number) else number for number in (value, error))
+    return entry
 
 
 def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
@@ -104,8 +114,18 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     drawn = []
     for one in ensembles:
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
-        drawn.append((one.name, one.growth, all_aggregates(one.boxes) | units))
+        rows = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
+        drawn.append((one.name, one.growth, rows))
     save(growth_figure(drawn, guides), folder / NAMES[4])
+
+
+def temperatures_over_time(boxes: Sequence[BoxResult]) -> np.ndarray:
+    """Rows of time [s] and `BodyTemperatures` [K] of all bodies of all boxes, one for each frame read, (K, 4)."""
+    rows = []
+    for looks in zip(*(box.bodies for box in boxes), strict=False):
+        together = joined([motion for _, motion in looks])
+        rows.append([float(np.mean([time for time, _ in looks])), *body_temperatures(together)])
+    return np.array(rows).reshape(-1, 4)
 
 
 def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Figure of an ensemble of growth simulations: S(t), local degree, moments, sizes, and the paper's power laws."""
+"""Figure of an ensemble of growth simulations: S(t), local degree, moments, sizes, temperatures; the paper's laws."""
 
 from __future__ import annotations
 
@@ -16,29 +16,34 @@ from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, legend_above, p
 COLOURS = (RED, BLUE, GREEN, PURPLE)
 PAPER_EXPONENTS = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
 """Exponents of Dominik & Nübold (2002): growth of S (section 3.3), and μ(N) (Figure 1)."""
+TEMPERATURE_STYLES = (("translation", "o-"), ("rotation, mean", "^--"), ("rotation, median", "v:"))
+"""Label and line of each temperature."""
 
 
 def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: bool = False) -> Figure:
-    """Figure of S(t), λ(S), μ(N) and N(r_g) of one or more ensembles.
+    """Figure of S(t), λ(S), μ(N), N(r_g) and the temperatures of bodies of one or more ensembles.
 
     Parameters
     ----------
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
         For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
-        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain.
+        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain, and `temperatures` (K, 4), times
+        [s] and `BodyTemperatures` [K].
     guides : bool, optional
         Whether lines show the power laws of the paper.
     """
     with plot_style():
-        figure = Figure(figsize=(9.6, 6.2 + 0.6 * len(ensembles)), layout="constrained")
-        (left, degrees), (middle, right) = figure.subplots(2, 2)
+        figure = Figure(figsize=(14.4, 6.2 + 0.6 * len(ensembles)), layout="constrained")
+        (left, degrees, last), (middle, right, unused) = figure.subplots(2, 3)
+        unused.set_axis_off()
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _draw_growth(left, name, growth, size, colour, guides)
             _draw_degrees(degrees, name, growth, colour)
             _draw_moments(middle, growth, rows, colour, guides)
             _draw_dimension(right, growth, rows, colour)
-        for axes in (left, middle, right):
+            _draw_temperatures(last, name, rows["temperatures"], size, colour)
+        for axes in (left, middle, right, last):
             axes.set(xscale="log", yscale="log")
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
@@ -51,8 +56,11 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
         degrees.xaxis.set_minor_formatter(NullFormatter())
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
+        last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
         empty = "no aggregates"
-        for axes, text in ((left, empty), (middle, empty), (right, empty), (degrees, "$S$ grows too little")):
+        texts = {degrees: "$S$ grows too little", last: "all bodies are at rest"}
+        for axes in (left, degrees, last, middle, right):
+            text = texts.get(axes, empty)
             if axes.get_legend_handles_labels()[0]:
                 legend_above(axes)
             else:
@@ -140,6 +148,15 @@ def _exponent(law: Any) -> str:
     if np.isnan(law.low):
         return value
     return f"{value} (95 %: " + (f"> {law.low:.2f})" if np.isinf(law.high) else f"{law.low:.2f} to {law.high:.2f})")
+
+
+def _draw_temperatures(axes: Axes, name: str, rows: np.ndarray, size: float, colour: str) -> None:
+    """Temperatures of translation and rotation over time, of all bodies of the ensemble."""
+    for column, (label, style) in enumerate(TEMPERATURE_STYLES, 1):
+        positive = rows[:, column] > 0.0
+        if positive.any():
+            time, values = rows[positive, 0] / size, rows[positive, column]
+            axes.plot(time, values, style, color=colour, ms=3, lw=1.0, label=f"{name}: {label}")
 
 
 def _with_error(law: Any) -> str:

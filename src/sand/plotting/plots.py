@@ -22,6 +22,7 @@ from .panels import (
     draw_contacts,
     draw_energies,
     draw_losses,
+    draw_temperatures,
     draw_time,
     energy_unit,
     time_unit,
@@ -38,6 +39,7 @@ _DRAW: dict[str, Callable[[Axes, Any, AxisUnit, AxisUnit], None]] = {
     "losses": draw_losses,
     "contacts": lambda axes, ledger, time, _: draw_contacts(axes, ledger, time),
     "balance": draw_balance,
+    "temperatures": lambda axes, ledger, time, _: draw_temperatures(axes, ledger, time),
 }
 HISTORY = tuple(_DRAW)
 """Names of the figures over time."""

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..analysis.body_motion import body_temperatures, motion_of
 from ..analysis.clusters import labels_of, mean_size
-from ..analysis.internal_motion import internal_energies
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
 from ..errors import BadInput
 from ..grains import Grains
+from ..io.ledger_table import TEMPERATURES
 from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from .walls import wall_row
 
@@ -29,6 +30,8 @@ INTERNAL = "internal"
 """Column of the kinetic energy of clusters beyond their rigid motion; a part of the kinetic energies."""
 CORRECTION = "angular_momentum_corrected"
 """Column of the corrections that keep the angular momentum constant over r-RESPA cycles, their magnitudes summed."""
+OF_MOTION = (*MOMENTA, CORRECTION, INTERNAL, *TEMPERATURES)
+"""Columns of the motion that are not part of the total energy."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 LOST_WALLS = "lost_walls"
 """Column of the energy that moving walls took from grains and contacts; only with walls."""
@@ -46,7 +49,7 @@ def log_row(
     forces: dict[str, float],
     walls: Sequence[str] = (),
 ) -> dict[str, float]:
-    """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
+    """Compute one row of the ledger: energies, losses [J], momenta (SI), temperatures of bodies [K], counts.
 
     Parameters
     ----------
@@ -72,10 +75,9 @@ def log_row(
     row |= moved
     row["total"] = math.fsum([*energies, *forces.values(), *lost, *moved.values()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
-    row |= {
-        CORRECTION: float(state.clock[CORRECTED]),
-        INTERNAL: math.fsum(internal_energies(state.grains, pairs, state.box, labels)),
-    }
+    bodies = motion_of(state.grains, pairs, state.box, labels)
+    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal)}
+    row |= dict(zip(TEMPERATURES, body_temperatures(bodies), strict=True))
     return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
@@ -136,13 +138,13 @@ class Ledger(LedgerColumns):
     def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, rigid: bool = False):
         others = [name for name in forces if name != MAGNETIC]
         self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if rigid else NUMBERS
-        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, AWAKE}
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
         if taken := [name for name in walls if name in {*own, *forces, LOST_WALLS, MAGNETIC}]:
             raise BadInput(f"walls: '{taken[0]}' is a column of the ledger; give this wall another name")
         lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
-        of_state = (*lost, "total", *MOMENTA, CORRECTION, INTERNAL, *numbers, *walls)
+        of_state = (*lost, "total", *OF_MOTION, *numbers, *walls)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
@@ -169,10 +171,10 @@ class Ledger(LedgerColumns):
     def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
         """Restore the rows from the array of `to_array`; raises BadInput if it lacks a column of this ledger.
 
-        Further columns are those of forces that a change left out. Without the column `awake`, as in checkpoints of
-        versions that did not have it, the ledger goes on without it.
+        Further columns are those of forces that a change left out. Without the column `awake` or the temperatures of
+        bodies, as in checkpoints of versions that did not have them, the ledger goes on without them.
         """
-        if not set(columns) >= set(self.columns) - {AWAKE}:
+        if not set(columns) >= set(self.columns) - {AWAKE, *TEMPERATURES}:
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
@@ -189,7 +191,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, AWAKE}
+        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *OF_MOTION, *NUMBERS, AWAKE}
         others |= set(self.walls)
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])

@@ -17,7 +17,7 @@ from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
 from ..io.checkpoint import write_checkpoint
 from ..io.damage import sealed
-from ..io.ledger_table import LedgerFile, keep_if_damaged
+from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
@@ -288,6 +288,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         **{f"contacts_{name}": last[name] for name in ("made", "moved", "broken")},
         **{name: last[name] for name in ("clusters", "mean_cluster_size", "largest_cluster")},
         "largest_overlap": float(simulation.regular_state.clock[LARGEST_OVERLAP]),
+        **{name: last.get(name) for name in TEMPERATURES},
         **rigid_clusters(simulation, ledger),
         "dissipated": ledger.dissipated,
         "drift": result.drift,

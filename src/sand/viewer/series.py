@@ -10,8 +10,18 @@ from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import AWAKE, LedgerColumns
 from ..analysis.quantities import measured
 from ..errors import BadInput
+from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import plain
-from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
+from ..plotting.panels import (
+    CHANNEL_LABELS,
+    COUNTS,
+    TEMPERATURE_LINES,
+    column,
+    energies_drawn,
+    has_temperatures,
+    losses_drawn,
+    peak,
+)
 from ..plotting.style import BLUE, MUTED, ON_DARK, RED, SKY, TEXT_COLOUR
 
 MAX_POINTS = 2000
@@ -38,7 +48,7 @@ def series_from_ledger(ledger: LedgerColumns) -> dict[str, Any]:
     """Plots and contact events from a ledger; a plot whose columns are missing is left out."""
     thinned = ledger.select(evenly_spaced(len(ledger)))
     plots = []
-    for plot in (_clusters, _energies, _losses, _contacts, _balance, _awake):
+    for plot in (_clusters, _energies, _losses, _contacts, _balance, _temperatures, _awake):
         try:
             plots.append(plot(thinned))
         except (KeyError, ValueError):  # a ledger of another version
@@ -84,6 +94,12 @@ def _clusters(ledger: Any) -> dict[str, Any]:
 
 def _awake(ledger: LedgerColumns) -> dict[str, Any]:
     return _plot("awake", "Awake grains", [_line("grains of awake clusters", RED, column(ledger, AWAKE))])
+
+
+def _temperatures(ledger: LedgerColumns) -> dict[str, Any]:
+    drawn = zip(TEMPERATURES, TEMPERATURE_LINES, strict=True) if has_temperatures(ledger) else ()
+    lines = [_line(label, colour, column(ledger, name)) for name, (label, colour) in drawn]
+    return _plot("temperatures", "Temperatures of bodies", lines, "K", log=True)
 
 
 def _energies(ledger: LedgerColumns) -> dict[str, Any]:
