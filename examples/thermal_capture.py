@@ -3,7 +3,7 @@
 Run it with:  python examples/thermal_capture.py [RELATIVE_ERROR] [T:E ...]
 Each T:E is a temperature of translation [K] and a mean energy of rotation of each grain [k_B times 1 K]: 100:50 is
 k_B T/2 at 100 K, the spin of Dominik & Nübold (2002); 100:150 is equipartition.  RELATIVE_ERROR of each cross-section
-is 0.02 by default; ten minutes on one core.
+is 0.02 by default.
 """
 
 import csv

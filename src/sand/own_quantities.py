@@ -29,6 +29,7 @@ RESERVED = frozenset(
             "overlaps",
             "touching",
             "own_units",
+            "with_arrays",
             "with_own",
             "copy",
             "grains",
@@ -63,7 +64,19 @@ RESERVED = frozenset(
         ),
         # quantities and figures of `sand plot`, and other variables of `Run.to_xarray`
         *("cluster", "size", "coordination", "speed", "kinetic_energy", "alignment", "field_alignment"),
-        *("load", "mode", "energies", "losses", "contacts", "balance", "still", "frame", "grain", "axis"),
+        *(
+            "load",
+            "mode",
+            "energies",
+            "losses",
+            "contacts",
+            "balance",
+            "temperatures",
+            "still",
+            "frame",
+            "grain",
+            "axis",
+        ),
         # columns of exported files
         *("species", "pos", "positions", "velo", "radii", "moments", "dipole", "charges", "type", "x", "y", "z"),
     }

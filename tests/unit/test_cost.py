@@ -160,6 +160,7 @@ def test_contact_steps_of_rigid_clusters_follow_the_touches():
     assert brief.awake <= 1e-15 / steps.contact_step(sim) * (1.0 + 1e-12)
 
 
+@pytest.mark.compiled("small")  # two examples build aggregates
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.toml")))
 def test_every_example_has_an_estimate(name, capsys):
     """A wall time of each example of `sand run`, `sand grow`, `sand collide` and `sand scatter`, with no run before."""
