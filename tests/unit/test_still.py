@@ -156,6 +156,7 @@ def test_pixels_per_inch_change_the_print_alone():
         still_picture(frame, dpi=10)
 
 
+@pytest.mark.slow
 def test_pictures_are_reproducible():
     """Two pictures of a frame are equal byte for byte, as PNG, PDF and SVG."""
     from sand.plotting.run_figure import figure_bytes

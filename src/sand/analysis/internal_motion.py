@@ -15,12 +15,11 @@ __all__ = ["internal_kinetic_energy"]
 
 
 class RigidMotion(NamedTuple):
-    """The rigid motion of K clusters, and of their n grains relative to it."""
+    """The rigid motion of K clusters of n grains."""
 
     label: np.ndarray  # (n,) cluster of each grain
     spin: np.ndarray  # (3, K) Ω = J⁻¹ L of each cluster [rad/s]
     offset: np.ndarray  # (3, n) s, from the centre of mass of the cluster [m]
-    velocity: np.ndarray  # (3, n) relative to that of the centre of mass [m/s]
 
 
 def rigid_motion(grains: Any, pairs: np.ndarray, box: Box) -> RigidMotion:
@@ -40,7 +39,7 @@ def rigid_motion(grains: Any, pairs: np.ndarray, box: Box) -> RigidMotion:
     u = velocity - (summed(mass * velocity) / total)[:, label]
     angular = summed(mass * np.cross(s, u, axis=0) + inertia * np.asarray(grains.spin).T)
     tensor = summed(mass * (s * s).sum(axis=0) + inertia) * np.eye(3)[:, :, None] - summed(mass * s[:, None] * s[None])
-    return RigidMotion(label, np.linalg.solve(tensor.T, angular.T[:, :, None])[:, :, 0].T, s, u)
+    return RigidMotion(label, np.linalg.solve(tensor.T, angular.T[:, :, None])[:, :, 0].T, s)
 
 
 @checked

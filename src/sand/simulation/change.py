@@ -39,7 +39,7 @@ from ..state.state import (
     grains_from_arrays,
 )
 from ..units import si
-from .assemble import build_engine
+from .assemble import build_engine, fitting_forces
 from .changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
 from .checks import outside_box
 from .driven import Driven, kept_driven, refuse_changed_motion
@@ -397,6 +397,7 @@ def changed_engine(
     cutoff = None if change.box != state.box or state.cutoff[CUT_RADIUS] == 0.0 else state.cutoff.copy()
     arrays = {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
     same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
+    forces = fitting_forces(forces, engine.stepping)
     parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed)
     new = build_engine(*parts, fresh=False, cutoff=cutoff, driven=driven, walls=walls)
     without = [name for name in new.columns() if name not in columns]

@@ -38,7 +38,7 @@ PER_PAIR, PER_EWALD_PAIR, PER_WAVE = 2e-9, 5e-9, 3.5e-9
 """Wall times [s] of a long-range sum for each grain and pair, and for each grain and wave vector."""
 PER_BODY_STEP, PER_AWAKE_STEP = 10e-6, 3e-6
 """Wall times [s] of a step of bodies, and of a contact step of awake clusters."""
-PER_OUTPUT, PER_OUTPUT_GRAIN = 0.5e-3, 2e-6
+PER_OUTPUT, PER_OUTPUT_GRAIN = 2e-3, 2.7e-6
 """Wall times [s] of a frame and its row, and of each grain in it."""
 START, FIGURE = 1.0, 1.5
 """Wall times [s] of the start of a run, with imports and compiled code from the disk, and of the figure at its end."""
@@ -105,8 +105,8 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
         getattr(found, mode) * step_seconds(simulation, mode, found.contacts, sums) * speeds[mode] for mode in MODES
     )
     span = min(end, found.span)
-    output = outputs(simulation, span, found.total) * (PER_OUTPUT + PER_OUTPUT_GRAIN * grains) * speeds["output"]
-    parts = {"stepping": stepping, "output": output, "start": (START + FIGURE) * speeds["output"]}
+    output = outputs(simulation, span, found.total) * (PER_OUTPUT + PER_OUTPUT_GRAIN * grains)
+    parts = {"stepping": stepping, "output": output, "start": START + FIGURE}
     rigid = isinstance(simulation.stepping, RigidClusters)
     return Cost(
         span / found.total,
@@ -158,7 +158,7 @@ def _speeds(kind: str) -> tuple[dict[str, float], str]:
     known = table.get(kind, {})
     every = [one["ratio"] for runs in table.values() for one in runs.values()]
     machine = math.exp(math.fsum(map(math.log, every)) / len(every)) if every else 1.0
-    speeds = {mode: known[mode]["ratio"] if mode in known else machine for mode in MODES} | {"output": machine}
+    speeds = {mode: known[mode]["ratio"] if mode in known else machine for mode in MODES}
     if known:
         return speeds, "as in a run of this kind on this machine"
     return speeds, "as in other runs on this machine" if every else ""

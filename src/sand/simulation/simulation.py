@@ -42,6 +42,7 @@ from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
 from .solid_limits import extreme_warnings, grain_warnings
 from .stop import StopCriteria, stop_criteria
+from .truncation import truncation_warnings
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
 from .wall_clock import WallClock
@@ -429,6 +430,8 @@ class Simulation(ReadOnlySettings):
         start = self.grains.copy()
         for name, value in {"forces": forces, "box": change.box, "driven": driven, "start": start}.items():
             object.__setattr__(self, name, value)
+        for text in truncation_warnings(self.grains, forces, change.box):
+            self._warn(text, text.partition(",")[0])
         if change.regroups:  # the description of the grains in a case file no longer holds
             self.recipe = None
         engine.regular_state.lost[OUTSIDE] += before - self._log_row()["total"]

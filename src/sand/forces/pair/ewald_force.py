@@ -195,7 +195,8 @@ class EwaldForce(CutoffForce):
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box.
 
-        "auto" stays in an open box, too, so that a change to a periodic one sums all images.
+        "auto" stays in all boxes if no cut-off is given, so that a change to a periodic one sums all images.
         """
-        as_given = self.uses_ewald(grains, box) or (self.periodic == "auto" and box.is_open)
+        free = self.periodic == "auto" and not self._given("cutoff", "cut")
+        as_given = free or self.uses_ewald(grains, box)
         return self.parameters() if as_given else super().resolved(grains, box)
