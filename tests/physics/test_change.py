@@ -280,3 +280,21 @@ def test_a_box_that_cuts_a_contact_is_refused():
     assert sim.state.count[CONTACTS] == 1
     gap = sim.grains.overlaps(np.array([[0, 1]]), sim.box)[0]
     assert gap == pytest.approx(grains.overlaps(np.array([[0, 1]]), sand.Box.periodic(0.4e-6))[0], abs=1e-21)
+
+
+@pytest.mark.compiled("dipoles")
+def test_charges_sum_all_images_after_a_change_to_a_periodic_box():
+    """From an open box and from a slab: forces are those of a new simulation, bit by bit; a slab is warned of."""
+    grains = sand.setup.gas(8, None, extent=1e-6, radius=1e-8, material="silica", temperature="300 K", seed=1)
+    charge = 8e-19 * np.where(np.arange(8) % 2, 1.0, -1.0)
+    given = {"velocity": grains.velocity, "charge": charge}
+    grains, slab = sand.Grains(grains.position, 1e-8, "silica", **given), sand.Box.periodic(1.2e-6, 1.2e-6, None)
+    whole = sand.Simulation(grains, [sand.Contact(), sand.Charges()], box=1.2e-6).loads()
+    for before in (sand.Box.open(), slab):
+        sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], box=before)
+        with sim.change() as change:
+            change.box = 1.2e-6
+        assert (sim.loads()["force"] == whole["force"]).all() and np.abs(whole["force"]).max() > 0.0
+        with sim.change() as change:
+            change.box = slab
+        assert any("ends an interaction that is not small" in text for text in sim.warnings)

@@ -165,6 +165,17 @@ def test_a_frame_with_nan_is_refused(collision_run):
         sand.setup.from_frame(frame, {"silica": sand.SILICA})
 
 
+@pytest.mark.compiled("small")
+def test_a_frame_without_contacts_starts_a_run(tmp_path):
+    """The first frame of a gas: grains as they were, no contact."""
+    grains = sand.setup.gas(5, 1e-6, radius=1e-8, material="iron", temperature="100 K", seed=1)
+    sand.Simulation(grains, [sand.Contact()], box=1e-6, out=tmp_path / "gas").run(steps=1)
+    start = sand.setup.from_frame(sand.open(tmp_path / "gas").frames[0])
+    again = sand.Simulation(start.grains, [sand.Contact()], box=start.box, contacts=start.contacts)
+    again.run(steps=1)
+    assert len(again.contacts) == 0 and len(again.grains) == 5
+
+
 def test_overlap_by_rounding_makes_no_contact():
     """Two grains with a tiny gap that overlap once rounded are separated again."""
     positions = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
