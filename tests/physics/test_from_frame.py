@@ -170,7 +170,7 @@ def test_a_frame_without_contacts_starts_a_run(tmp_path):
     """The first frame of a gas: grains as they were, no contact."""
     grains = sand.setup.gas(5, 1e-6, radius=1e-8, material="iron", temperature="100 K", seed=1)
     sand.Simulation(grains, [sand.Contact()], box=1e-6, out=tmp_path / "gas").run(steps=1)
-    start = sand.setup.from_frame(sand.open(tmp_path / "gas").frames[0])
+    start = sand.setup.from_frame(sand.open(tmp_path / "gas").frames[0], {"iron": sand.IRON})
     again = sand.Simulation(start.grains, [sand.Contact()], box=start.box, contacts=start.contacts)
     again.run(steps=1)
     assert len(again.contacts) == 0 and len(again.grains) == 5
