@@ -173,7 +173,7 @@ def test_a_frame_without_contacts_starts_a_run(tmp_path):
     start = sand.setup.from_frame(sand.open(tmp_path / "gas").frames[0], {"iron": sand.IRON})
     again = sand.Simulation(start.grains, [sand.Contact()], box=start.box, contacts=start.contacts)
     again.run(steps=1)
-    assert len(again.contacts) == 0 and len(again.grains) == 5
+    assert len(again.contacts["pair"]) == 0 and len(again.grains) == 5
 
 
 def test_overlap_by_rounding_makes_no_contact():
