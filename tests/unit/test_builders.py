@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 import sand
 from sand.cli.main import main
-from sand.config.build import body_from_file
+from sand.setup.from_file import body_from_file
 from sand.contact.jkr import rest_overlap, rest_radius
 from sand.contact.mixing import pairing_between
 from sand.io.bodies import read_body, write_body
