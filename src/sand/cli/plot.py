@@ -131,6 +131,7 @@ def _bonds(given: str | None) -> str | None:
 @click.option("--transparent", is_flag=True, help="Transparent background.")
 @click.option("--dark", is_flag=True, help="Dark background.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@options.reading
 @options.output
 def command(
     source: str,
@@ -143,7 +144,9 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
+    """Draw the run in DIR: figures over time, a still picture of a frame, histograms over grains.
+
+    DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
     a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with the
@@ -154,7 +157,8 @@ def command(
 
     folder, names = _place(Path(source), what, out, form, overwrite)
     how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
-    pictures = _draw(_open_source(Path(source)), names, frame, form, how)
+    given = {name: how.pop(name) for name in ("radius", "length", "material")}
+    pictures = _draw(_open_source(Path(source), given), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)
     paths = [folder / f"{name}.{form}" for name in names]
@@ -188,18 +192,16 @@ def _place(
     return folder, names
 
 
-def _open_source(path: Path) -> Source:
-    """Open a run or a trajectory.  Raises BadInput if there is none of SAND."""
-    from ..io.trajectory import Frames
+def _open_source(path: Path, given: Mapping[str, Any]) -> Source:
+    """Open a run, a trajectory or a file of grains.  Raises BadInput."""
+    from ..io.file_frames import open_frames
     from ..results import Run
 
-    if not path.is_file():
-        run = Run(path)
-        return Source(path, run.frames, run)
-    frames = Frames(path)
-    if not frames.written_by_sand:
-        raise BadInput(f"{path} is not a trajectory of SAND, or has no frame")
-    return Source(path, frames, None)
+    if path.is_file():
+        return Source(path, open_frames(path, **given), None)
+    options.refuse_reading(path, given)
+    run = Run(path)
+    return Source(path, run.frames, run)
 
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:

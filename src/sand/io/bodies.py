@@ -23,6 +23,7 @@ from .trajectory import Frames, TrajectoryWriter
 
 SINGLE = 6e-8
 """Relative rounding error of single precision, in which trajectories store masses."""
+OPEN = Box.open()
 SUFFIXES = (".xyz", ".extxyz", ".gsd")
 
 
@@ -34,6 +35,8 @@ class ReadGrains(NamedTuple):
     centre: np.ndarray | None  # (3,) centre of this box [m]; None if the file states none
     contacts: tuple[np.ndarray, np.ndarray] | None  # pairs (C, 2) and overlaps [m], in frames of SAND
     notes: tuple[str, ...]
+    time: float | None = None  # [s], if the file states it
+    step: int | None = None
 
 
 MASSES = 1e3
@@ -62,8 +65,8 @@ def read_grains(
     radius : float or str, optional
         Radius [m] of all grains, for a file without radii.
     length : str or None, optional
-        Unit of length of the file, "1 nm" for example. Default: the one that the file states; 1 Å in XYZ; 1 m in columns
-        and in LAMMPS files that state no unit. GSD of other programs needs it.
+        Unit of length of the file, "1 nm" for example. Default: the one that the file states; 1 Å in XYZ; 1 m in
+        columns and in LAMMPS files that state no unit. GSD of other programs needs it.
     materials : Mapping[str, Material], optional
         Materials that the file may name.
     otherwise : Material or None, optional
@@ -74,17 +77,19 @@ def read_grains(
     Raises
     ------
     BadInput
-        If the file is missing or in no such format, has lines that are not numbers (the first ten are named), grains with
-        impossible numbers, quantities without a unit, no radii or two, no such frame, or unknown materials.
+        If the file is missing or in no such format, has lines that are not numbers (the first ten are named), grains
+        with impossible numbers, quantities without a unit, no radii or two, no such frame, or unknown materials.
     """
     file = Path(path)
     if is_gsd(file) and (found := _read_own_gsd(file, frame)) is not None:
         data, contacts = found
     else:
         opened, contacts = open_grains(path), None
-        if not -opened.count <= frame < opened.count:
-            raise BadInput(f"{path} has {opened.count} frames, from 0 to {opened.count - 1}; there is no {frame}")
-        data = opened.frame(frame % opened.count)
+        if not -opened.frame_count <= frame < opened.frame_count:
+            raise BadInput(
+                f"{path} has {opened.frame_count} frames, from 0 to {opened.frame_count - 1}; there is no {frame}"
+            )
+        data = opened.frame(frame % opened.frame_count)
         if data.unit is None and length is None:
             raise BadInput(
                 f"{path} ({opened.form}) does not state its unit of length; give it: length = '1 um', for example"
@@ -95,7 +100,7 @@ def read_grains(
     assert unit is not None
     grains = _grains_of(path, data, unit, radius, (material, materials, otherwise))
     box, centre = _box_of(data, unit)
-    return ReadGrains(grains, box, centre, contacts, tuple(data.notes))
+    return ReadGrains(grains, box, centre, contacts, tuple(data.notes), data.time, data.step)
 
 
 def _grains_of(
@@ -128,10 +133,10 @@ def _grains_of(
             mass = np.where(kept_masses(given["mass"], before) == before, grains.mass, mass)
         ratio = np.asarray(mass) / grains.mass
         if (far := np.flatnonzero(~((ratio > 1.0 / MASSES) & (ratio < MASSES)))).size:
-            k = far[0]
+            k, name = far[0], grains.materials[grains.material[far[0]]].name
             raise BadInput(
-                f"mass of grain {k} is {mass[k]:.3g} kg, but a sphere of {grains.materials[grains.material[k]].name} of "
-                f"its radius has {grains.mass[k]:.3g} kg; give masses in kg, or leave them out"
+                f"mass of grain {k} is {mass[k]:.3g} kg, but a sphere of {name} of its radius has "
+                f"{grains.mass[k]:.3g} kg; give masses in kg, or leave them out"
             )
         return Grains(data.position * unit, size, kinds, own=own, **(given | {"mass": mass}))
     except BadInput as error:
@@ -257,9 +262,9 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     return target
 
 
-def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
-    """Table of the unstrained contacts of grains in open space, by column, as `TrajectoryWriter.write` takes it."""
-    pair, overlap = grains.touching(Box.open())
+def contacts_of(grains: Grains, box: Box = OPEN) -> dict[str, np.ndarray]:
+    """Table of the unstrained contacts of grains, by column, as `TrajectoryWriter.write` takes it."""
+    pair, overlap = grains.touching(box)
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)

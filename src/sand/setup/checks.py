@@ -13,6 +13,8 @@ MOST_OVERLAP = (2.0, 1e-3)
 """Largest initial overlap: the larger of 2 δ0 and 1e-3 of the smaller radius."""
 MOST_GAP = 1e-3
 """Largest gap, in smaller radii of the pair, of grains in a file that are in contact: coordinates are rounded."""
+SAME_PLACE = 1e-6
+"""Distance of centres, in radii of the smallest grain, up to which two grains are at the same place."""
 MOST_MESSAGES = 10
 """Number of errors that are listed."""
 
@@ -20,6 +22,15 @@ MOST_MESSAGES = 10
 def most_overlap(rest: np.ndarray | float, smaller: np.ndarray | float) -> np.ndarray:
     """Largest allowed initial overlap [m] for an equilibrium overlap and a smaller radius of the pair [m]."""
     return np.maximum(MOST_OVERLAP[0] * np.asarray(rest), MOST_OVERLAP[1] * np.asarray(smaller))
+
+
+def at_same_place(grains: Grains, box: Box) -> list[str]:
+    """Messages about the first ten pairs of grains at the same place, between which no force has a direction."""
+    pairs = box.close_pairs(grains.position, SAME_PLACE * float(grains.radius.min()))
+    problems = [
+        f"grains {i} and {j} are at the same place; leave one of them out, or move it" for i, j in pairs[:MOST_MESSAGES]
+    ]
+    return first_problems(problems, len(pairs), "such pairs")
 
 
 def pairs_in_contact(grains: Grains, box: Box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -51,21 +62,17 @@ def refuse_excess(grains: Grains, pairs: np.ndarray, overlap: np.ndarray, rest: 
     BadInput
         One line for each of the first ten such pairs.
     """
+    if same := at_same_place(grains, Box.open()):
+        raise BadInput(f"{origin}: {problem}" for problem in same)
     most = most_overlap(rest, grains.radius[pairs].min(axis=1))
-    distance = grains.radius[pairs].sum(axis=1) - overlap
+    wrong = np.flatnonzero(overlap > most)
     problems = [
-        f"{origin}: grains {pairs[k, 0]} and {pairs[k, 1]} are at the same place: leave one of them out"
-        if distance[k] <= SAME_PLACE * grains.radius[pairs[k]].min()
-        else f"{origin}: grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m, at most {most[k]:.3g} m is "
+        f"{origin}: grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m, at most {most[k]:.3g} m is "
         "allowed: move them apart"
-        for k in np.flatnonzero(overlap > most)
+        for k in wrong[:MOST_MESSAGES]
     ]
     if problems:
-        raise BadInput(first_problems(problems[:MOST_MESSAGES], len(problems), "overlapping pairs"))
-
-
-SAME_PLACE = 1e-6
-"""Distance of centres, in smaller radii of the pair, up to which two grains are at the same place."""
+        raise BadInput(first_problems(problems, len(wrong), "overlapping pairs"))
 
 
 def refuse_pieces(grains: Grains, pairs: np.ndarray, box: Box, origin: str) -> None:

@@ -66,9 +66,9 @@ def body_from_file(path: str | Path, *arguments: Any, **named: Any) -> Grains:
         make_whole(grains, pairs, found.box, str(path))
     mean = np.average(grains.velocity, axis=0, weights=grains.mass)
     if np.linalg.norm(mean) > EXACT * float(np.linalg.norm(grains.velocity, axis=1).max()):
+        speed = format_quantity(float(np.linalg.norm(mean)), "m/s")
         notes.append(
-            f"{path}: the velocity of its centre of mass, {format_quantity(float(np.linalg.norm(mean)), 'm/s')}, is not "
-            "used; velocities relative to it are"
+            f"{path}: velocities are used relative to that of the centre of mass, which is {speed} in the file"
         )
     grains.arrays.velocity[...] -= mean[:, None]
     _tell(notes)
@@ -173,7 +173,11 @@ def make_whole(grains: Grains, pairs: np.ndarray, box: Box, origin: str) -> bool
         if before[k] != count:
             position[k] = position[before[k]] + box.nearest(position[k] - position[before[k]])
     apart = position[pairs[:, 0]] - position[pairs[:, 1]]
-    if (wrong := np.flatnonzero(np.abs(apart - box.nearest(apart)).max(axis=1, initial=0.0) > 1e-6 * grains.radius.max())).size:
+    if (
+        wrong := np.flatnonzero(
+            np.abs(apart - box.nearest(apart)).max(axis=1, initial=0.0) > 1e-6 * grains.radius.max()
+        )
+    ).size:
         i, j = pairs[wrong[0]]
         raise BadInput(
             f"{origin}: the cluster of grains {i} and {j} touches its own image across the box, {box.describe()}, and "

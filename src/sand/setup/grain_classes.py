@@ -251,7 +251,9 @@ def members_of(
     sizes = np.array([len(body) for body in bodies])
     grains = combined(bodies, [np.zeros(3)] * count, [np.zeros(3)] * count)
     if given.charge is not None and grains.charge.any():
-        raise BadInput(f"charge: {given.file} has the charges of its grains; leave charge out, or give it to other classes")
+        raise BadInput(
+            f"charge: {given.file} has the charges of its grains; leave charge out, or give it to other classes"
+        )
     if given.charge is not None:
         grains.arrays.charge[:] = given.charge
     for name in ("velocity", "spin"):

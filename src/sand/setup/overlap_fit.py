@@ -23,13 +23,12 @@ class Fit(NamedTuple):
     residue: float  # largest difference of an overlap from the wanted one [m]
 
 
-def fit_overlaps(
-    position: np.ndarray, radius: np.ndarray, box: Box, pair: np.ndarray, overlap: np.ndarray
-) -> Fit:
+def fit_overlaps(position: np.ndarray, radius: np.ndarray, box: Box, pair: np.ndarray, overlap: np.ndarray) -> Fit:
     """Move grains so that the overlaps of pairs come as close to the wanted ones as possible.
 
-    Gauss–Newton iteration for the least sum of squares of the differences; of all such positions those with the smallest
-    displacements. In a cluster without rings all overlaps are met. Other pairs that would come to overlap are separated.
+    Gauss–Newton iteration for the least sum of squares of the differences; of all such positions those with the
+    smallest displacements. In a cluster without rings all overlaps are met. Other pairs that would come to overlap are
+    separated.
 
     Parameters
     ----------
@@ -50,11 +49,12 @@ def fit_overlaps(
         fresh = [p for p in overlapping(x, size, scaled) if p not in known]
         known |= set(fresh)
         parted = np.concatenate([parted, np.array(fresh, dtype=np.int64).reshape(-1, 2)])
-        lacking, n = deficit(x, np.concatenate([pair, parted]), np.concatenate([target, size[parted].sum(axis=1)]), scaled)
+        constrained = np.concatenate([pair, parted])
+        lacking, n = deficit(x, constrained, np.concatenate([target, size[parted].sum(axis=1)]), scaled)
         free = np.arange(len(lacking)) >= len(pair)
         use = ~free | (lacking >= 0.0)
         lacking = np.where(free, lacking + APART, lacking)
-        shift = least_shift(np.concatenate([pair, parted])[use], n[use], lacking[use], len(x))
+        shift = least_shift(constrained[use], n[use], lacking[use], len(x))
         x = x + shift
         if not len(pair) or np.abs(shift).max() <= CONVERGED:
             break

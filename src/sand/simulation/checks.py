@@ -11,6 +11,7 @@ from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
+from ..setup.checks import at_same_place
 from ..units import format_quantity
 from .limits import limit_warnings
 from .solid_limits import fast_settling, grain_warnings
@@ -23,6 +24,12 @@ NEAREST = 8
 """Nearest neighbours of a grain, itself included, that are checked for overlaps."""
 OVERLAP_TOLERANCE = 1e-3
 """Overlap, in radii of the smaller grain, that counts as rounding where there is no contact law."""
+
+
+def _of_a_start(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """Errors of positions and cut-offs at a new start."""
+    outside = outside_box(grains, box)
+    return [*outside, *([] if outside else at_same_place(grains, box)), *_short_cutoffs(grains, forces, box)]
 
 
 def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
@@ -43,7 +50,7 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
     BadInput
         With all problems.
     """
-    problems = [*outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
+    problems = _of_a_start(grains, forces, box) if fresh else []
     warnings: list[str] = []
     for force in forces:
         try:

@@ -18,8 +18,8 @@ __all__ = ["FileBox", "GrainData", "GrainFile", "is_gsd", "open_grains"]
 def open_grains(path: str | Path) -> GrainFile:
     """Open a file of grains that is no trajectory of SAND; its content tells the format, not its name.
 
-    Formats: plain and extended XYZ, LAMMPS data and dump, GSD, columns (also CSV, MSTM, FracVAL), and those of ASE if it
-    is installed.
+    Formats: plain and extended XYZ, LAMMPS data and dump, GSD, columns (also CSV, MSTM, FracVAL), and those of ASE if
+    it is installed.
 
     Raises
     ------

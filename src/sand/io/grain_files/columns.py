@@ -132,8 +132,10 @@ def _words(text: str) -> list[str]:
 
 
 def _header(text: str) -> tuple[list[str], dict[str, str]] | None:
-    """Names of columns, and the units of some, as `x [nm], y [nm], z [nm], r [nm]`; None if x, y, z are not among them."""
-    cells = [cell.strip().strip("\"'") for cell in re.split(r"[;,]", text.strip())] if re.search(r"[;,]", text) else [text]
+    """Names of columns and units, as in `x [nm], y [nm], z [nm]`; None if x, y, z are not among them."""
+    cells = (
+        [cell.strip().strip("\"'") for cell in re.split(r"[;,]", text.strip())] if re.search(r"[;,]", text) else [text]
+    )
     found = [_NAME.fullmatch(cell) if len(cells) > 1 else None for cell in cells]
     pairs = [(m[1], m[2]) if m else (cell, None) for m, cell in zip(found, cells, strict=True)]
     if len(cells) == 1:

@@ -51,9 +51,12 @@ UNITS = {
 }
 """Units of SI of the quantities that are not lengths."""
 DERIVED = frozenset(
-    "id type types species symbol symbols element elements numbers index particle mol cluster c_cluster cluster_id "
-    "force forces fx fy fz torque torques tqx tqy tqz field fields ix iy iz images energy stress tags "
-    "orientation orientations quaternion".split()
+    (
+        *("id", "type", "types", "species", "symbol", "symbols", "element", "elements", "numbers", "index", "particle"),
+        *("mol", "cluster", "c_cluster", "cluster_id", "tags", "orientation", "orientations", "quaternion", "images"),
+        *("force", "forces", "torque", "torques", "field", "fields", "energy", "stress"),
+        *("fx", "fy", "fz", "tqx", "tqy", "tqz", "ix", "iy", "iz"),
+    )
 )
 """Names of columns that number grains, or that SAND computes itself; they are not read."""
 LENGTHS = ("position", "radius", "diameter")
@@ -93,6 +96,10 @@ class GrainData:
         Messages about quantities that cannot be kept.
     sizes_assumed : bool
         Whether the radii are those that the format defines for a file without any.
+    time : float or None
+        Time [s], if the file states it.
+    step : int or None
+        Number of the step, if the file states it.
     """
 
     position: np.ndarray
@@ -105,13 +112,15 @@ class GrainData:
     notes: list[str] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     sizes_assumed: bool = False
+    time: float | None = None
+    step: int | None = None
 
 
 class GrainFile(NamedTuple):
     """A file of grains: its format, and its frames, each read on access."""
 
     form: str
-    count: int
+    frame_count: int
     frame: Callable[[int], GrainData]
 
 

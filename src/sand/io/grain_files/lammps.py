@@ -123,7 +123,9 @@ def _atom_columns(path: Any, line: int, style: str, width: int) -> list[str]:
     if not words and width in (5, 8):
         words = ["atomic"]
     if words[:1] == ["hybrid"] and words[1:] and all(word in IN_HYBRID for word in words[1:]):
-        names = list(dict.fromkeys(["id", "type", "x", "y", "z", *(c for w in words[1:] for c in IN_HYBRID[w].split())]))
+        names = list(
+            dict.fromkeys(["id", "type", "x", "y", "z", *(c for w in words[1:] for c in IN_HYBRID[w].split())])
+        )
     elif len(words) == 1 and words[0] in ATOMS:
         names = ATOMS[words[0]].split()
     else:
@@ -194,7 +196,9 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
     names = (atoms or "ATOMS").split()[1:]
     begin = items.get(atoms or "", first) + 1
     if not names or begin + count > end:
-        raise BadInput(f"{path}, line {first + 1}: the snapshot lacks some of its {count} atoms, or their columns' names")
+        raise BadInput(
+            f"{path}, line {first + 1}: the snapshot lacks some of its {count} atoms, or their columns' names"
+        )
     walls = [word for word in (bounds or "").split()[2:] if word[:1] in "pfsm" and word not in ("xy", "xz", "yz")]
     x, y, z = (k < len(walls) and walls[k].startswith("p") for k in range(3))
     if "xy" in (bounds or "") and any((x, y, z)):
@@ -217,6 +221,8 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
                 columns[axis] = low[k] + values * (high[k] - low[k]) if scaled else values
     data = _in_si(path, columns, units, by_sand=False)
     data.box = FileBox(low, high, (x, y, z))
+    told = lines[first + 1].split()
+    data.step = int(told[0]) if len(told) == 1 and told[0].isdecimal() else None
     return data
 
 

@@ -50,8 +50,8 @@ def _of_snapshot(path: Path, stored: Any) -> GrainData:
     for name, values in moving.items():
         if values is not None and np.any(values):
             data.refused.append(
-                f"{path}: its {name} are in units that the file does not state; set them to 0, or write the grains with "
-                "numbers in SI as columns '# x y z r vx vy vz'"
+                f"{path}: its {name} are in units that the file does not state; set them to 0, or write the grains in "
+                "SI, as columns '# x y z r vx vy vz'"
             )
     if p.mass is not None and np.ptp(p.mass) > 0.0:
         data.notes.append(f"{path}: masses are not read, the file states no unit; they follow from radius and material")
@@ -73,7 +73,7 @@ def read_by_ase(path: Path) -> GrainFile:
     ImportError
         If ASE is not installed.
     """
-    import ase.io
+    import ase.io  # type: ignore[import-not-found]
 
     try:
         if (form := ase.io.formats.filetype(str(path), guess=False)) not in BY_ASE:
@@ -89,8 +89,14 @@ def read_by_ase(path: Path) -> GrainFile:
 
 def _of_atoms(path: Path, atoms: Any) -> GrainData:
     radius = atoms.arrays.get("radius", atoms.arrays.get("radii"))
-    data = GrainData(np.asarray(atoms.positions, float), None if radius is None else np.asarray(radius, float), ANGSTROM)
-    for name, given in (("momenta", "momenta"), ("initial_charges", "charges"), ("initial_magmoms", "magnetic moments")):
+    data = GrainData(
+        np.asarray(atoms.positions, float), None if radius is None else np.asarray(radius, float), ANGSTROM
+    )
+    for name, given in (
+        ("momenta", "momenta"),
+        ("initial_charges", "charges"),
+        ("initial_magmoms", "magnetic moments"),
+    ):
         if np.any(atoms.arrays.get(name, 0.0)):
             data.refused.append(f"{path}: its {given} are in units of atoms, which are not read; remove them")
     cell = np.asarray(atoms.cell)

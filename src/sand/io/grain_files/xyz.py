@@ -22,7 +22,9 @@ def is_xyz(lines: list[str]) -> bool:
         return True
     words = lines[2].split() if len(lines) > 2 else []
     try:
-        return len(words) >= 4 and not words[0][0].isdigit() and len(numbers(words[1:4])) == 3 and not _is_number(words[0])
+        return (
+            len(words) >= 4 and not words[0][0].isdigit() and len(numbers(words[1:4])) == 3 and not _is_number(words[0])
+        )
     except ValueError:
         return False
 
@@ -93,6 +95,9 @@ def _read_frame(path: Any, lines: list[str], first: int, count: int) -> GrainDat
         columns["material"] = _named(path, columns["material"], head["materials"])
     data = data_of(columns, unit, place=place, own=own)
     data.box = _box(place, head)
+    if head.get("other_units") == "SI" and _is_number(head.get("Time", "")):
+        data.time = numbers([head["Time"]])[0]
+    data.step = int(head["Step"]) if head.get("Step", "").isdecimal() else None
     if head.get("other_units") != "SI" and (kept := [q for q in data.given if np.any(data.given[q])]):
         data.notes.append(f"{path} states no units of {' and '.join(kept)}: they are taken in SI")
     return data
