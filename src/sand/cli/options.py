@@ -84,7 +84,7 @@ def reading(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --radius, --length and --material of commands that read files of grains of other programs."""
     radius = click.option("--radius", metavar="LENGTH", help="Radius of the grains of a file without radii.")
     length = click.option("--length", metavar="LENGTH", help="Unit of length of a file of another program, as '1 nm'.")
-    material = click.option("--material", metavar="NAME", help="Material of the grains of a file that names none.")
+    material = click.option("--material", metavar="NAME", help="Material of a file that names none (silica).")
     return radius(length(material(command)))
 
 

@@ -262,9 +262,12 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     return target
 
 
-def contacts_of(grains: Grains, box: Box = OPEN) -> dict[str, np.ndarray]:
-    """Table of the unstrained contacts of grains, by column, as `TrajectoryWriter.write` takes it."""
-    pair, overlap = grains.touching(box)
+def contacts_of(grains: Grains, box: Box = OPEN, gap: float = 0.0) -> dict[str, np.ndarray]:
+    """Table of the unstrained contacts of grains, by column, as `TrajectoryWriter.write` takes it.
+
+    `gap`: as in `Grains.touching`.
+    """
+    pair, overlap = grains.touching(box, gap)
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import BadInput, warn
+from ..grains import ROUNDED
 from ..material import PRESETS, SILICA, Material, as_material
 from .bodies import contacts_of, read_grains
 from .frame import Frame, FrameSequence, stored_frame
@@ -65,8 +66,8 @@ class _Known(Mapping[str, Material]):
 class FileFrames(FrameSequence):
     """Frames of a file of grains that is no trajectory of SAND, with the interface of `LiveTrajectory`.
 
-    Grains that touch are in contact. Masses of grains of unknown materials are those of silica, unless the file has
-    masses; a note says so. Frames without a time are one second apart.
+    Grains that touch, up to the rounding of coordinates, are in contact. Masses of grains of unknown materials are
+    those of silica, unless the file has masses; a note says so. Frames without a time are one second apart.
 
     Parameters
     ----------
@@ -80,6 +81,7 @@ class FileFrames(FrameSequence):
     """
 
     incomplete = generation = 0
+    age = 0.0
 
     @checked
     def __init__(self, path: Path, radius: Any = None, length: str | None = None, material: Any = None):
@@ -106,7 +108,7 @@ class FileFrames(FrameSequence):
             if found.centre is not None:  # boxes of SAND have their centre at the origin
                 found.grains.arrays.position[...] -= found.centre[:, None]
             time = float(number) if found.time is None else found.time
-            contacts = contacts_of(found.grains, found.box)
+            contacts = contacts_of(found.grains, found.box, ROUNDED)
             step = number if found.step is None else found.step
             self._kept[number] = Frame(stored_frame(step, time, found.grains, found.box, contacts, exact=True))
         return self._kept[number]
@@ -121,6 +123,10 @@ class FileFrames(FrameSequence):
     def pairs(self, index: int) -> np.ndarray:
         """Grains in contact (C, 2) of a frame ≥ 0."""
         return self[index].pair
+
+    def identities(self, index: int) -> np.ndarray:
+        """Identities (N,) of the grains of a frame ≥ 0."""
+        return self[index].id
 
     @cached_property
     def times(self) -> np.ndarray:

@@ -6,13 +6,11 @@ import numpy as np
 
 from ..box import Box
 from ..errors import BadInput, first_problems
-from ..grains import Grains
+from ..grains import ROUNDED, Grains
 from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)
 """Largest initial overlap: the larger of 2 δ0 and 1e-3 of the smaller radius."""
-MOST_GAP = 1e-3
-"""Largest gap, in smaller radii of the pair, of grains in a file that are in contact: coordinates are rounded."""
 SAME_PLACE = 1e-6
 """Distance of centres, in radii of the smallest grain, up to which two grains are at the same place."""
 MOST_MESSAGES = 10
@@ -36,12 +34,9 @@ def at_same_place(grains: Grains, box: Box) -> list[str]:
 def pairs_in_contact(grains: Grains, box: Box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs (C, 2) of grains of a file that are in contact, their overlaps, and those of equilibrium (C,) [m].
 
-    Gaps up to `MOST_GAP` of the smaller radius count as contacts, because coordinates in files are rounded.
+    Gaps up to `ROUNDED` of the smaller radius count as contacts.
     """
-    pairs = box.close_pairs(grains.position, 2.0 * float(grains.radius.max()) * (1.0 + 0.5 * MOST_GAP))
-    overlap = grains.overlaps(pairs, box)
-    found = overlap >= -MOST_GAP * grains.radius[pairs].min(axis=1)
-    pairs, overlap = pairs[found], overlap[found]
+    pairs, overlap = grains.touching(box, ROUNDED)
     grain_set = grain_set_of(grains.radius, [grains.materials[k] for k in grains.material])
     rest = grains.radius[pairs].sum(axis=1) - rest_distances(grain_set, pairs[:, 0], pairs[:, 1])
     return pairs, overlap, rest
