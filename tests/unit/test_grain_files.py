@@ -65,6 +65,10 @@ TEXTS = {
         "3\nProperties=species:S:1:pos:R:3:radius:R:1 length_unit=nm\n" + rows("Si {:.9f} {} {} 100"),
         None,
     ),
+    "CSV with text": (
+        "id,name,x,y,z,r\n" + "".join(f"{k},s{k},{x:.9f},0,0,100\n" for k, (x, _, _) in enumerate(NM)),
+        "1 nm",
+    ),
     "LAMMPS data": (LAMMPS + "".join(f"{k} 1 2e-7 2650 {x * 1e-9!r} 0 0\n" for k, (x, _, _) in enumerate(NM, 1)), None),
     "LAMMPS dump": (
         DUMP.format(5, "id type radius xs ys zs")
@@ -254,8 +258,8 @@ def test_rings_are_fitted_by_least_squares(tmp_path):
     """Of a triangle all three overlaps are met; of a hexagon with a small grain the sum of squares is least.
 
     Six grains round a seventh have twelve distances for eleven free coordinates in their plane: a radius that differs
-    by 8e-4 leaves a residue. It is the least possible where the sum of squares has no slope: at each grain the sum of the
-    differences times the directions of the contacts is zero.
+    by 8e-4 leaves a residue. It is the least possible where the sum of squares has no slope: at each grain the sum of
+    the differences times the directions of the contacts is zero.
     """
     path = tmp_path / "a"
     path.write_text("0 0 0 1\n2.0003 0 0 1\n1 1.7325 0 1\n")
@@ -335,7 +339,7 @@ CASE = (
 
 @pytest.mark.compiled("contacts", "small")
 def test_a_gas_starts_from_a_file(tmp_path, monkeypatch, capsys):
-    """Free grains, two bodies, and the velocities of the file; a class of a gas refuses charges that are given twice."""
+    """Free grains, a body, and the velocities of the file; a radius beside a trajectory is refused."""
     monkeypatch.chdir(tmp_path)
     Path("gas").write_text(
         "# x y z r vx vy vz\n" + rows("{:.9f} {} {} 100 0 0 0") + "0 800 0 100 0 0 3\n0 -900 0 100 0 0 0\n"

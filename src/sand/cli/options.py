@@ -82,9 +82,9 @@ threads = click.option(
 
 def reading(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --radius, --length and --material of commands that read files of grains of other programs."""
-    radius = click.option("--radius", metavar="LENGTH", help="Radius of the grains of a file without radii.")
+    radius = click.option("--radius", metavar="R", help="Radius of the grains of a file without radii.")
     length = click.option("--length", metavar="LENGTH", help="Unit of length of a file of another program, as '1 nm'.")
-    material = click.option("--material", metavar="NAME", help="Material of a file that names none (silica).")
+    material = click.option("--material", metavar="M", help="Material of a file that names none (silica).")
     return radius(length(material(command)))
 
 

@@ -12,6 +12,9 @@ from .lammps import is_data, is_dump, read_data, read_dump
 from .others import is_gsd, read_by_ase, read_gsd
 from .xyz import is_xyz, read_xyz
 
+SUFFIXES = (".cfg", ".cif", ".gro", ".mol", ".pdb", ".sdf", ".traj", ".vasp", ".xsf")
+"""Suffixes of formats that ASE reads, for a message if it is not installed."""
+
 __all__ = ["FileBox", "GrainData", "GrainFile", "is_gsd", "open_grains"]
 
 
@@ -53,5 +56,9 @@ def _by_ase(file: Path, error: BadInput) -> GrainFile:
         raise error
     try:
         return read_by_ase(file)
-    except (ImportError, BadInput):
+    except ImportError:
+        if file.suffix.lower() in SUFFIXES:
+            raise BadInput(f"{file}: files {file.suffix} are read by ASE, which is missing: pip install ase") from None
+        raise error from None
+    except BadInput:
         raise error from None

@@ -32,7 +32,7 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
     BadInput
         If lines are not such rows; the first ten are named.
     """
-    rows, header, first = _rows(path, _sphere_block(lines))
+    rows, header, first, texts = _rows(path, _sphere_block(lines))
     table = np.array(rows)
     names, units = header
     notes: list[str] = []
@@ -44,7 +44,8 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
     unit = 1.0 if stated is None else in_unit(f"1 {stated}", "m")
     if unit is None:
         raise BadInput(f"{path}: {stated!r} is not a unit of length")
-    data = data_of(dict(zip(names, table.T, strict=True)), unit, place=str(path), units=units)
+    columns: dict[str, Any] = dict(zip(names, table.T, strict=True)) | texts
+    data = data_of(columns, unit, place=str(path), units=units)
     data.notes += notes
 
     def frame(number: int) -> GrainData:
@@ -63,12 +64,20 @@ def _sphere_block(lines: list[str]) -> list[str]:
     return ["" if not begin < k < end else line for k, line in enumerate(lines)]
 
 
-def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], tuple[list[str], dict[str, str]], int]:
-    """Rows of numbers, names of the columns with their units, and the line of the first row.  Raises BadInput."""
+Header = tuple[list[str], dict[str, str]]
+"""Names of columns, and the units of some."""
+
+
+def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, dict[str, list[str]]]:
+    """Rows of numbers, names of the columns with their units, line of the first row, and columns of text by name.
+
+    Raises BadInput.
+    """
     rows: list[list[float]] = []
+    texts: dict[str, list[str]] = {}
     problems: list[str] = []
-    header: tuple[list[str], dict[str, str]] = ([], {})
-    told: tuple[int, int] | None = None  # number of grains that the file states, and its line
+    header: Header = ([], {})
+    stated: tuple[int, int] | None = None  # number of grains that the file states, and its line
     first = 0
     for number, line in enumerate(lines, start=1):
         text, comment = _without_comment(line)
@@ -83,11 +92,11 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], tuple[list[st
             if not rows and (found := _header(text)):
                 header = found
                 continue
-            if told and not rows and number <= told[1] + 2:  # the title below the number of grains
+            if stated and not rows and number <= stated[1] + 2:  # the title below the number of grains
                 continue
-            row = []
-        if len(row) == 1 and not rows and told is None and row[0] == int(row[0]) and row[0] >= 1:
-            told = (int(row[0]), number)
+            row = _with_text(words, header[0], texts)
+        if len(row) == 1 and not rows and stated is None and row[0] == int(row[0]) and row[0] >= 1:
+            stated = (int(row[0]), number)
             continue
         if len(row) < 3 or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
             problems.append(f"{path}, line {number}: {line.strip()[:40]!r} is not x y z or x y z r, as in all lines")
@@ -99,16 +108,39 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], tuple[list[st
             break
     if len(rows) > MOST_GRAINS:
         problems.append(f"{path} holds more than {MOST_GRAINS:.0e} grains")
-    if told and not rows:
-        problems.append(f"{path}, line {told[1]}: {lines[told[1] - 1].strip()[:40]!r} is not x y z or x y z r")
-    elif told and not problems and told[0] != len(rows):
-        problems.append(f"{path}, line {told[1]}: '{told[0]}' is not the number of grains; there are {len(rows)} lines")
+    if stated and not rows:
+        problems.append(f"{path}, line {stated[1]}: {lines[stated[1] - 1].strip()[:40]!r} is not x y z or x y z r")
+    elif stated and not problems and stated[0] != len(rows):
+        problems.append(
+            f"{path}, line {stated[1]}: '{stated[0]}' is not the number of grains; there are {len(rows)} lines"
+        )
     if problems or not rows:
         raise BadInput(problems or f"{path} holds no grain")
-    return rows, header, first
+    if uneven := [name for name, words in texts.items() if len(words) != len(rows)]:
+        raise BadInput(f"{path}: column {uneven[0]!r} has numbers in some lines and text in others")
+    return rows, header, first, texts
 
 
-def _is_named(lines: list[str], header: tuple[list[str], dict[str, str]]) -> bool:
+def _with_text(words: list[str], names: list[str], texts: dict[str, list[str]]) -> list[float]:
+    """Numbers of a line with text in columns that are no quantity of grains, or the material, which goes to `texts`.
+
+    Empty if it is no such line.
+    """
+    if len(words) != len(names):
+        return []
+    row = []
+    for name, word in zip(names, words, strict=True):
+        try:
+            row += numbers([word])
+        except ValueError:
+            if (known_as(name) or ("material", None))[0] != "material":
+                return []
+            texts.setdefault(name, []).append(word.strip("\"'"))
+            row.append(0.0)
+    return row
+
+
+def _is_named(lines: list[str], header: Header) -> bool:
     """Whether the names of the columns were found outside comments, where a wrong number of them is a mistake."""
     return bool(header[0]) and any(_header(_without_comment(line)[0]) == header for line in lines[:50])
 
@@ -131,7 +163,7 @@ def _words(text: str) -> list[str]:
     return words
 
 
-def _header(text: str) -> tuple[list[str], dict[str, str]] | None:
+def _header(text: str) -> Header | None:
     """Names of columns and units, as in `x [nm], y [nm], z [nm]`; None if x, y, z are not among them."""
     cells = (
         [cell.strip().strip("\"'") for cell in re.split(r"[;,]", text.strip())] if re.search(r"[;,]", text) else [text]

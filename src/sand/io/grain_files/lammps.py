@@ -221,8 +221,8 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
                 columns[axis] = low[k] + values * (high[k] - low[k]) if scaled else values
     data = _in_si(path, columns, units, by_sand=False)
     data.box = FileBox(low, high, (x, y, z))
-    told = lines[first + 1].split()
-    data.step = int(told[0]) if len(told) == 1 and told[0].isdecimal() else None
+    words = lines[first + 1].split()
+    data.step = int(words[0]) if len(words) == 1 and words[0].isdecimal() else None
     return data
 
 

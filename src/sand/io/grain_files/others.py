@@ -76,7 +76,7 @@ def read_by_ase(path: Path) -> GrainFile:
     import ase.io  # type: ignore[import-not-found]
 
     try:
-        if (form := ase.io.formats.filetype(str(path), guess=False)) not in BY_ASE:
+        if (form := ase.io.formats.filetype(str(path), guess=True)) not in BY_ASE:
             raise ValueError(f"format {form}")
         found = ase.io.read(path, index=":", format=form)
     except Exception as error:  # its readers raise various ones
