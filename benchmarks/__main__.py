@@ -9,7 +9,7 @@ import warnings
 import sand
 from sand.simulation.run_writer import versions
 
-from . import compare, files, main_job, regimes, rigid_clusters, scaling, settling, vibrations
+from . import compare, estimates, files, quick_figures, regimes, rigid_clusters, scaling, settling, vibrations
 from .long_range import growth, savings, tell
 from .rows import all_rows
 from .table import HEAD, about, line, tell_about
@@ -22,11 +22,13 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="one JSON object")
     parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
     parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
+    parser.add_argument("--estimates", action="store_true", help="write benchmarks/estimates.csv, instead")
     parser.add_argument("--page", action="store_true", help="what the page of a run costs in a browser, instead")
     parser.add_argument("--scaling", action="store_true", help="cost of a grain's step from 100 grains on, instead")
     parser.add_argument(
-        "--main-job", action="store_true", help="time the main job and write docs/main-job.json, instead"
+        "--quoted", action="store_true", help="measure what README and docs quote and write docs/measured.json, instead"
     )
+    parser.add_argument("--tests", action="store_true", help="with --quoted: time the default tests, too")
     parser.add_argument("--settling", action="store_true", help="write docs/physics/settling.csv, instead (a minute)")
     parser.add_argument("--vibrations", action="store_true", help="write docs/physics/vibrations.csv, instead (hours)")
     parser.add_argument(
@@ -40,8 +42,13 @@ def main() -> None:
         parser.error(f"--rounds {options.rounds}: an interval of 95 % needs at least 6 rounds")
     warnings.simplefilter("ignore")
     sand.set_threads(1)  # a row that needs more says so
-    if options.main_job:
-        print(main_job.write())
+    if options.tests and not options.quoted:
+        parser.error("--tests is for --quoted")
+    if options.quoted:
+        print(quick_figures.write(options.tests))
+        return
+    if options.estimates:
+        print(estimates.write())
         return
     if options.settling:
         print(settling.write())

@@ -63,6 +63,14 @@ def thread(call: Callable[[], object]) -> float:
 
 def of_command(words: Sequence[str], repeat: int = 3) -> float:
     """Least CPU time [s] of a program, from its start to its end; wall time where Python cannot tell it (Windows)."""
+    return min(ran(words)[0] for _ in range(repeat))
+
+
+def ran(words: Sequence[str], **options: Any) -> tuple[float, str]:
+    """CPU time [s] of one run of a program, as `of_command` has it, and what it prints.
+
+    Raises CalledProcessError where the program fails.
+    """
 
     def spent() -> float:
         if resource is None:
@@ -70,12 +78,9 @@ def of_command(words: Sequence[str], repeat: int = 3) -> float:
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         return used.ru_utime + used.ru_stime
 
-    times = []
-    for _ in range(repeat):
-        before = spent()
-        subprocess.run(words, capture_output=True, check=True)
-        times.append(spent() - before)
-    return min(times)
+    before = spent()
+    done = subprocess.run(words, capture_output=True, text=True, check=True, **options)
+    return spent() - before, done.stdout
 
 
 def per_step(sim: Any, steps: int) -> float:

@@ -3,13 +3,14 @@
 Build with:  sphinx-build -W --keep-going -b html docs docs/_build/html
 """
 
-import json
 import os
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE / "_ext"))
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
+
+from benchmarks.quoted import quotable  # noqa: E402
 
 from sand import __version__  # noqa: E402
 
@@ -47,8 +48,8 @@ default_role = "code"
 smartquotes = False
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "substitution"]
-# measured by `python -m benchmarks --main-job`
-myst_substitutions = {"main_job": json.loads((HERE / "main-job.json").read_text("utf-8"))["sentence"]}
+# figures of cost, of docs/measured.json
+myst_substitutions = quotable()
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
 

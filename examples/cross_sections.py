@@ -3,8 +3,7 @@
 The three values in the paper cannot come from one set of initial conditions; the table covers the possible ones.
 
 Run it with:  python examples/cross_sections.py [RELATIVE_ERROR]
-RELATIVE_ERROR is 0.01 by default, which takes nine minutes on one core.  The rows are explained in
-docs/physics/cross-sections.md.
+RELATIVE_ERROR is 0.01 by default.  The rows are explained in docs/physics/cross-sections.md.
 """
 
 import csv

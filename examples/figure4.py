@@ -2,7 +2,7 @@
 
 Run it with:  python examples/figure4.py [figure4.png]
 The script prints the final shape of the chain and draws maps of impact speed and position with the final shape
-(T, straight, bent or broken).  It takes half a minute, most of it for compilation in the first run.
+(T, straight, bent or broken).
 """
 
 import sys

@@ -2,8 +2,6 @@
 
 import csv
 import itertools
-import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ import pytest
 import sand
 
 table = pytest.importorskip("benchmarks.table", reason="benchmarks are not beside the tests")
-from benchmarks import decks, main_job, pieces, scaling, settling, steps, timing, worlds  # noqa: E402
+from benchmarks import decks, pieces, scaling, settling, steps, timing, worlds  # noqa: E402
 from benchmarks.compare import median_interval  # noqa: E402
 
 
@@ -96,14 +94,6 @@ def test_scaling_skips_systems_that_do_not_fit_in_memory(monkeypatch):
     rows = list(scaling.rows(True))
     assert len(rows) == 11
     assert all("needs" in one["skipped"] for one in rows)
-
-
-def test_readme_quotes_the_measured_main_job():
-    """The only time of the main job on all pages is that of docs/main-job.json, in generated wording."""
-    top = Path(__file__).parents[2]
-    measured = json.loads((top / "docs" / "main-job.json").read_text("utf-8"))
-    assert measured["sentence"] == main_job.sentence(measured)
-    assert measured["sentence"] in " ".join((top / "README.md").read_text("utf-8").split())
 
 
 def test_coverage_of_the_interval_of_a_median():

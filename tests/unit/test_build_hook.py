@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -53,6 +54,28 @@ def fake_node(hook, tmp_path, monkeypatch):
         monkeypatch.setattr(hook, "find_node", lambda: (node, tmp_path / "npm-cli.js"))
 
     return make
+
+
+def test_links_of_the_readme_get_addresses_for_pypi(hook):
+    """Pictures from the files as they are, other relative links to pages; addresses and headings stay."""
+    readme = "![a b](docs/a.png) [c](ARCHITECTURE.md) [d](https://d.e/f) [g](#h) `[i]`"
+    there = "https://github.com/o/n"
+    picture, page = f"![a b]({there}/raw/v1.2/docs/a.png)", f"[c]({there}/blob/v1.2/ARCHITECTURE.md)"
+    assert hook.with_addresses(readme, there, "1.2") == f"{picture} {page} [d](https://d.e/f) [g](#h) `[i]`"
+    assert hook.with_addresses(readme, "", "1.2") == readme
+
+
+@pytest.mark.slow
+def test_the_description_on_pypi_has_no_relative_link(monkeypatch):
+    """Metadata of the package as hatchling makes them: README, and every link and picture with an address."""
+    from hatchling.metadata.core import ProjectMetadata
+    from hatchling.plugin.manager import PluginManager
+
+    monkeypatch.setenv("SAND_REPOSITORY", "https://github.com/o/n")
+    text = ProjectMetadata(str(TOP), PluginManager()).core.readme
+    assert text.startswith("# SAND") and "![" in text
+    links = re.findall(r"\]\(([^)\s]+)\)", text)
+    assert links and all(link.startswith("https://") for link in links)
 
 
 def names(folder):

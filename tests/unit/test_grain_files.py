@@ -117,7 +117,7 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("4\n0 0 0 1\n5 0 0 1\n", "'4' is not the number of grains; there are 2 lines"),
         ("0 0 0 1\n****** 0 0 1\n", "line 2"),
         ("x y z r mass\n0 0 0 1e-7 28\n", "mass of grain 0 is 28 kg, but a sphere of silica"),
-        ("x,y,z,r,heat [J]\n0,0,0,1,2\n", "own: there is no quantity 'heat'"),
+        ("x,y,z,r,heat [parsec/x]\n0,0,0,1,2\n", "own: heat"),
         (
             "LAMMPS\n\n1 atoms\n\nAtoms\n\n1 1 1 1 0 0 0\n",
             r"line 5: atoms of style \(none is stated\); write the style",
@@ -356,6 +356,7 @@ def test_a_gas_starts_from_a_file(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.compiled("small")
+@pytest.mark.usefixtures("bundle")
 def test_pictures_and_exports_of_files(tmp_path, monkeypatch, capsys):
     """`plot`, `view` and `export` take a body, and ask for a missing radius; the file itself is not overwritten."""
     monkeypatch.chdir(tmp_path)
@@ -371,3 +372,11 @@ def test_pictures_and_exports_of_files(tmp_path, monkeypatch, capsys):
     assert main(["plot", "d", "--out", "q"]) == 2
     assert "has no radii; give a radius" in capsys.readouterr().err
     assert main(["plot", "d", "--out", "q", "--size", "320x200", "--radius", "10 nm", "--material", "iron"]) == 0
+
+
+def test_own_quantities_of_named_columns(tmp_path):
+    """A column with a name of its own and a unit is an own quantity, in SI; one without a unit is named in a note."""
+    (tmp_path / "a").write_text("x,y,z,r,heating [mW/m^2],porosity\n0,0,0,1e-7,2,0.5\n")
+    found, notes = told(read_grains, tmp_path / "a", sand.SILICA)
+    assert found.grains.own["heating"] == pytest.approx([2e-3], rel=1e-12, abs=0.0)
+    assert list(found.grains.own) == ["heating"] and "not read: porosity" in found.notes[0] and not notes

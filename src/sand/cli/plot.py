@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ from . import options, parsing, report
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
 FOLDER = "plots"
+READING = ("radius", "length", "material")
+"""Options of `options.reading`."""
 
 
 class PrintSize(NamedTuple):
@@ -69,18 +72,20 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     """Errors of the values of options."""
     if all(values[name] is None for name in ("what", "colour", "bonds", "view", "size")):
         return
-    from ..analysis.quantities import GRAIN_NAMES
+    from ..analysis.quantities import names_of
     from ..plotting.plots import HISTORY
     from ..plotting.render.still import check_picture_options
 
-    allowed, names = (*HISTORY, STILL, *GRAIN_NAMES), values["what"] or []
+    given = {name: values[name] for name in READING}
+    one = None if values["source"] is None else _first_frame(Path(values["source"]), given)
+    allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
     yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
     if values["cluster"] is not None and (others := [name for name in names if name != STILL]):
         yield f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
     size = DEFAULT_SIZE if values["size"] is None else values["size"]
     shown = values["colour"] or "cluster", _bonds(values["bonds"]), values["view"] or "iso"
     try:
-        check_picture_options(*shown, size.pixels(values["dpi"] or DPI))
+        check_picture_options(*shown, size.pixels(values["dpi"] or DPI), values["dpi"] or DPI, one)
     except BadInput as error:
         yield from error.problems
 
@@ -148,16 +153,17 @@ def command(
 
     DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD.
 
-    WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
-    a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with the
-    moment of their cluster), field_alignment, material, at_rest (with rigid clusters). As a colour of grains, size is
-    the number of grains in their cluster.
+    WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
+    QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
+    alignment (of moments with the moment of their cluster), field_alignment, material, at_rest (with rigid clusters),
+    or an own quantity of the run, such as temperature. As a colour of grains, size is the number of grains in their
+    cluster.
     """
     from ..io.run_folder import make_folder, replace_file
 
     folder, names = _place(Path(source), what, out, form, overwrite)
     how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
-    given = {name: how.pop(name) for name in ("radius", "length", "material")}
+    given = {name: how.pop(name) for name in READING}
     pictures = _draw(_open_source(Path(source), given), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)
@@ -202,6 +208,17 @@ def _open_source(path: Path, given: Mapping[str, Any]) -> Source:
     options.refuse_reading(path, given)
     run = Run(path)
     return Source(path, run.frames, run)
+
+
+def _first_frame(path: Path, given: Mapping[str, Any]) -> Any:
+    """The first frame, for the names of own quantities; None if it cannot be read, which is reported later."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # notes appear when the frames are drawn
+        try:
+            frames = _open_source(path, given).frames
+            return frames[0] if len(frames) else None
+        except BadInput:
+            return None
 
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:

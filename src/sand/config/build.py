@@ -214,7 +214,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     library = case.materials_by_name()
     try:
         index = arrays["grains/material"]
-        grains = grains_from_arrays(arrays, [library[names[i]] for i in index])
+        grains = grains_from_arrays(arrays, [library[names[i]] for i in index], meta.get("own", {}))
     except (KeyError, IndexError) as error:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
     if (grains.arrays.material != index).any():

@@ -13,8 +13,7 @@ from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
-from ..schema import BY_NAME, own_values
-from ..units import in_unit, si
+from ..units import si
 from .extended_xyz import xyz_text
 from .frame import MODES
 from .grain_files import FileBox, GrainData, is_gsd, open_grains
@@ -120,9 +119,8 @@ def _grains_of(
     kinds = _materials(path, data, material or (otherwise if data.names is None else None), materials)
     given = dict(data.given)
     density = given.pop("density", None)
-    own = {name: _in_si(path, name, *pair) for name, pair in data.own.items()}
     try:
-        grains = Grains(data.position * unit, size, kinds, own=own, **(given | {"mass": None}))
+        grains = Grains(data.position * unit, size, kinds, own=data.own, **(given | {"mass": None}))
         if density is not None and "mass" not in given:
             given["mass"] = density * (4.0 / 3.0 * np.pi) * grains.radius**3
         if "mass" not in given:
@@ -138,7 +136,7 @@ def _grains_of(
                 f"mass of grain {k} is {mass[k]:.3g} kg, but a sphere of {name} of its radius has "
                 f"{grains.mass[k]:.3g} kg; give masses in kg, or leave them out"
             )
-        return Grains(data.position * unit, size, kinds, own=own, **(given | {"mass": mass}))
+        return Grains(data.position * unit, size, kinds, own=data.own, **(given | {"mass": mass}))
     except BadInput as error:
         raise error.at(str(path)) from None
 
@@ -146,15 +144,6 @@ def _grains_of(
 def kept_masses(mass: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     """Masses from a file, (N,) [kg]; the nominal ones where they are equal to single precision."""
     return np.where(np.abs(mass - nominal) <= 8.0 * SINGLE * nominal, nominal, mass)
-
-
-def _in_si(path: str | Path, name: str, values: np.ndarray, unit: str) -> np.ndarray:
-    """Values of an own quantity in SI.  Raises BadInput."""
-    field = BY_NAME.get(name)
-    factor = in_unit(f"1 {unit}", field.unit) if field is not None else 1.0  # an unknown name is refused by Grains
-    if factor is None:
-        raise BadInput(f"{path}: {name} is in {unit!r}, which is not a unit of it")
-    return values * factor
 
 
 def _box_of(data: GrainData, unit: float) -> tuple[Box, np.ndarray | None]:
@@ -211,7 +200,7 @@ def _read_own_gsd(path: Path, number: int) -> tuple[GrainData, tuple[np.ndarray,
         1.0,
         {name: np.asarray(getattr(frame, name), np.float64) for name in names},
         [frame.materials[k] for k in frame.material],
-        {name: (values, BY_NAME[name].unit) for name, values in own_values(frame).items()},
+        {name: (values, frame.own.units[name]) for name, values in frame.own.items()},
     )
     lengths = np.array(frame.drawn)
     x, y, z = (length is not None for length in frame.box.lengths)

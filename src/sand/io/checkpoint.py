@@ -10,7 +10,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | lost | energy lost per channel [J] |
 | cutoff | the cut-off of dipoles that follows the largest clusters, and the choice; meta.json names all entries |
 | ledger | all rows so far, (K, columns of ledger.csv) |
-| grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
+| grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials; `own`: own quantities (K, N) |
 | contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
 | pair_list/… | the list of candidate pairs, and the positions at its last rebuild |
 | order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
@@ -127,11 +127,20 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         raise OtherFormat(f"{path} has format {meta['version']}, and this SAND reads format {VERSION}; {advice}")
     if _checksum(arrays) != meta.get("sha256"):
         raise BadInput(f"{path} is damaged: its checksum is wrong")
+    _name_own(arrays, meta)
     try:
         check_state(arrays, meta)
     except BadInput as error:
         raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
+
+
+def _name_own(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    """Own quantities of a checkpoint that was written when the only one was the temperature of the grain."""
+    only = arrays.pop("grains/internal_temperature", None)
+    if only is not None and "grains/own" not in arrays:
+        meta["own"] = {"internal_temperature": "K"} if only.any() else {}
+        arrays["grains/own"] = only[None][: len(meta["own"])]
 
 
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

@@ -7,10 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..grains import Grains
+from ..own_quantities import OwnQuantities
 
 ANGSTROM = 1e-10
 SYMBOLS = {"iron": "Fe", "silica": "Si", "ice": "O", "graphite": "C", "forsterite": "Mg", "magnetite": "Fe"}
 """Chemical symbols that distinguish materials; X for others."""
+
+
+def own_columns(own: OwnQuantities) -> tuple[str, str]:
+    """Names of the columns of own quantities in `Properties=`, and the entry with their units."""
+    units = ";".join(f"{name}={unit}" for name, unit in own.units.items())
+    return "".join(f":{name}:R:1" for name in own), f' own="{units}"' if own else ""
 
 
 def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
@@ -26,19 +33,20 @@ def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Se
 
 
 def xyz_text(grains: Grains) -> str:
-    """Format grains as extended XYZ: position and radius [Å], velocity, spin, moment, charge, mass, material.
+    """Format grains as extended XYZ: position, radius [Å], velocity, spin, moment, charge, mass, own quantities.
 
-    Numbers are in full precision, all but lengths in SI. Materials are indices; their names are in the second line.
-    There are masses only if they are not those of spheres of the materials.
+    Numbers are in full precision, all but lengths in SI. The last column, material, is an index; names of materials,
+    and units of own quantities, are in the second line. There are masses only if they are not those of spheres of the
+    materials.
     """
-    names = [m.name for m in grains.materials]
+    names, (own, units) = [m.name for m in grains.materials], own_columns(grains.own)
     density = np.array([m.density for m in grains.materials])[grains.material]
     masses = [grains.mass] * bool((grains.mass != density * (4.0 / 3.0) * np.pi * grains.radius**3).any())
     head = (
         "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:spin:R:3:moment:R:3:charge:R:1"
-        f"{':mass:R:1' * len(masses)}:material:I:1 "
-        f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI'
+        f"{':mass:R:1' * len(masses)}{own}:material:I:1 "
+        f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI{units}'
     )
     columns = [grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.velocity, grains.spin, grains.moment]
-    columns += [grains.charge, *masses, grains.material]
-    return xyz_frame(names, grains.material, head, columns, "%.17g " * (14 + len(masses)) + "%d")
+    columns += [grains.charge, *masses, *grains.own.values(), grains.material]
+    return xyz_frame(names, grains.material, head, columns, "%.17g " * (14 + len(masses) + len(grains.own)) + "%d")

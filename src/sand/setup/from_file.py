@@ -14,7 +14,6 @@ from ..errors import BadInput, warn
 from ..grains import Grains
 from ..io.run_folder import TRAJECTORY
 from ..material import Material
-from ..schema import own_values
 from ..units import format_quantity
 from .checks import cluster_labels, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
 from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
@@ -223,7 +222,7 @@ def largest_body(start: Start) -> tuple[Grains, StrainedContacts | None]:
         [grains.materials[k] for k in grains.material[chosen]],
         moment=grains.moment[chosen],
         charge=grains.charge[chosen],
-        own={name: values[chosen] for name, values in own_values(grains).items()},
+        own=grains.own.taken(chosen),
         mass=grains.mass[chosen],
     )
     make_whole(body, links, start.box, "the largest cluster")
