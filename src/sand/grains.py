@@ -20,6 +20,9 @@ from .units import format_quantity, in_unit
 ROUNDING = 1e-7
 """Largest gap of a contact without adhesion, relative to the sum of radii; allows for coordinates of seven digits."""
 
+ROUNDED = 1e-3
+"""Largest gap, in smaller radii of the pair, of grains in a file that are in contact: their coordinates are rounded."""
+
 SMALLEST = 1e-10
 """Smallest radius [m] of a grain, that of an atom."""
 
@@ -272,11 +275,14 @@ class Grains:
         separation = box.nearest(self.position[i] - self.position[j])
         return self.radius[i] + self.radius[j] - np.linalg.norm(separation, axis=1)
 
-    def touching(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs (P, 2) of grains in contact, sorted, with their overlaps [m]; a gap up to `ROUNDING` counts."""
-        pairs = box.close_pairs(self.position, 2.0 * float(self.radius.max()) * (1.0 + ROUNDING))
-        overlap = self.overlaps(pairs, box)
-        found = overlap >= -ROUNDING * self.radius[pairs].sum(axis=1)
+    def touching(self, box: Box, gap: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs (P, 2) of grains in contact, sorted, with their overlaps [m].
+
+        A gap up to `ROUNDING`, or up to `gap` smaller radii of the pair, counts as a contact.
+        """
+        pairs = box.close_pairs(self.position, 2.0 * float(self.radius.max()) * (1.0 + max(ROUNDING, 0.5 * gap)))
+        overlap, radius = self.overlaps(pairs, box), self.radius[pairs]
+        found = overlap >= -np.maximum(ROUNDING * radius.sum(axis=1), gap * radius.min(axis=1))
         return pairs[found], overlap[found]
 
     def copy(self) -> Grains:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
@@ -78,6 +78,22 @@ threads = click.option(
     metavar="N",
     help="Threads for a large simulation (default: one per core, or $SAND_THREADS); results do not depend on it.",
 )
+
+
+def reading(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --radius, --length and --material of commands that read files of grains of other programs."""
+    radius = click.option("--radius", metavar="R", help="Radius of the grains of a file without radii.")
+    length = click.option("--length", metavar="LENGTH", help="Unit of length of a file of another program, as '1 nm'.")
+    material = click.option("--material", metavar="M", help="Material of a file that names none (silica).")
+    return radius(length(material(command)))
+
+
+def refuse_reading(folder: Any, given: Mapping[str, Any]) -> None:
+    """Refuse options of `reading` that were given for the folder of a run.  Raises BadInput."""
+    if wrong := [
+        f"--{name}: the run in {folder} has it; leave --{name} out" for name in given if given[name] is not None
+    ]:
+        raise BadInput(wrong)
 
 
 def _import(context: click.Context, _option: click.Parameter, names: tuple[str, ...]) -> None:

@@ -123,7 +123,7 @@ class MaterialSection(Section):
 
 
 class GrainsSection(Section):
-    """[grains]: a gas of grains, or grains of a `file`: a frame of a trajectory, or a body; "given": from a script."""
+    """[grains]: a gas of grains, or grains of a `file`: a frame, free grains or bodies; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
@@ -151,11 +151,12 @@ class GrainsSection(Section):
     """Length of the gas along open axes of the box [m]: one, or three with "periodic" along periodic axes; the gas is
     centred on the origin, and its members are wholly inside."""
     file: PathName | None = None
-    """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
+    """Run folder, trajectory or body of SAND, or a file of another program: XYZ, columns, CSV, LAMMPS data and dump,
+    GSD; its content tells the format."""
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
-    """Index of the frame of a trajectory; −1 is the last."""
+    """Index of the frame; −1 is the last."""
     length: str | None = None
-    """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
+    """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> GrainsSection:

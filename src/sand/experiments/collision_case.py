@@ -41,15 +41,17 @@ class BodySection(Section):
     kind: BodyKind
     """Builder (as for `sand build`), or `file`."""
     file: PathName | None = None
-    """File of the body, relative to the case file; required with `kind = "file"`."""
+    """File of the body, relative to the case file, in any format of `file` in [grains]; required with
+    `kind = "file"`."""
     length: str | None = None
-    """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
+    """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
     grains: Count | None = None
     """Number of grains; required except for a grain, a lattice or a file."""
     shape: list[Count] | None = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
     radius: Any = None
-    """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; optional for a file."""
+    """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
+    radii."""
     material: str = "silica"
     """Preset or name in [materials]."""
     moment: Moment | None = None

@@ -18,6 +18,7 @@ from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
 from ..own_quantities import own_values
 from ..schema import BY_NAME, CHANGEABLE, stored
+from ..setup.checks import at_same_place
 from ..state.arrays import SAVED_LONG_RANGE
 from ..state.state import (
     BROKEN,
@@ -330,7 +331,9 @@ class Change:
         return grains
 
     def refuse_overlaps(self, grains: Grains, forces: Sequence[Force]) -> None:
-        """Refuse added grains, and a box, in which grains without a contact overlap by more than at a start."""
+        """Refuse added grains, and a box, in which grains overlap by more than at a start, or are at the same place."""
+        if self.regroups and (same := at_same_place(grains, self.box)):
+            raise BadInput(same)
         contact = next((force for force in forces if isinstance(force, Contact)), None)
         if contact is None or not self.regroups:
             return

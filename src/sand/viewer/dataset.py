@@ -323,6 +323,11 @@ def _unit_vector(vector: Sequence[float]) -> list[float]:
     return [float(f"{component / size:.9g}") if size > 0.0 else 0.0 for component in vector]
 
 
+def frames_dataset(path: Path, frames: Any, field: FieldDescription | None = None) -> RunDataset:
+    """The frames of a file without a run, for the viewer."""
+    return RunDataset(ByIdentity(frames), path.stem, str(path), ledger=lambda: None, summary=dict, field=field)
+
+
 def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunDataset:
     """Open a run folder, or a trajectory written by SAND, for the viewer.
 
@@ -337,9 +342,7 @@ def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunD
         if not source.is_file():
             reason = f"there is no {files.TRAJECTORY} in it" if source.is_dir() else "there is no such folder or file"
             raise BadInput(f"{path} is neither a run folder nor a trajectory: {reason}")
-        return RunDataset(
-            ByIdentity(LiveTrajectory(source)), source.stem, str(path), ledger=lambda: None, summary=dict, field=field
-        )
+        return frames_dataset(source, LiveTrajectory(source), field)
     frames = ByIdentity(LiveTrajectory(folder / files.TRAJECTORY))
     name, ledger = folder.resolve().name, LedgerReader(folder)
     return RunDataset(frames, name, str(path), ledger=ledger, summary=lambda: read_summary(folder), field=field)
