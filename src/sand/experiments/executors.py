@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import re
 import signal
 import sys
@@ -20,6 +21,8 @@ ANSWER = 10.0
 """Timeout of the connection to a scheduler [s]."""
 MOST_ON_WINDOWS = 61
 """Largest number of processes of a pool on Windows, a limit of `concurrent.futures`."""
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable by which Python leaves the current folder out of its path."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
@@ -84,15 +87,30 @@ def _nothing() -> None:
 
 
 def _start(pool: Executor, workers: int) -> None:
-    """Start all processes, which ignore Ctrl-C from their start."""
+    """Start all processes, which ignore Ctrl-C from their start and run no files of the current folder."""
     in_main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main else None
     try:
-        for future in [pool.submit(_nothing) for _ in range(workers)]:
-            future.result()
+        with _safe_path():
+            for future in [pool.submit(_nothing) for _ in range(workers)]:
+                future.result()
     finally:
         if in_main:
             signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """New interpreters begin without the current folder on their path; later they get the path of this process."""
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
 
 
 @contextmanager
