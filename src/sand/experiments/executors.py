@@ -60,8 +60,10 @@ def executor_for(
     else:
         context = multiprocessing.get_context("spawn")
         begin = partial(_begin_worker, threads or 1, list(IMPORTED))
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=begin) as pool:
+        with _safe_path():  # the first lock of a pool starts a process, too
+            pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin)
             _start(pool, workers)
+        with pool:
             processes = list((getattr(pool, "_processes", None) or {}).values())
             try:
                 yield pool
@@ -87,13 +89,12 @@ def _nothing() -> None:
 
 
 def _start(pool: Executor, workers: int) -> None:
-    """Start all processes, which ignore Ctrl-C from their start and run no files of the current folder."""
+    """Start all processes, which ignore Ctrl-C from their start."""
     in_main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main else None
     try:
-        with _safe_path():
-            for future in [pool.submit(_nothing) for _ in range(workers)]:
-                future.result()
+        for future in [pool.submit(_nothing) for _ in range(workers)]:
+            future.result()
     finally:
         if in_main:
             signal.signal(signal.SIGINT, before)
