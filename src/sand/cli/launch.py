@@ -11,6 +11,7 @@ from typing import Any
 from ..config.case import with_absolute_files
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
+from ..io.checkpoint import checkpoint_files
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..simulation.outcome import Outcome, Result
@@ -111,7 +112,7 @@ def _conclude(result: Any, folder: Path, **output: bool) -> int:
         return INTERRUPTED
     if outcome.is_physics:
         report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
-        last = report.checkpoints(folder)[-1]
+        last = checkpoint_files(folder)[-1]
         kept = int(last.stem.removeprefix("checkpoint-")) == result.steps
         report.note(f"the {'last state' if kept else 'last good state'} is in {last}")
         return PHYSICS
@@ -122,7 +123,7 @@ def _interrupted(folder: Path) -> int:
     """Report an interruption before the first step, or a second one; returns the exit code."""
     if not folder.is_dir():
         report.note(f"interrupted; the folder {folder} does not exist, start again")
-    elif report.checkpoints(folder):
+    elif checkpoint_files(folder):
         report.note(f"interrupted at once; continue from the last checkpoint with: {report.resume_line(folder)}")
     else:
         report.note("interrupted before the first step; nothing is lost, start again")
@@ -133,7 +134,7 @@ def _how_to_recover(folder: Path) -> str:
     """What to do after a file could not be written."""
     if not folder.is_dir():
         return f"the folder {folder} has been removed; start again"
-    if report.checkpoints(folder):
+    if checkpoint_files(folder):
         return f"once this is solved, continue from the last checkpoint with: {report.resume_line(folder)}"
     return "there is no checkpoint yet; once this is solved, start again with --overwrite"
 

@@ -13,7 +13,7 @@ from ..box import Box, as_box
 from ..errors import BadInput
 from ..forces.own import import_modules
 from ..grains import Grains
-from ..io.checkpoint import newest_checkpoint
+from ..io.checkpoint import checkpoint_files, newest_checkpoint
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..setup.from_file import TEXT_SUFFIXES, body_from_file, from_trajectory
@@ -200,7 +200,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
     import_modules(imports)
-    if not any(place.glob("checkpoint-*.npz")):
+    if not checkpoint_files(place):
         advice = ""
         if (place / TRAJECTORY).exists():
             advice = f"; to start a new run from its last frame: sand run --from {shlex.quote(str(place))}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import re
 import signal
 import sys
@@ -20,6 +21,8 @@ ANSWER = 10.0
 """Timeout of the connection to a scheduler [s]."""
 MOST_ON_WINDOWS = 61
 """Largest number of processes of a pool on Windows, a limit of `concurrent.futures`."""
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable by which Python leaves the current folder out of its path."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
@@ -57,8 +60,10 @@ def executor_for(
     else:
         context = multiprocessing.get_context("spawn")
         begin = partial(_begin_worker, threads or 1, list(IMPORTED))
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=begin) as pool:
+        with _safe_path():  # the first lock of a pool starts a process, too
+            pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin)
             _start(pool, workers)
+        with pool:
             processes = list((getattr(pool, "_processes", None) or {}).values())
             try:
                 yield pool
@@ -93,6 +98,20 @@ def _start(pool: Executor, workers: int) -> None:
     finally:
         if in_main:
             signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """New interpreters begin without the current folder on their path; later they get the path of this process."""
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from ..config.build import resume, simulation_of
 from ..config.case import check_case
 from ..errors import BadInput
 from ..io import run_folder as files
+from ..io.checkpoint import checkpoint_files
 from ..io.lock import writing
 from ..simulation.serialise import case_of
 
@@ -122,6 +123,10 @@ def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> lis
     path = place / files.CASE
     before: list[int] = []
     if path.exists():
+        if not files.was_written_by_sand(path):
+            raise BadInput(
+                f"{path} is not from SAND, and the case file of the job would replace it; give another folder"
+            )
         before = files.read_toml(path).get("grow", {}).get("seeds", [])
         if not before:
             raise BadInput(f"{place} contains a run; give another folder for the boxes")
@@ -142,7 +147,7 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     place, case, own = Path(folder), check_case(content, "case"), list(observers)
     case.run.seed = seed
     until = case.run.until
-    if any(place.glob("checkpoint-*.npz")):
+    if checkpoint_files(place):
         simulation = resume(place, observers=own)
         requested, stored = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
         if changed := [name for name in requested if name != "run" and requested[name] != stored[name]]:

@@ -30,6 +30,7 @@ import contextlib
 import hashlib
 import io
 import json
+import os
 import warnings
 import zipfile
 from pathlib import Path
@@ -39,7 +40,7 @@ import numpy as np
 
 from ..errors import BadInput, FilesFailed
 from .damage import set_aside
-from .run_folder import refuse_devices, replace_file
+from .run_folder import CHECKPOINT, refuse_devices, replace_file
 from .state_arrays import check_state
 
 VERSION = 10
@@ -63,6 +64,27 @@ def checkpoint_name(steps: int) -> str:
     return f"checkpoint-{int(steps):015d}.npz"
 
 
+def checkpoint_files(folder: Path) -> list[Path]:
+    """The checkpoints of a folder, oldest first: files with the names that SAND gives, by the steps stored in them.
+
+    A copy with a name that the user gave is none, and a copy of an older one under a later name stays the older one.
+    """
+    found = [path for path in folder.glob("checkpoint-*.npz") if CHECKPOINT.fullmatch(path.name)]
+    return sorted(found, key=lambda path: (_stored_steps(path), path.name))
+
+
+def _stored_steps(path: Path) -> int:
+    """Number of steps stored in a checkpoint; that of its name if it cannot be read."""
+    match = CHECKPOINT.fullmatch(path.name)
+    named = int(match.group(1)) if match else -1
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(f"{_META}.npy") as member:
+            steps = json.loads(np.lib.format.read_array(member, allow_pickle=False).tobytes())["steps"]
+            return int(steps)
+    except Exception:  # numpy and zipfile raise various exceptions for broken files
+        return named
+
+
 def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Path:
     """Write one checkpoint, then delete all but the newest two.
 
@@ -84,7 +106,7 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     np.savez(memory, **{_META: text}, **arrays)  # type: ignore[arg-type]
     path = folder / checkpoint_name(meta["steps"])
     replace_file(path, memory.getvalue())
-    for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:
+    for old in checkpoint_files(folder)[:-KEPT]:
         with contextlib.suppress(OSError):  # Windows cannot remove an open file; the next call tries again
             old.unlink(missing_ok=True)
     return path
@@ -106,18 +128,30 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     ------
     OtherFormat
         If it has another version of the format.
+    FilesFailed
+        If the system does not let it be read: no permission, an error of the device, too many open files, no memory.
     BadInput
         If it is not a checkpoint, is damaged, or has numbers that a state cannot have.
     """
+    refuse_devices(path)
     try:
-        refuse_devices(path)
-        with zipfile.ZipFile(path) as archive:
+        content = path.read_bytes()
+    except (OSError, MemoryError) as error:
+        raise _unreadable(path, error) from error
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+            # SAND does not compress: a member larger than the file is not from SAND, and need not be unpacked to know
+            if any(one.compress_type != zipfile.ZIP_STORED or one.file_size > len(content) for one in members):
+                raise zipfile.BadZipFile
             if archive.testzip():  # before NumPy allocates arrays of sizes that may be wrong
                 raise zipfile.BadZipFile
-        with np.load(path, allow_pickle=False) as saved:
+        with np.load(io.BytesIO(content), allow_pickle=False) as saved:
             arrays = {name: saved[name] for name in saved.files}
         meta = json.loads(arrays.pop(_META).tobytes())
         is_dictionary = isinstance(meta, dict)
+    except MemoryError as error:
+        raise _unreadable(path, error) from error
     except Exception as error:  # numpy and zipfile raise various exceptions for broken files
         raise BadInput(f"{path} is not a readable checkpoint ({type(error).__name__})") from error
     if not is_dictionary or meta.get("format") != "SAND checkpoint" or not isinstance(meta.get("version"), int):
@@ -132,6 +166,16 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     except BadInput as error:
         raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
+
+
+def _unreadable(path: Path, error: BaseException) -> FilesFailed:
+    """The error of a file that may be whole, but cannot be read now."""
+    code = getattr(error, "errno", None)
+    reason = "not enough memory" if isinstance(error, MemoryError) else os.strerror(code) if code else str(error)
+    return FilesFailed(
+        f"cannot read {path}: {reason}; it may be whole, so it stays as it is, and no older one is taken: try again "
+        "when it can be read, or move it elsewhere to continue from the one before"
+    )
 
 
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -149,10 +193,10 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
     BadInput
         If there is no intact checkpoint; no file is renamed then.
     FilesFailed
-        If a damaged one cannot be renamed.
+        If one cannot be read, though it may be whole, or a damaged one cannot be renamed.
     """
     problems: list[tuple[Path, str]] = []
-    for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
+    for path in reversed(checkpoint_files(folder)):
         try:
             arrays, meta = read_checkpoint(path)
         except OtherFormat:

@@ -49,6 +49,8 @@ class FolderLock:
         self._lock: Any = None
         if not folder.is_dir():  # filelock would create it
             raise FilesFailed(f"cannot write to folder {folder}: there is no such folder")
+        if path.is_symlink():
+            raise BadInput(f"{path} is a link, through which a file elsewhere would be changed; remove it")
         lock = FileLock(path, timeout=0, thread_local=False, fallback_to_soft=False)
         try:
             lock.acquire()
@@ -65,7 +67,7 @@ class FolderLock:
             )
             return
         self._lock, self._process = lock, os.getpid()
-        if not write_pid:
+        if not write_pid or path.stat().st_nlink > 1:  # a copy of the folder by hard links may have it, too
             return
         with contextlib.suppress(OSError), open(path, "r+b", buffering=0) as file:  # a full disk does no harm
             file.seek(1)  # the first byte is locked; on Windows other processes can neither read nor write it

@@ -15,7 +15,7 @@ import numpy as np
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
-from ..io.checkpoint import write_checkpoint
+from ..io.checkpoint import checkpoint_files, write_checkpoint
 from ..io.damage import sealed
 from ..io.ledger_table import LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
@@ -91,9 +91,9 @@ class RunWriter:
         self._lock: FolderLock | None = None
         self._changed = False  # by the user or an updater since case.toml was written
         self._written = written  # the case in case.toml
-        newest = max(self.folder.glob("checkpoint-*.npz"), default=None) if resumed else None
+        kept = checkpoint_files(self.folder) if resumed else []
         # the checkpoint from which this simulation continues, or the last one that it wrote
-        self._own: tuple[str, int] | None = None if newest is None else _stamp(newest)
+        self._own: tuple[str, int] | None = _stamp(kept[-1]) if kept else None
 
     def open(self, simulation: Simulation, criteria: StopCriteria) -> None:
         """Create the files or continue them; called by each `run` with its stop criteria.
@@ -152,11 +152,9 @@ class RunWriter:
     def _refuse_others_files(self, steps: int) -> None:
         """Raise BadInput if the folder holds files that this simulation, at step `steps`, did not write."""
         begun = self._resumed or self._trajectory is not None
-        newest = max(self.folder.glob("checkpoint-*.npz"), default=None)
-        if newest is None:
-            strange = not begun and (self.folder / files.TRAJECTORY).exists()
-        else:
-            strange = _stamp(newest) != self._own
+        kept = checkpoint_files(self.folder)
+        begun_by_others = not begun and (self.folder / files.TRAJECTORY).exists()
+        strange = _stamp(kept[-1]) != self._own if kept else begun_by_others
         if strange:
             advice = "continue its run with sand.resume" if begun else "give another folder"
             raise BadInput(f"another run has written to {self.folder} since this simulation was created; {advice}")
