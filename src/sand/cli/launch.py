@@ -17,8 +17,8 @@ from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..simulation.outcome import Outcome, Result
 from ..units import format_quantity
 from . import report
-from .exits import DONE, INTERRUPTED, PHYSICS
-from .job import InterruptObserver
+from .exits import DONE, INTERRUPTED, PHYSICS, WALL_TIME
+from .job import InterruptObserver, reason
 from .progress import Progress
 
 
@@ -26,9 +26,8 @@ def launch(
     make: Callable[[], Any],
     folder: Path,
     heading: str,
-    until: float | None,
-    steps: int | None = None,
-    stop: str | None = None,
+    ends: tuple[float | None, int | None, str | None],
+    wall_time: float | None,
     *,
     quiet: bool,
     as_json: bool,
@@ -41,17 +40,19 @@ def launch(
         Returns the simulation, which writes its files to `folder`.
     heading : str
         Heading of the description before the start.
-    until, steps, stop : float or None, int or None, str or None
+    ends : tuple[float or None, int or None, str or None]
         End of the run: a time [s], a number of further steps, a condition, or whichever comes first; without all, the
         planned end of the simulation.
+    wall_time : float or None
+        Wall time of the command [s] after which the run stops with a checkpoint.
 
     Returns
     -------
     int
         The exit code.
     """
-    bar = None
-    with report.compiling(quiet), InterruptObserver() as interrupts:
+    bar, (until, steps, stop) = None, ends
+    with report.compiling(quiet), InterruptObserver(wall_time) as interrupts:
         simulation = make()
         simulation.observers.append(interrupts)
         end, last_step, condition = simulation.planned
@@ -65,8 +66,8 @@ def launch(
             simulation.observers.append(bar)
         try:
             result = simulation.run(until, steps=steps, stop=stop)
-        except Interrupted as stop:
-            result = stop.result
+        except Interrupted as interruption:
+            result = interruption.result
         except FilesFailed as error:
             raise FilesFailed(f"{error}; {_how_to_recover(folder)}") from error
         except (Exception, KeyboardInterrupt) as error:
@@ -74,12 +75,13 @@ def launch(
                 raise
             result = _finished_result(simulation, goal, folder)
             if result is None:
-                return _interrupted(folder)  # an interrupted compiler may raise any exception
+                return _interrupted(folder, interrupts, wall_time)  # an interrupted compiler may raise any exception
             report.note("the figure is not drawn")
         finally:
             if bar is not None:
                 bar.finish()
-    return _conclude(result, folder, quiet=quiet, as_json=as_json)
+    code = _conclude(result, folder, reason(interrupts, wall_time), quiet=quiet, as_json=as_json)
+    return WALL_TIME if code == INTERRUPTED and interrupts.is_late else code
 
 
 def _finished_result(simulation: Any, goal: Sequence[float], folder: Path) -> Any:
@@ -98,8 +100,8 @@ def _finished_result(simulation: Any, goal: Sequence[float], folder: Path) -> An
     return Result(outcome, simulation.steps, simulation.time, simulation.ledger.drift, condition=met)
 
 
-def _conclude(result: Any, folder: Path, **output: bool) -> int:
-    """Report how a run ended; returns the exit code."""
+def _conclude(result: Any, folder: Path, why: str, **output: bool) -> int:
+    """Report how a run ended, or `why` it was interrupted; returns the exit code."""
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
     rows = [*report.results(summary), ("files", report.listed(folder))]
@@ -108,8 +110,11 @@ def _conclude(result: Any, folder: Path, **output: bool) -> int:
     if outcome is Outcome.CONDITION_MET:
         report.note(f"ended at {when}: {outcome.value}: {result.condition}")
     if outcome is Outcome.INTERRUPTED:
-        report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
+        report.note(f"{why} at {when}; resume with: {report.resume_line(folder)}")
         return INTERRUPTED
+    if outcome is Outcome.WALL_TIME:
+        report.note(f"the wall time of the condition is used up at {when}; resume with: {report.resume_line(folder)}")
+        return WALL_TIME
     if outcome.is_physics:
         report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
         last = checkpoint_files(folder)[-1]
@@ -119,15 +124,16 @@ def _conclude(result: Any, folder: Path, **output: bool) -> int:
     return DONE
 
 
-def _interrupted(folder: Path) -> int:
+def _interrupted(folder: Path, interrupts: InterruptObserver, wall_time: float | None) -> int:
     """Report an interruption before the first step, or a second one; returns the exit code."""
+    why = reason(interrupts, wall_time)
     if not folder.is_dir():
-        report.note(f"interrupted; the folder {folder} does not exist, start again")
+        report.note(f"{why}; the folder {folder} does not exist, start again")
     elif checkpoint_files(folder):
-        report.note(f"interrupted at once; continue from the last checkpoint with: {report.resume_line(folder)}")
+        report.note(f"{why} at once; continue from the last checkpoint with: {report.resume_line(folder)}")
     else:
-        report.note("interrupted before the first step; nothing is lost, start again")
-    return INTERRUPTED
+        report.note(f"{why} before the first step; nothing is lost, start again")
+    return WALL_TIME if interrupts.is_late else INTERRUPTED
 
 
 def _how_to_recover(folder: Path) -> str:

@@ -259,7 +259,9 @@ def read_json(path: Path) -> dict[str, Any]:
         raise BadInput(f"{path} is not JSON") from None
     if not isinstance(content, dict):
         raise BadInput(f"{path} is not a summary of SAND")
-    if content.get(DIGEST, digest_of(content)) != digest_of(content):
+    # every summary has a digest: one without it was changed, too
+    without = None if path.name == SUMMARY else digest_of(content)
+    if content.get(DIGEST, without) != digest_of(content):
         raise BadInput(f"{path} is damaged: its content does not match its digest")
     return content
 
@@ -274,13 +276,15 @@ def refuse_devices(path: str | Path) -> None:
         raise BadInput(f"{path} is a device or a pipe; give an ordinary file")
 
 
-def read_text(path: str | Path, most: int | None = None) -> str:
+def read_text(path: str | Path, most: int | None = None, errors: str = "strict") -> str:
     """Read the text of a UTF-8 file, with or without a byte-order mark; lines end with "\\n".
 
     Parameters
     ----------
     most : int or None, optional
         Largest accepted size in bytes, for files of any type; by default all of an ordinary file is read.
+    errors : str, optional
+        What is done with bytes that are not text, as for `bytes.decode`.
 
     Raises
     ------
@@ -303,7 +307,7 @@ def read_text(path: str | Path, most: int | None = None) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise BadInput(f"{path} is not a text file in UTF-8, but one in UTF-16; save it as UTF-8")
     try:
-        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig").read()
+        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig", errors=errors).read()
     except UnicodeDecodeError:
         raise BadInput(f"{path} is not a text file") from None
 

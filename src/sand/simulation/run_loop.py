@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time as wall
+from collections.abc import Mapping
 from typing import Any
 
 from ..integrate.parts import Stop
 from ..integrate.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
-from .condition import EVERY, EVERY_LONG, Condition, OwnCondition
+from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
 from .ledger import COUNTED, count_row
 from .observers import call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome
@@ -32,6 +33,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
     simulation._stopped_by = ""
     if condition is not None and simulation._met == (key_of(condition), simulation.steps):
         return Outcome.CONDITION_MET
+    started, is_late = wall.monotonic(), False
     frames, rows, saves = _schedules(simulation)
     every = EVERY_LONG if isinstance(simulation.stepping, RigidClusters) else EVERY
     checks = Schedule(None if condition is None else Cadence("steps", every), simulation.time, simulation.steps)
@@ -78,6 +80,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         if condition is not None and checks.is_due(simulation.time, simulation.steps):
             checks.advance(simulation.time, simulation.steps)
             met = _is_met(simulation, condition) or met
+            is_late = not met and _is_late(simulation, condition, wall.monotonic() - started)
         with_frame = done or met or frames.is_due(simulation.time, simulation.steps)
         output = with_frame or rows.is_due(simulation.time, simulation.steps)
         if output:
@@ -96,6 +99,9 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         call_ticks(simulation.observers, simulation)
         if signals.received:
             return Outcome.INTERRUPTED
+        if is_late:
+            return Outcome.WALL_TIME
+        signals.has_to_save = simulation.writer is not None
 
 
 def _schedules(simulation: Simulation) -> list[Schedule]:
@@ -114,16 +120,27 @@ def _schedules(simulation: Simulation) -> list[Schedule]:
 
 
 def _is_met(simulation: Simulation, condition: Condition | OwnCondition) -> bool:
-    """Whether the present regular state meets a condition."""
-    if isinstance(condition, OwnCondition):
-        holds = condition.holds(simulation)
+    """Whether the present regular state meets a condition, whatever the wall time."""
+    if isinstance(condition, Condition):
+        holds = _holds(simulation, condition, 0.0)
     else:
-        holds = condition.holds(
-            count_row(simulation.state) if COUNTED.issuperset(condition.names) else simulation._log_row()
-        )
+        holds = condition.holds(simulation)
     if holds:
         simulation._met = (key_of(condition), simulation.steps)
     return holds
+
+
+def _is_late(simulation: Simulation, condition: Condition | OwnCondition, seconds: float) -> bool:
+    """Whether a condition is met because of the wall time [s] of this run; the run can then be continued."""
+    return isinstance(condition, Condition) and WALL in condition.names and _holds(simulation, condition, seconds)
+
+
+def _holds(simulation: Simulation, condition: Condition, seconds: float) -> bool:
+    """Whether a condition holds after a wall time of `seconds` [s]."""
+    row: Mapping[str, float] = {}
+    if names := set(condition.names) - {WALL}:
+        row = count_row(simulation.state) if COUNTED.issuperset(names) else simulation._log_row()
+    return condition.holds({**row, WALL: seconds})
 
 
 def key_of(condition: Condition | OwnCondition) -> Any:

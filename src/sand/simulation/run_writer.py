@@ -42,7 +42,7 @@ from ..version import __version__
 from .cadence import read_cadence
 from .displays import DISPLAYS
 from .ledger import Ledger
-from .outcome import Outcome, Result
+from .outcome import UNFINISHED, Result
 from .serialise import case_of
 from .stop import StopCriteria
 from .updater import described
@@ -126,6 +126,7 @@ class RunWriter:
         """Open ledger and trajectory, or create them, and write a checkpoint."""
         if self._resumed:
             self._clean_up_earlier(simulation)
+        self._stop_beside_others()
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         times = simulation._frame_times
         resumed_at = (times[-1] if times else -math.inf) if self._resumed else None
@@ -159,6 +160,16 @@ class RunWriter:
             advice = "continue its run with sand.resume" if begun else "give another folder"
             raise BadInput(f"another run has written to {self.folder} since this simulation was created; {advice}")
 
+    def _stop_beside_others(self) -> None:
+        """Raise BadInput if another process has begun to write to the folder, where the file system has no locks."""
+        kept = [_stamp(path) for path in checkpoint_files(self.folder)[-1:]]
+        taken = self._lock is not None and not self._lock.is_held
+        if taken or (self._own is not None and kept and kept[0] > self._own):
+            raise BadInput(
+                f"another process has begun to write to {self.folder}, whose file system has no locks; this run stops "
+                "and writes nothing more to it. Continue the other one when it has ended: sand resume"
+            )
+
     def _clean_up_earlier(self, simulation: Simulation) -> None:
         """Of a resumed run: keep a copy of a damaged ledger, and delete a summary of steps that are taken again."""
         try:
@@ -175,6 +186,8 @@ class RunWriter:
         """Write a row of the ledger, and a frame."""
         if self._ledger is None:
             return
+        if self._lock is not None and not self._lock.is_held:
+            self._stop_beside_others()
         self._ledger.append(row)
         if with_frame:
             self._frame(simulation)
@@ -200,6 +213,7 @@ class RunWriter:
 
         An unsound state is not written: the last good checkpoint stays.
         """
+        self._stop_beside_others()
         regular = simulation.regular_state
         assert regular.count[STAGE] == 0
         begun = wall.monotonic()
@@ -252,8 +266,8 @@ class RunWriter:
             self._trajectory.close()
         summary = summary_of(simulation, result, ledger) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
-        # no figure after an interruption: the user is waiting for the prompt
-        if self.draws and result.outcome is not Outcome.INTERRUPTED:
+        # no figure after an interruption: the user is waiting for the prompt, or the wall time ends
+        if self.draws and result.outcome not in UNFINISHED:
             self.draw(simulation)
 
     def draw(self, simulation: Simulation) -> None:
