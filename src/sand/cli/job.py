@@ -6,7 +6,6 @@ import _thread
 import signal
 import threading
 import time
-
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
@@ -33,8 +32,8 @@ class WallTimeUsed(KeyboardInterrupt):
 class InterruptObserver(Interrupts, Observer):
     """Raises KeyboardInterrupt on all stop signals in the block; during steps `simulation.signals` handles them.
 
-    An exception raised while the compiler calls back into Python is lost. It is raised again before the next compilation,
-    or, as this class is an observer, at the first frame.
+    An exception raised while the compiler calls back into Python is lost. It is raised again before the next
+    compilation, or, as this class is an observer, at the first frame.
 
     Parameters
     ----------

@@ -38,9 +38,9 @@ def executor_for(
 ) -> Iterator[Executor | None]:
     """Context manager of an executor; None for a single worker, which is this process.
 
-    An exception in the block, also Ctrl-C or the death of a worker, stops all worker processes: no task begins after it,
-    and runs that write files end with a checkpoint. Workers do the same when this process dies. Tasks that a dask worker
-    has begun go on to their end, all others are cancelled.
+    An exception in the block, also Ctrl-C or the death of a worker, stops all worker processes: no task begins after
+    it, and runs that write files end with a checkpoint. Workers do the same when this process dies. Tasks that a dask
+    worker has begun go on to their end, all others are cancelled.
 
     Parameters
     ----------

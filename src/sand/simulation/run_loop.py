@@ -121,10 +121,7 @@ def _schedules(simulation: Simulation) -> list[Schedule]:
 
 def _is_met(simulation: Simulation, condition: Condition | OwnCondition) -> bool:
     """Whether the present regular state meets a condition, whatever the wall time."""
-    if isinstance(condition, Condition):
-        holds = _holds(simulation, condition, 0.0)
-    else:
-        holds = condition.holds(simulation)
+    holds = _holds(simulation, condition, 0.0) if isinstance(condition, Condition) else condition.holds(simulation)
     if holds:
         simulation._met = (key_of(condition), simulation.steps)
     return holds
