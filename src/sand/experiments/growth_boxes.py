@@ -106,7 +106,8 @@ def _run_all(
     observers: Sequence[Any],
 ) -> None:
     """Run the boxes of `grow`. Raises BadInput for boxes that stopped for physical reasons."""
-    run = partial(_run_one, content, {seed: str(place) for seed, place in places.items()})
+    folders = {seed: str(place.absolute()) for seed, place in places.items()}  # workers may be in another folder
+    run = partial(_run_one, content, folders)
     if executor is None:
         run = partial(run, observers=observers)
     outcomes: dict[int, str] = {}
@@ -114,11 +115,12 @@ def _run_all(
         outcomes[seed] = outcome
         if on_result is not None:
             on_result(seed, outcome)
-    problems = [
-        f"seed {seed}: stopped ({outcomes[seed]}); see {place / files.SUMMARY}"
-        for seed, place in places.items()
-        if outcomes[seed] != "finished"
-    ]
+    problems = []
+    for seed, place in places.items():
+        if outcomes[seed] != "finished":
+            problems.append(f"seed {seed}: stopped ({outcomes[seed]}); see {place / files.SUMMARY}")
+        elif not (place / files.SUMMARY).exists():
+            problems.append(f"seed {seed}: finished, but not in {place}; its worker must see the same folders")
     if problems:
         raise BadInput(problems)
 

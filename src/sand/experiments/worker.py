@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import socket
 import threading
 import time
 import warnings
@@ -34,17 +33,19 @@ _collected = threading.local()
 
 
 def begin_worker(threads: int, imports: list[str]) -> None:
-    """Prepare a new worker process: signals, watch of the parent, threads, modules of the user."""
+    """Prepare a new worker process: signals, its end with the parent, threads, modules of the user."""
     from ..compiler.progress import suppress_notes
 
     for number in SHIELDED:
         signal.signal(number, signal.SIG_IGN)
     for number in STOPPERS:
         signal.signal(number, left_to_thread)
-    reader, writer = socket.socketpair()
-    writer.setblocking(False)
-    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
-    threading.Thread(target=_watch, args=(reader, writer), daemon=True).start()
+    reader = None
+    if os.name != "nt":  # Windows ends a process without a signal
+        reader, writer = os.pipe()  # also while compiled code runs, in which Python calls no handler
+        os.set_blocking(writer, False)
+        signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    threading.Thread(target=_end_with_parent, args=(reader,), daemon=True).start()
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPPERS)
     set_threads(threads)
@@ -52,16 +53,17 @@ def begin_worker(threads: int, imports: list[str]) -> None:
     import_modules(imports)
 
 
-def _watch(reader: socket.socket, _writer: socket.socket) -> None:
-    """Stop this process after a signal, or when its parent has died.
+def _end_with_parent(reader: int | None) -> None:
+    """Stop this process after a signal, whose number is read from the pipe `reader`, or when its parent has died.
 
     A run with files ends with a checkpoint; everything else, also a compilation, ends at once.
     """
     parent = multiprocessing.parent_process()
+    sources = [each for each in (reader, None if parent is None else parent.sentinel) if each is not None]
     while True:
-        ready = wait([reader, *([parent.sentinel] if parent is not None else [])])
-        has_signal = reader in ready and not STOPPERS.isdisjoint(reader.recv(64))
-        if has_signal or len(ready) > (reader in ready):
+        ready = wait(sources)
+        has_signal = reader is not None and reader in ready and not STOPPERS.isdisjoint(os.read(reader, 64))
+        if has_signal or ready != [reader]:
             break
     _stopping.set()
     if not Signals.ends_with_checkpoint():

@@ -85,4 +85,4 @@ def _is_free(number: int) -> bool:
 
 
 def left_to_thread(_number: int, _frame: FrameType | None) -> None:
-    """Handler of a worker process outside of its runs: the thread that watches gets the signal."""
+    """Handler of a worker process outside of its runs: a thread of the worker gets the signal."""
