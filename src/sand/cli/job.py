@@ -35,26 +35,22 @@ class InterruptObserver(Interrupts, Observer):
     An exception raised while the compiler calls back into Python is lost. It is raised again before the next
     compilation, or, as this class is an observer, at the first frame.
 
-    Parameters
+    Attributes
     ----------
-    wall_time : float or None, optional
-        Wall time [s] of the command after which the block is interrupted as by a signal.
+    why : str
+        Why the command was interrupted.
+    is_late : bool
+        Whether the wall time is used up.
     """
 
-    def __init__(self, wall_time: float | None = None) -> None:
+    def __init__(self) -> None:
         super().__init__(STOPS)
-        self.is_late = False
+        self.why, self.is_late = "interrupted", False
         self._timer: threading.Timer | None = None
-        if wall_time is not None:
-            left = min(max(BEGAN + wall_time - time.monotonic(), 0.0), threading.TIMEOUT_MAX)
-            self._timer = threading.Timer(left, self._end_wall_time)
-            self._timer.daemon = True
 
     def __enter__(self) -> InterruptObserver:
         super().__enter__()
         before_first_calls.append(self._check)
-        if self._timer is not None:
-            self._timer.start()
         return self
 
     def __exit__(self, *problem: object) -> None:
@@ -63,9 +59,18 @@ class InterruptObserver(Interrupts, Observer):
         before_first_calls.remove(self._check)
         super().__exit__(*problem)
 
-    def _end_wall_time(self) -> None:
+    def limit(self, wall_time: float | None) -> None:
+        """Interrupt the block, as by a signal, after the wall time `wall_time` [s] of the command; None: no limit."""
+        if wall_time is not None:
+            left = min(max(BEGAN + wall_time - time.monotonic(), 0.0), threading.TIMEOUT_MAX)
+            late = f"the wall time of {format_quantity(wall_time, 's')} is used up"
+            self._timer = threading.Timer(left, self._end_wall_time, [late])
+            self._timer.daemon = True
+            self._timer.start()
+
+    def _end_wall_time(self, why: str) -> None:
         """Interrupt the main thread, also where it waits."""
-        self.is_late = True
+        self.is_late, self.why = True, why
         # Ctrl-C is ignored in a background job of a shell
         number = next((one for one in STOPS if one != signal.SIGINT and one in self._before), signal.SIGINT)
         if hasattr(signal, "pthread_kill"):
@@ -73,22 +78,20 @@ class InterruptObserver(Interrupts, Observer):
         else:
             _thread.interrupt_main(number)
 
+    def _raise(self, number: int, frame: Any) -> None:
+        try:
+            super()._raise(number, frame)
+        except KeyboardInterrupt:
+            raise (WallTimeUsed(self.why) if self.is_late else KeyboardInterrupt) from None
+
     def _check(self) -> None:
         Signals.check()
-        if self.received:
-            raise KeyboardInterrupt
+        self.see(None, {})
 
     def see(self, simulation: Any, row: dict[str, float]) -> None:
         """Raise an exception that was lost."""
         if self.received:
             raise KeyboardInterrupt
-
-
-def reason(interrupts: InterruptObserver, wall_time: float | None) -> str:
-    """Why a command was interrupted."""
-    if interrupts.is_late and wall_time is not None:
-        return f"the wall time of {format_quantity(wall_time, 's')} is used up"
-    return "interrupted"
 
 
 @contextmanager
@@ -110,12 +113,14 @@ def running_job(
     KeyboardInterrupt
         After a signal, or as `WallTimeUsed` after the wall time `wall_time` [s]; its text says how to continue.
     """
-    interrupts = InterruptObserver(wall_time)
+    interrupts = InterruptObserver()
     try:
-        with report.compiling(quiet), interrupts, executor_for(workers, scheduler, threads) as executor:
-            yield executor, interrupts
+        with report.compiling(quiet), interrupts:
+            interrupts.limit(wall_time)
+            with executor_for(workers, scheduler, threads) as executor:
+                yield executor, interrupts
     except (KeyboardInterrupt, BrokenExecutor) as error:
         if isinstance(error, BrokenExecutor) and not (interrupts.received or interrupts.is_late):
             raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
-        text = f"{reason(interrupts, wall_time)}; {report.how_to_continue(folder)}"
+        text = f"{interrupts.why}; {report.how_to_continue(folder)}"
         raise (WallTimeUsed if interrupts.is_late else KeyboardInterrupt)(text) from None

@@ -18,7 +18,7 @@ from ..simulation.outcome import Outcome, Result
 from ..units import format_quantity
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS, WALL_TIME
-from .job import InterruptObserver, reason
+from .job import InterruptObserver
 from .progress import Progress
 
 
@@ -52,7 +52,8 @@ def launch(
         The exit code.
     """
     bar, (until, steps, stop) = None, ends
-    with report.compiling(quiet), InterruptObserver(wall_time) as interrupts:
+    with report.compiling(quiet), InterruptObserver() as interrupts:
+        interrupts.limit(wall_time)
         simulation = make()
         simulation.observers.append(interrupts)
         end, last_step, condition = simulation.planned
@@ -75,12 +76,12 @@ def launch(
                 raise
             result = _finished_result(simulation, goal, folder)
             if result is None:
-                return _interrupted(folder, interrupts, wall_time)  # an interrupted compiler may raise any exception
+                return _interrupted(folder, interrupts)  # an interrupted compiler may raise any exception
             report.note("the figure is not drawn")
         finally:
             if bar is not None:
                 bar.finish()
-    code = _conclude(result, folder, reason(interrupts, wall_time), quiet=quiet, as_json=as_json)
+    code = _conclude(result, folder, interrupts.why, quiet=quiet, as_json=as_json)
     return WALL_TIME if code == INTERRUPTED and interrupts.is_late else code
 
 
@@ -124,15 +125,14 @@ def _conclude(result: Any, folder: Path, why: str, **output: bool) -> int:
     return DONE
 
 
-def _interrupted(folder: Path, interrupts: InterruptObserver, wall_time: float | None) -> int:
+def _interrupted(folder: Path, interrupts: InterruptObserver) -> int:
     """Report an interruption before the first step, or a second one; returns the exit code."""
-    why = reason(interrupts, wall_time)
     if not folder.is_dir():
-        report.note(f"{why}; the folder {folder} does not exist, start again")
+        report.note(f"{interrupts.why}; the folder {folder} does not exist, start again")
     elif checkpoint_files(folder):
-        report.note(f"{why} at once; continue from the last checkpoint with: {report.resume_line(folder)}")
+        report.note(f"{interrupts.why} at once; continue from the last checkpoint with: {report.resume_line(folder)}")
     else:
-        report.note(f"{why} before the first step; nothing is lost, start again")
+        report.note(f"{interrupts.why} before the first step; nothing is lost, start again")
     return WALL_TIME if interrupts.is_late else INTERRUPTED
 
 

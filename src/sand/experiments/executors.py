@@ -124,6 +124,7 @@ class _Pool(ProcessPoolExecutor):
 
     def stop(self) -> None:
         """Stop all processes: those that write the files of a run write a checkpoint first."""
+        manager: Any = self._executor_manager_thread
         self.shutdown(wait=False, cancel_futures=True)
         processes = list(self._workers.values())
         with _only_ctrl_c():
@@ -136,6 +137,8 @@ class _Pool(ProcessPoolExecutor):
             finally:  # also after a second Ctrl-C
                 for process in processes:
                     process.kill()
+                if manager is not None:  # at the end of the program it must not be at work
+                    manager.join(LONGEST_STOP)
 
 
 @contextmanager
