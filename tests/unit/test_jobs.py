@@ -114,7 +114,7 @@ def test_a_signal_prevents_further_compilation(workdir, capsys, monkeypatch):
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("condition", ["wall > 1 ns", "wall > 1e-9 and time > 0.2 ns", "clusters == 0 or wall > 1e-9"])
 def test_a_run_in_parts_of_a_wall_time_has_the_same_bits(tmp_path, condition):
-    """Stopped by its wall time at every check of the condition, each 100 steps: no frame or row is added."""
+    """Stopped by its wall time at each return of the compiled steps: no frame or row is added."""
     setup = struck_chain()
     given = {"frame_every": "0.3 ns"}
     whole = sand.Simulation(setup.grains, setup.forces, out=tmp_path / "whole", **given)

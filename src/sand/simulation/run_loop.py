@@ -33,7 +33,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
     simulation._stopped_by = ""
     if condition is not None and simulation._met == (key_of(condition), simulation.steps):
         return Outcome.CONDITION_MET
-    started, is_late = wall.monotonic(), False
+    started = wall.monotonic()
     frames, rows, saves = _schedules(simulation)
     every = EVERY_LONG if isinstance(simulation.stepping, RigidClusters) else EVERY
     checks = Schedule(None if condition is None else Cadence("steps", every), simulation.time, simulation.steps)
@@ -80,7 +80,6 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         if condition is not None and checks.is_due(simulation.time, simulation.steps):
             checks.advance(simulation.time, simulation.steps)
             met = _is_met(simulation, condition) or met
-            is_late = not met and _is_late(simulation, condition, wall.monotonic() - started)
         with_frame = done or met or frames.is_due(simulation.time, simulation.steps)
         output = with_frame or rows.is_due(simulation.time, simulation.steps)
         if output:
@@ -99,7 +98,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         call_ticks(simulation.observers, simulation)
         if signals.received:
             return Outcome.INTERRUPTED
-        if is_late:
+        if condition is not None and _is_late(simulation, condition, wall.monotonic() - started):
             return Outcome.WALL_TIME
         signals.has_to_save = simulation.writer is not None
 
