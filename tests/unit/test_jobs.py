@@ -116,11 +116,11 @@ def test_a_signal_prevents_further_compilation(workdir, capsys, monkeypatch):
 def test_a_run_in_parts_of_a_wall_time_has_the_same_bits(tmp_path, condition):
     """Stopped by its wall time at each return of the compiled steps: no frame or row is added."""
     setup = struck_chain()
-    given = {"frame_every": "0.3 ns"}
+    given = {"frame_every": "0.15 ns"}
     whole = sand.Simulation(setup.grains, setup.forces, out=tmp_path / "whole", **given)
-    whole.run(until="1 ns", stop="clusters == 0")
+    whole.run(until="0.5 ns", stop="clusters == 0")
     simulation = sand.Simulation(setup.grains, setup.forces, out=tmp_path / "parts", **given)
-    outcomes = [simulation.run(until="1 ns", stop=condition).outcome]
+    outcomes = [simulation.run(until="0.5 ns", stop=condition).outcome]
     while outcomes[-1] is not sand.Outcome.FINISHED and len(outcomes) < 100:
         outcomes.append(sand.resume(tmp_path / "parts").run().outcome)
     assert len(outcomes) > 2 and set(outcomes[:-1]) == {sand.Outcome.WALL_TIME}
@@ -216,6 +216,18 @@ def test_warnings_of_other_processes_are_issued_here():
         assert sorted(results_of(executor, failing_work, [1, 2])) == [(1, 2), (2, 4)]
     assert len(seen) == 2
     assert list(results_of(None, abs, [-1, 2])) == [(-1, 1), (2, 2)]
+
+
+@pytest.mark.compiled("contacts")
+def test_boxes_on_a_cluster(workdir, capsys):
+    """`sand grow --scheduler` with a dask worker: all boxes, as with worker processes."""
+    distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        words = ["--seeds", "1-2", "--out", "g", "--quiet", "--scheduler", cluster.scheduler_address]
+        assert main(["grow", "box.toml", *words]) == 0
+    assert json.loads((workdir / "g" / "growth.json").read_text())["seeds"] == [1, 2]
 
 
 # --- where the file system has no locks ------------------------------------------------------------------------------
