@@ -9,7 +9,7 @@ import warnings
 import sand
 from sand.simulation.run_writer import versions
 
-from . import compare, files, quick_figures, regimes, rigid_clusters, scaling, settling, vibrations
+from . import compare, estimates, files, quick_figures, regimes, rigid_clusters, scaling, settling, vibrations
 from .long_range import growth, savings, tell
 from .rows import all_rows
 from .table import HEAD, about, line, tell_about
@@ -22,6 +22,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="one JSON object")
     parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
     parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
+    parser.add_argument("--estimates", action="store_true", help="write benchmarks/estimates.csv, instead")
     parser.add_argument("--page", action="store_true", help="what the page of a run costs in a browser, instead")
     parser.add_argument("--scaling", action="store_true", help="cost of a grain's step from 100 grains on, instead")
     parser.add_argument(
@@ -45,6 +46,9 @@ def main() -> None:
         parser.error("--tests is for --quoted")
     if options.quoted:
         print(quick_figures.write(options.tests))
+        return
+    if options.estimates:
+        print(estimates.write())
         return
     if options.settling:
         print(settling.write())

@@ -15,6 +15,34 @@ FRAMES = 200
 """Frames of a run by default."""
 
 
+OUTPUTS = 100
+"""Outputs in a run that measures what one costs."""
+LIMITS = {100: 0.5e-3, 1000: 2e-3}
+"""Largest CPU time [s] of an output by number of grains."""
+
+
+def output_seconds(count: int) -> float:
+    """CPU time [s] of an output of so many grains: the step to its time, row, frame and file.
+
+    A run with `OUTPUTS` outputs less one without any, of the same steps; the least of three pairs.
+    """
+    start = dimers(count, PER_VOLUME)
+    found = []
+    for _ in range(3):
+        with tempfile.TemporaryDirectory() as place:
+            taken = []
+            for out, every in ((Path(place) / "run", "0.1 ns"), (None, "1 s")):
+                sim = sand.Simulation(start.grains, start.forces, box=start.box, out=out, frame_every=every)
+                if sim.writer is not None:
+                    sim.writer.draws = False
+                sim.run(until="1 ns")  # loads code
+                began = time.process_time()
+                sim.run(until=1e-9 + OUTPUTS * 1e-10)
+                taken.append(time.process_time() - began)
+            found.append((taken[0] - taken[1]) / OUTPUTS)
+    return min(found)
+
+
 def costs(count: int = 10_000) -> dict[str, Any]:
     """Seconds of wall time for a step, a row, a frame and a checkpoint, in one run of so many grains."""
     with tempfile.TemporaryDirectory() as place:
@@ -36,7 +64,14 @@ def costs(count: int = 10_000) -> dict[str, Any]:
             spent["checkpoint"].append(_seconds(lambda: record.save(sim)))
         sizes = {path.suffix: path.stat().st_size for path in (Path(place) / "run").iterdir()}
         told = {name: sorted(times)[2] for name, times in spent.items()}
-        return {"grains": count, "step": seconds_per_step(sim), **told, "checkpoint_bytes": sizes[".npz"]}
+        outputs = {str(number): output_seconds(number) for number in LIMITS}
+        return {
+            "outputs": outputs,
+            "grains": count,
+            "step": seconds_per_step(sim),
+            **told,
+            "checkpoint_bytes": sizes[".npz"],
+        }
 
 
 def share(cost: dict[str, Any], steps: float) -> float:
@@ -49,6 +84,10 @@ def share(cost: dict[str, Any], steps: float) -> float:
 
 def tell(cost: dict[str, Any]) -> None:
     """Print it."""
+    for number, most in LIMITS.items():
+        seconds = cost["outputs"][str(number)]
+        missed = "" if seconds <= most else "  MISSED"
+        print(f"an output of {number} grains {1e3 * seconds:6.2f} ms of CPU time, at most {1e3 * most:g}{missed}")
     for name in ("step", "row", "frame", "checkpoint"):
         print(f"{name:12} {1e3 * cost[name]:10.3f} ms")
     print(f"checkpoint   {cost['checkpoint_bytes'] / cost['grains']:10.0f} bytes per grain")

@@ -11,3 +11,4 @@ IS_ROOT = getattr(os, "geteuid", lambda: -1)() == 0
 
 stops_others = pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT or SIGTERM to another process")
 keeps_modes = pytest.mark.skipif(os.name == "nt", reason="Windows has no permission bits of group and others")
+needs_terminals = pytest.mark.skipif(os.name == "nt", reason="Windows has no pseudo-terminals")

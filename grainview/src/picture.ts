@@ -112,8 +112,11 @@ export class Picture {
     const kind = settings.get<string>("bonds");
     this.bondScale = loadScale(dataset.manifest, frame);
     const colourOf = bondColours(kind, frame, dataset.manifest, this.bondScale);
-    const pieces = kind === "off" ? null : bondPieces(frame, this.positions, world.shown, dataset.manifest, colourOf);
-    world.setBonds(pieces, settings.number("bar") * this.medianRadius);
+    const { radius } = dataset.grains;
+    const { positions } = this;
+    const pieces =
+      kind === "off" ? null : bondPieces(frame, positions, radius, world.shown, dataset.manifest, colourOf);
+    world.setBonds(pieces, settings.number("bar"));
   }
 
   private shownGrains(frame: Frame): Uint8Array | null {

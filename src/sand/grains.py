@@ -13,7 +13,8 @@ from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
-from .schema import BY_NAME, CHANGEABLE, FIELDS, OWN, public, stored
+from .own_quantities import OwnQuantities, read_own, refuse_same_letters
+from .schema import BY_NAME, CHANGEABLE, FIELDS, public, stored
 from .units import format_quantity, in_unit
 
 ROUNDING = 1e-7
@@ -30,7 +31,6 @@ class GrainArrays(NamedTuple):
     mass: np.ndarray
     inertia: np.ndarray
     charge: np.ndarray
-    internal_temperature: np.ndarray
     body_moment: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
@@ -40,11 +40,12 @@ class GrainArrays(NamedTuple):
     force: np.ndarray
     torque: np.ndarray
     field: np.ndarray
+    own: np.ndarray  # own quantities, (K, N); their names and units are those of Grains.own
     material: np.ndarray  # index into Grains.materials, uint32
     id: np.ndarray  # the user's index of the grain, uint32
 
 
-NAMES = GrainArrays._fields
+NAMES = tuple(name for name in GrainArrays._fields if name != "own")
 """Public quantities of `Grains`."""
 
 
@@ -115,8 +116,9 @@ class Grains:
     mass : float or str or array_like, optional
         Scalar or (N,) [kg] > 0. Default: density × volume.
     own : dict, optional
-        Own quantities (kind "own" of `sand.schema.FIELDS`), such as {"internal_temperature": "300 K"}: scalars
-        or (N,). No force depends on them; checkpoints, frames, figures and the viewer have them. Default: zero.
+        Own quantities by name: text with a unit, as {"temperature": "300 K"}; numbers and their unit, one or (N,), as
+        {"heating": (values, "W/m^2")}; numbers without a unit; or the `own` of other grains. Values are kept in SI.
+        No force depends on them; updaters may change them; all files, figures and the viewer have them.
 
     Raises
     ------
@@ -141,11 +143,11 @@ class Grains:
         problems: list[str] = []
         arrays = {f.name: np.zeros(count if f.width == 1 else (f.width, count)) for f in FIELDS}
         given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
-        for name, values in (own or {}).items():
-            if name in OWN:
-                given[name] = values
-            else:
-                problems.append(f"own: there is no quantity {shown(name)}; {did_you_mean(str(name), OWN)}")
+        carried = OwnQuantities({}, {})
+        try:
+            carried = read_own(own, count)
+        except BadInput as error:
+            problems += error.problems
         for name, values in given.items():
             if values is None and name not in ("position", "radius"):
                 continue
@@ -168,23 +170,52 @@ class Grains:
         arrays["inertia"] = 0.4 * arrays["mass"] * arrays["radius"] ** 2
         arrays["orientation"][3] = 1.0
         arrays["moment"] = arrays["body_moment"].copy()
-        self.arrays = GrainArrays(**arrays, material=index, id=np.arange(count, dtype=np.uint32))
+        self.own_units = carried.units
+        rows = np.array(list(carried.values())).reshape(len(carried), count)
+        self.arrays = GrainArrays(**arrays, own=rows, material=index, id=np.arange(count, dtype=np.uint32))
 
     def __len__(self) -> int:
         return self.arrays.radius.size
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Read-only view of a quantity of the field table, (N,) or (N, width)."""
+        """Read-only view of a quantity of the field table, (N,) or (N, width), or of an own quantity."""
+        units = self.__dict__.get("own_units", {})
+        if name in units:
+            return public(self.arrays.own[list(units).index(name)])
         if name not in NAMES:
-            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
+            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, (*NAMES, *units))}")
         return public(getattr(self.arrays, name))
+
+    @property
+    def own(self) -> OwnQuantities:
+        """Own quantities by name, read-only (N,), and their `units`."""
+        return OwnQuantities(dict(zip(self.own_units, self.arrays.own, strict=True)), self.own_units)
+
+    def with_own(self, own: Mapping[str, Any]) -> Grains:
+        """A copy with these own quantities, as in the argument `own`, beside or in place of those that it has.
+
+        Raises
+        ------
+        BadInput
+            If a name or a value cannot be used; one line for each.
+        """
+        more, other = read_own(own, len(self)), self.copy()
+        for name in more:
+            refuse_same_letters(name, (other_name for other_name in self.own_units if other_name != name))
+        units = self.own_units | more.units
+        rows = [more[name] if name in more else self.own[name] for name in units]
+        other.__dict__["own_units"] = units
+        other.arrays = other.arrays._replace(own=np.array(rows).reshape(len(units), len(self)))
+        return other
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse assignments, which would leave the arrays and derived quantities unchanged."""
-        if name == "arrays" or (name == "materials" and name not in self.__dict__):
+        if name == "arrays" or (name in ("materials", "own_units") and name not in self.__dict__):
             object.__setattr__(self, name, value)
-        elif name in NAMES or name == "materials":
-            key = "material=…" if name == "materials" else f'own={{"{name}": …}}' if name in OWN else f"{name}=…"
+        elif name in (*NAMES, "materials", "own", "own_units", *self.own_units):
+            own = "own={…}" if name.startswith("own") else f'own={{"{name}": …}}'
+            is_own = name in ("own", "own_units", *self.own_units)
+            key = own if is_own else "material=…" if name == "materials" else f"{name}=…"
             raise NoSuchAttribute(
                 f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}), "
                 "and build a new Simulation from them"
@@ -195,12 +226,12 @@ class Grains:
                 )
             )
         elif type(self).__module__.startswith("sand."):
-            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
+            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, (*NAMES, *self.own_units))}")
         else:
             object.__setattr__(self, name, value)
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *NAMES]
+        return [*super().__dir__(), *NAMES, *self.own_units]
 
     def __getitem__(self, index: Any) -> Grains:
         """Grains of this index, slice, mask (N,) or list of indices, as new grains with indices from 0.
@@ -250,8 +281,13 @@ class Grains:
 
     def copy(self) -> Grains:
         """Return an independent copy."""
-        other = copy.copy(self)
-        other.arrays = GrainArrays(*(a.copy() for a in self.arrays))
+        return self.with_arrays(GrainArrays(*(a.copy() for a in self.arrays)))
+
+    def with_arrays(self, arrays: GrainArrays) -> Grains:
+        """Return grains of the same materials with other arrays."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        object.__setattr__(other, "arrays", arrays)
         return other
 
 

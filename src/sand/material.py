@@ -17,12 +17,14 @@ _RANGES: dict[str, tuple[str, dict[str, float]]] = {
     "poisson_ratio": ("1", {"above": -1.0}),
     "rolling_limit": ("m", {"above": 0.0}),
     "specific_moment": ("A m^2/kg", {"least": 0.0}),
-    "anisotropy": ("J/m^3", {"above": 0.0}),
+    "anisotropy": ("J/m^3", {}),
     "exchange_stiffness": ("J/m", {"above": 0.0}),
 }
 """Unit and lower limit of each number."""
 OPTIONAL = ("surface_energy", "anisotropy", "exchange_stiffness")
 """Numbers that may be None, for unknown."""
+ANISOTROPIES = ("uniaxial", "cubic")
+"""Kinds of magnetic anisotropy."""
 
 
 @checked
@@ -48,10 +50,15 @@ class Material:
     specific_moment : float or str, optional
         Magnetic moment per mass [A m²/kg] ≥ 0, at saturation.
     anisotropy : float or str, optional
-        Effective uniaxial magnetic anisotropy K [J/m³] > 0. No force depends on it or on the next one: with both SAND
-        reports where moments fixed in the grains are no good model (`sand.theory.magnetic_limits`).
+        Magnetic anisotropy K [J/m³]: of a uniaxial grain > 0, or the first cubic constant K₁ ≠ 0 of a cubic crystal. No
+        force depends on it or on the next two: with them SAND reports where moments fixed in the grains are no good
+        model (`sand.theory.magnetic_limits`).
     exchange_stiffness : float or str, optional
         Exchange stiffness A [J/m] > 0.
+    anisotropy_kind : str, optional
+        "uniaxial", energy per volume −K cos²θ from one easy axis: of a hexagonal crystal, or of an elongated grain with
+        its effective K. "cubic", K₁ (α₁²α₂² + α₂²α₃² + α₃²α₁²) with the direction cosines α: a round grain of a cubic
+        crystal.
 
     Raises
     ------
@@ -68,6 +75,7 @@ class Material:
     specific_moment: Any = 0.0
     anisotropy: Any = None
     exchange_stiffness: Any = None
+    anisotropy_kind: str = "uniaxial"
 
     def __post_init__(self) -> None:
         problems: list[str] = []
@@ -83,8 +91,21 @@ class Material:
             if key == "poisson_ratio" and number > 0.5:
                 problems.append(f"{self.name}: poisson_ratio = {value!r} must not exceed 0.5")
             object.__setattr__(self, key, number)
+        problems += self._wrong_anisotropy()
         if problems:
             raise BadInput(problems)
+
+    def _wrong_anisotropy(self) -> list[str]:
+        """Messages about the kind of anisotropy, and a K that it does not allow."""
+        if self.anisotropy_kind not in ANISOTROPIES:
+            kinds = did_you_mean(str(self.anisotropy_kind), ANISOTROPIES)
+            return [f"{self.name}: anisotropy_kind = {shown(self.anisotropy_kind)}; {kinds}"]
+        k = self.anisotropy
+        if isinstance(k, float) and (k == 0.0 or (k < 0.0 and self.anisotropy_kind == "uniaxial")):
+            allowed = "must be above 0 J/m^3" if self.anisotropy_kind == "uniaxial" else "must not be 0 J/m^3"
+            cubic = "; K1 of a cubic crystal may be negative: anisotropy_kind = 'cubic'" if k < 0.0 else ""
+            return [f"{self.name}: anisotropy = {k:g} {allowed} if it is {self.anisotropy_kind}{cubic}"]
+        return []
 
     @property
     def shear_modulus(self) -> float:
@@ -109,14 +130,12 @@ GRAPHITE = Material("graphite", 2200.0, 0.075, 10.0e9, 0.32)
 """Graphite (DT97)."""
 FORSTERITE = Material("forsterite", 3210.0, 0.07, 204.0e9, 0.24)
 """Forsterite."""
-IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, specific_moment=200.0, anisotropy=4.8e4, exchange_stiffness=2e-11)
-"""Iron (DT97), 200 A m²/kg as in the paper. K (first cubic constant) and A at room temperature are recalled from the
-literature: check them before you rely on the limits that follow."""
-MAGNETITE = Material(
-    "magnetite", 5200.0, None, 230.0e9, 0.26, specific_moment=92.0, anisotropy=1.1e4, exchange_stiffness=1.2e-11
-)
-"""Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`. K (magnitude of
-the first cubic constant) and A at room temperature are recalled from the literature, as for iron."""
+IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, "10 angstrom", 200.0, 4.8e4, 2e-11, "cubic")
+"""Iron (DT97), 200 A m²/kg as in the paper. K₁ (cubic) and A at room temperature are recalled from the literature, not
+read at the source: check them before you rely on the limits that follow."""
+MAGNETITE = Material("magnetite", 5200.0, None, 230.0e9, 0.26, "10 angstrom", 92.0, -1.1e4, 1.2e-11, "cubic")
+"""Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`. K₁ (cubic) and A
+at room temperature are recalled from the literature, as for iron."""
 
 PRESETS = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
 PRESETS["quartz"] = SILICA.but(name="quartz")

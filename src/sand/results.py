@@ -22,7 +22,6 @@ from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
-from .schema import BY_NAME, own_values
 from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -213,9 +212,12 @@ class Run:
             "radius": ("grain", whole[0].radius, {"units": "m"}),
             "material": ("grain", np.array(whole[0].materials)[whole[0].material]),
             "axis": ("axis", list("xyz")),
-            **{name: ("grain", v, {"units": BY_NAME[name].unit}) for name, v in own_values(whole[0]).items()},
         }
-        columns = {name: (("frame", "grain"), values) for name, values in of_grains.items()}
+        columns: dict[str, Any] = {name: (("frame", "grain"), values) for name, values in of_grains.items()}
+        columns |= {
+            name: (("frame", "grain"), np.array([one.own[name] for one in whole]), {"units": unit})
+            for name, unit in whole[0].own.units.items()
+        }
         return xarray.Dataset(data | columns, coords=coordinates)
 
     def to_pandas(self) -> Any:

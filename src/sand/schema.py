@@ -16,8 +16,7 @@ class Field(NamedTuple):
     name: str
     width: int  # numbers per grain
     unit: str
-    # "fixed": constant; "own": constant, of the user, no force depends on it; "moving": integrated in time; "load":
-    # computed from the others
+    # "fixed": constant; "moving": integrated in time; "load": computed from the others
     kind: str
     meaning: str
     symbol: str
@@ -28,9 +27,6 @@ FIELDS = (
     Field("mass", 1, "kg", "fixed", "mass", "m"),
     Field("inertia", 1, "kg m^2", "fixed", "moment of inertia, (2/5) m r²", "I"),
     Field("charge", 1, "C", "fixed", "electric charge", "q"),
-    Field(
-        "internal_temperature", 1, "K", "own", "temperature of the material of the grain; its range is not checked", "T"
-    ),
     Field("body_moment", 3, "A m^2", "fixed", "magnetic moment in the frame of the grain", "μ_body"),
     Field("position", 3, "m", "moving", "centre, laboratory frame", "r"),
     Field("velocity", 3, "m/s", "moving", "velocity of the centre, laboratory frame", "v"),
@@ -45,14 +41,6 @@ FIELDS = (
 BY_NAME = {field.name: field for field in FIELDS}
 CHANGEABLE = ("velocity", "spin", "moment", "charge")
 """Quantities that `Simulation.change` can change."""
-OWN = tuple(field.name for field in FIELDS if field.kind == "own")
-"""Quantities of `Grains(own=…)`: carried along, stored in checkpoints and frames, and shown."""
-
-
-def own_values(grains: Any) -> dict[str, np.ndarray]:
-    """Own quantities of which any grain has a value, by name; of grains, or of a frame."""
-    found = {name: np.asarray(getattr(grains, name, 0.0), dtype=np.float64) for name in OWN}
-    return {name: values for name, values in found.items() if values.any()}
 
 
 def public(array: np.ndarray) -> np.ndarray:

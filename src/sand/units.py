@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
@@ -95,14 +96,18 @@ def _factor(text: str, unit: str) -> float | None:
         return factor if given[1:] == wanted[1:] and 0.0 < factor < math.inf else None
     import pint
 
-    spelled = text.replace("·", "*").replace("²", "**2").replace("³", "**3")
-    spelled = re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", spelled)
     try:
-        none, one = (_registry().Quantity(n, spelled).to(unit.replace("^", "**")).magnitude for n in (0.0, 1.0))
+        none, one = (_registry().Quantity(n, _spelled(text)).to(unit.replace("^", "**")).magnitude for n in (0.0, 1.0))
         # units with an offset (0 degC is not 0 K) and logarithmic units (0 dB is 1) have no factor
         return float(one) if none == 0.0 and 0.0 < one < math.inf else None
     except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError, ValueError, AssertionError):
         return None
+
+
+def _spelled(text: str) -> str:
+    """A unit in the notation of pint."""
+    spelled = text.replace("·", "*").replace("²", "**2").replace("³", "**3")
+    return re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", spelled)
 
 
 def _times(number: str, factor: float) -> float:
@@ -153,6 +158,135 @@ def in_unit(value: Any, unit: str) -> Any:
     except (TypeError, ValueError, OverflowError, RecursionError):
         return None
     return float(array) if array.ndim == 0 else array
+
+
+_SI_UNITS = (
+    "m",
+    "kg",
+    "s",
+    "A",
+    "K",
+    "mol",
+    "cd",
+    "rad",
+    "N",
+    "J",
+    "W",
+    "Pa",
+    "C",
+    "V",
+    "ohm",
+    "T",
+    "Wb",
+    "F",
+    "H",
+    "Hz",
+)
+"""Units of SI without a prefix that replace others of the same dimension."""
+
+
+@functools.lru_cache(maxsize=512)
+def si_unit(text: str) -> str | None:
+    """SI unit of the dimension of a unit: "W/m^2" for "mW/cm^2", "J" for "eV", "1" for "percent".
+
+    A unit that is one of SI is kept as it is written; of others, each factor becomes one of SI.
+
+    Parameters
+    ----------
+    text : str
+        A unit as in text with a unit, or its inverse "1/s"; "1" or "" for pure numbers.
+
+    Returns
+    -------
+    str or None
+        The unit; None if it is unknown, or no multiple of a unit of SI: degC has an offset, dB a logarithm.
+    """
+    unit = _as_factors(text)
+    if unit in ("", "1"):
+        return "1"
+    match = _TEXT.fullmatch(f"1 {unit}") if len(unit) < LONGEST_TEXT else None
+    if not match or not match[2]:
+        return None
+    written = re.sub(r"\s*([*/·])\s*", r"\1", unit.replace("**", "^").replace("²", "^2").replace("³", "^3"))
+    powers = _powers(unit)
+    if powers and powers[0] == 0:
+        return written
+    import pint
+
+    try:
+        base = _compact(_registry().get_base_units(_spelled(unit))[1])
+        factor = _factor(unit, base)
+        if factor is None or factor == 1.0 or base == "1":
+            return None if factor is None else "1" if base == "1" else written
+        known = {_compact(_registry().get_base_units(each)[1]): each for each in reversed(_SI_UNITS)}
+        parts: dict[str, int] = {}
+        for name, power in _registry().parse_units(_spelled(unit))._units.items():
+            own = _compact(_registry().get_base_units(name)[1])
+            if own != "1":
+                parts[known.get(own, own)] = parts.get(known.get(own, own), 0) + int(power)
+        simple = all(re.fullmatch("[A-Za-z]+", name) for name in parts)
+        found = _written(parts) if simple else base
+        return found if _factor(unit, found) is not None else base
+    except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError, ValueError, AssertionError):
+        return None
+
+
+def _as_factors(text: str) -> str:
+    """A unit that begins with a name and has no brackets: "s^-1" for "1/s", "J/kg/K" for "J/(kg K)"."""
+    flat = re.sub(
+        r"/\s*\(([^()]*)\)", lambda found: "/" + "/".join(re.split(r"[\s*·]+", found[1].strip())), text.strip()
+    )
+    inverse = re.fullmatch(r"1\s*/\s*([^\W\d²³]+)(?:(?:\^|\*\*)?(\d)|([²³]))?", flat)
+    return f"{inverse[1]}^-{inverse[2] or {'²': 2, '³': 3}.get(inverse[3], 1)}" if inverse else flat
+
+
+def _written(powers: Mapping[str, int]) -> str:
+    """Unit from the powers of its factors: "kg m^2/s^3"."""
+    above, below = (
+        [f"{name}^{abs(p)}" if abs(p) > 1 else name for name, p in powers.items() if p * sign > 0] for sign in (1, -1)
+    )
+    if not above:
+        return " ".join(f"{name}^{p}" for name, p in powers.items() if p) or "1"
+    return "/".join([" ".join(above), *below])
+
+
+def _compact(unit: Any) -> str:
+    """A unit of base units of pint, with symbols and integer powers."""
+    return _written({f"{_registry().get_symbol(name)}": int(power) for name, power in unit._units.items()})
+
+
+def with_own_unit(value: Any) -> tuple[Any, str] | None:
+    """Convert a quantity of any dimension to SI.
+
+    Parameters
+    ----------
+    value : float, array_like, str, tuple or quantity
+        Numbers without a unit; text with a unit; numbers and a unit, `(values, "W/m^2")`; or a quantity of pint or
+        astropy.
+
+    Returns
+    -------
+    tuple of (float or ndarray, str) or None
+        Values, and their unit of SI; None if it is no such quantity.
+    """
+    given: str = "1"
+    if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str):
+        value, given = (None if isinstance(value[0], str) else value[0]), _as_factors(value[1])
+    elif isinstance(value, str):
+        match = re.fullmatch(rf"\s*({_NUMBER})(.*)", value) if len(value) <= LONGEST_TEXT else None
+        value, given = (match[1], _as_factors(match[2])) if match else (None, "1")
+    elif hasattr(value, "to_value"):  # astropy
+        value, given = value.value, value.unit.to_string().replace(" ", "*") or "1"
+    elif hasattr(value, "magnitude"):  # pint, of any registry
+        value, given = value.magnitude, f"{value.units:~C}" or "1"
+    unit = si_unit(given)
+    factor = None if unit is None else 1.0 if given in ("", unit) else _factor(given, unit)
+    if unit is None or factor is None:
+        return None
+    if isinstance(value, str):
+        return _times(value, factor), unit
+    numbers = in_unit(value, "1")
+    return None if numbers is None else (numbers * factor, unit)
 
 
 LEAST, MOST = 1e-60, 1e60

@@ -19,6 +19,7 @@ from sand.box import Box
 from sand.io import run_folder as files
 from sand.io.ledger_table import LedgerFile
 from sand.io.trajectory import TrajectoryWriter
+from sand.own_quantities import OwnQuantities
 
 RADIUS = 10e-9
 SUNK = 0.997
@@ -42,7 +43,9 @@ class Body:
         count, rng = len(self.radius), np.random.default_rng(self.seed)
         self.id = np.arange(count)
         self.material = (np.arange(count) % 4 == 3).astype(np.uint32)
-        self.internal_temperature = 100.0 + np.arange(count, dtype=float)
+        # a name that objects of JavaScript have already, and letters beyond ASCII; `write` changes them in each frame
+        own = {"constructor": 100.0 + np.arange(count, dtype=float), "Wärmestrom": np.linspace(-2.0, 3.0, count)}
+        self.own = OwnQuantities(own, {"constructor": "K", "Wärmestrom": "W/m^2"})
         density = np.array([one.density for one in self.materials])[self.material]
         self.mass = density * 4.0 / 3.0 * np.pi * self.radius**3
         self.charge = np.zeros(count)
@@ -51,6 +54,11 @@ class Body:
         size = np.array([200.0, 0.0])[self.material] * self.mass  # non-magnetic grains have no arrow
         self.moment = way / np.linalg.norm(way, axis=1)[:, None] * size[:, None]
         self.velocity, self.spin = 3.0 * rng.normal(size=(count, 3)), 1e8 * rng.normal(size=(count, 3))
+
+    @property
+    def own_units(self) -> dict[str, str]:
+        """Units of the own quantities, as of `sand.Grains`."""
+        return self.own.units
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -126,6 +134,7 @@ def write(folder: Path, moments: list[Body], box: Box, rests: list[np.ndarray] |
     for k, body in enumerate(moments):
         table = contacts_of(body, box)
         rest = None if rests is None else rests[k]
+        body.own = OwnQuantities({name: (1.0 + k) * values for name, values in body.own.items()}, body.own.units)
         writer.write(1000 * k, STEP * k, body, box, table, at_rest=rest)  # type: ignore[arg-type]
         now = set(map(tuple, table["pair"].tolist()))
         made, broken, before = made + len(now - before) * (k > 0), broken + len(before - now), now
@@ -243,4 +252,12 @@ def many(folder: Path, bodies: int = 5, each: int = 2000, frames: int = 3) -> Pa
     return write(folder, moments, Box.open())
 
 
-KINDS = {"two": two, "hundred": hundred, "resting": resting, "ten-thousand": many}
+def unequal(folder: Path) -> Path:
+    """A row of grains of 10 and 25 nm in contact, in open space, most of them large; one frame."""
+    radius = np.array([1.0, 2.5, 1.0, 2.5, 2.5]) * RADIUS
+    along = np.concatenate([[0.0], np.cumsum(SUNK * (radius[1:] + radius[:-1]))])
+    place = np.stack([along - along.mean(), 0.0 * along, 0.0 * along], axis=1)
+    return write(folder, [Body(place, radius)], Box.open())
+
+
+KINDS = {"two": two, "unequal": unequal, "hundred": hundred, "resting": resting, "ten-thousand": many}

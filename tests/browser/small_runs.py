@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,8 @@ COLUMNS = (
 
 class Grains(SimpleNamespace):
     """Grains as `TrajectoryWriter` needs them."""
+
+    own_units: ClassVar[dict[str, str]] = {}
 
     def __len__(self) -> int:
         return len(self.radius)

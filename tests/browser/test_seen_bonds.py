@@ -1,6 +1,6 @@
 """Bars on the screen are the contacts of the file, in colours of what they bear; across a face both halves are there.
 
-Grains are 0.3 of their size and bars 0.45 radii thick, so that bars are seen from end to end.
+Grains are 0.3 of their size and bars 0.45 radii of the smaller grain thick, so that bars are seen from end to end.
 """
 
 import numpy as np
@@ -18,20 +18,26 @@ LOOK = (0.0, 0.0, 0.0, 0.52, -0.74, 0.43, 0.0, 0.0, 1.0, 60.0)
 
 
 def pieces_of(frame, unit: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Begin and end (P, 3) of bars, in the page's unit, and the contact (P,) each belongs to; halves across faces."""
+    """Begin and end (P, 3) of bars, in the page's unit, and the contact (P,) each belongs to; parts across faces.
+
+    Parts end where the spheres intersect: |x − a|² − r² = |x − b|² − s², a share (d² + r² − s²) / (2 d²) of the way.
+    """
     place, box = frame.position / unit, Box(tuple(v if v is None else v / unit for v in frame.box.lengths))
     i, j = frame.pair.T
     straight = place[j] - place[i]
     way = box.nearest(straight)
     cut = np.linalg.norm(way - straight, axis=1) > 1.0
+    r, s = frame.radius[i] / unit, frame.radius[j] / unit
+    share = 0.5 + 0.5 * (r**2 - s**2) / (way**2).sum(1)
+    middle = place[j] - (1.0 - share)[:, None] * way
     begin = np.concatenate([place[i], place[j][cut]])
-    end = np.concatenate([place[i] + np.where(cut[:, None], 0.5, 1.0) * way, (place[j] - 0.5 * way)[cut]])
+    end = np.concatenate([place[i] + np.where(cut, share, 1.0)[:, None] * way, middle[cut]])
     return begin, end, np.concatenate([np.arange(len(i)), np.flatnonzero(cut)])
 
 
-def thickness(view: View) -> float:
-    """Of a bar (half), in the page's unit."""
-    return BAR * float(np.sort(view.radii)[len(view.radii) // 2])
+def thickness(view: View, contact: np.ndarray) -> np.ndarray:
+    """Of bars of these contacts (half), in the page's unit."""
+    return BAR * view.radii[view.frame.pair[contact]].min(axis=1)
 
 
 def clear(eye: Eye, spot: np.ndarray, own: int, pieces: tuple, view: View) -> bool:
@@ -43,7 +49,7 @@ def clear(eye: Eye, spot: np.ndarray, own: int, pieces: tuple, view: View) -> bo
     a, b = eye.pixels(begin)[0], eye.pixels(end)[0]
     way = b - a
     share = np.clip(((at - a) * way).sum(1) / np.maximum((way**2).sum(1), 1e-9), 0.0, 1.0)
-    off = np.linalg.norm(at - a - share[:, None] * way, axis=1) - thickness(view) * eye.scale
+    off = np.linalg.norm(at - a - share[:, None] * way, axis=1) - thickness(view, contact) * eye.scale
     grains = np.linalg.norm(eye.pixels(view.positions)[0] - at, axis=1) - 0.3 * view.radii * eye.scale
     return bool((off[contact != own] > 2.0).all() and (grains > 2.0).all())
 
@@ -132,7 +138,7 @@ def test_bars_are_where_contacts_are_and_nowhere_else(page, shows, source):
         way = b - a
         share = ((points[:, None] - a) * way).sum(-1) / (way**2).sum(-1)
         off = np.linalg.norm(points[:, None] - a - np.clip(share, 0.0, 1.0)[..., None] * way, axis=-1)
-        near = (off < thickness(view) * eye.scale + 1.5).any(1)
+        near = (off < thickness(view, contact) * eye.scale + 1.5).any(1)
         centres = eye.pixels(view.positions)[0]
         apart = np.linalg.norm(points[:, None] - centres, axis=-1)
         near |= (apart < 0.3 * view.radii * eye.scale + 1.5).any(1)
@@ -144,6 +150,33 @@ def test_bars_are_where_contacts_are_and_nowhere_else(page, shows, source):
                 ((x, y),) = eye.pixels(begin[p] + part * (end[p] - begin[p]))[0].astype(int)
                 if 0 <= x < eye.wide and 0 <= y < eye.high:
                     assert (image[y, x] != BACKGROUND).any(), (k, p)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_collars_swallow_no_grain(page, shows, source):
+    """Grains of 10 nm beside such of 25 nm, at true size, seen from across: a collar is in front of both from the
+    contact to a = r − √(r² − R²) on either side, R = 0.45 of the smaller radius; beyond, the grain is.
+
+    Both surfaces are looked at on the axis, at 0.6 a and 1.4 a; collars are grey, grains are not.
+    """
+    shown = shows("unequal")
+    view = View(page, shown, source, bonds="plain", look=(*np.zeros(3), 0, -1, 0, 0, 0, 1, 12.0), **SMALL | {"size": 1})
+    frame = view.frame
+    place, radius = frame.position / shown.unit, frame.radius / shown.unit
+    grey = []
+    for c, (i, j) in enumerate(frame.pair):
+        (half,) = thickness(view, np.array([c]))
+        way = (place[j] - place[i]) / np.linalg.norm(place[j] - place[i])
+        apart = np.linalg.norm(place[j] - place[i])
+        middle = place[i] + (0.5 * apart + 0.5 * (radius[i] ** 2 - radius[j] ** 2) / apart) * way
+        eye = view.look(*middle, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 3.0)
+        image = view.image()
+        for side, r in ((-1, radius[i]), (1, radius[j])):
+            reach = r - np.sqrt(r**2 - half**2)
+            for part in (0.6, 1.4):
+                ((x, y),) = eye.pixels(middle + side * part * reach * way)[0].astype(int)
+                grey.append((bool(np.ptp(image[y, x].astype(int)) < 30), part == 0.6))
+    assert len(grey) == 4 * len(frame.pair) == 16 and all(seen == collar for seen, collar in grey), grey
 
 
 @pytest.mark.parametrize("source", SOURCES)

@@ -7,7 +7,6 @@ from sand.analysis.clusters import cluster_labels
 from sand.analysis.quantities import GRAIN_NAMES, measured
 from sand.errors import BadInput
 from sand.io.frame import REST
-from sand.schema import OWN, own_values
 
 from .looking import SOURCES, View
 
@@ -30,8 +29,8 @@ def test_every_quantity_is_that_of_the_file(page, shows, kind, source):
     view = View(page, shows(kind), source, shade=0)
     offered = {name for name, _ in page.evaluate("() => sandView.state.setting('colour').options")}
     first = view.shown.frames[0]
-    known = {*own_values(first)} | ({REST} if first.at_rest is not None else set())
-    assert offered == {*GRAIN_NAMES} - {*OWN, REST} | known
+    known = {*first.own} | ({REST} if first.at_rest is not None else set())
+    assert offered == {*GRAIN_NAMES} - {REST} | known
     for k in (0, len(view.shown.frames) // 2, len(view.shown.frames) - 1):
         frame = view.go(k)
         for name in offered:

@@ -331,3 +331,67 @@ def test_an_example_is_resumed_bit_for_bit(name, tmp_path):
     for key, array in whole.state.to_arrays().items():
         np.testing.assert_array_equal(array, rest.state.to_arrays()[key], err_msg=key)
     assert rest.ledger.rows[-1] == whole.ledger.rows[-1]
+
+
+def test_growth_in_gas():
+    """The numbers of the text of growth-in-gas.toml, to 1 %: stopping time 10 µs, n b³ = 2e-3, cut-off 12.5 b.
+
+    growth-coasting.toml is the same but for the gas and its comments.
+    """
+    case = check_case(read_toml(EXAMPLES / "growth-in-gas.toml"), "case")
+    gas = simulation_of(case, None)
+    moment, heat = float(np.linalg.norm(gas.grains.moment[0])), 1.380649e-23 * 100.0
+    b = math.sqrt(3.0) * (2e-7 * moment**2 / heat) ** (1.0 / 3.0)
+    friction = next(force for force in gas.forces if force.name == "gas")
+    dipoles = next(force for force in gas.forces if force.name == "dipoles")
+    assert friction.shortest_time(gas.grains) == pytest.approx(1e-5, rel=0.01, abs=0.0)
+    assert 300 * b**3 / 17e-6**3 == pytest.approx(2e-3, rel=0.01, abs=0.0)
+    assert dipoles.cutoff / b == pytest.approx(12.5, rel=0.01, abs=0.0)
+    told, coasting = (read_toml(EXAMPLES / f"growth-{name}.toml") for name in ("in-gas", "coasting"))
+    del told["forces"]["gas"]
+    assert told == coasting
+
+
+def test_capture_rates():
+    """Rates of pairs by Eq. 14, and touches between two frames.
+
+    ⟨σv⟩ of unequal clusters is that of `kinetics.capture`, to the digits of μ0/4π (1e-9).
+    """
+    example = runpy.run_path(str(EXAMPLES / "capture_rates.py"))
+    m, mu, volume = 3.3e-20, 6.6e-18, 1e-15
+    kernel = sand.theory.kinetics.capture(
+        "10 nm", m, mu, "100 K", exponent=1.0, reading="aligned", speed="thermal", c=1.0
+    )
+    sizes = np.array([1.0, 3.0, 1.0, 5.0])
+    found = example["expected_rates"](mu * sizes, m * sizes, sizes == 1.0, volume)
+    pairs = [[(1, 1)], [(1, 3), (1, 5), (3, 1), (1, 5)], [(3, 5)]]
+    expected = [sum(kernel(a * m, b * m) for a, b in kind) / volume for kind in pairs]
+    assert found == pytest.approx(expected, rel=1e-8, abs=0.0)
+    before = np.array([0, 1, 2, 2, 3, 4, 5, 5, 6])  # a pair and two grains join, the smallest first
+    after = np.array([0, 0, 1, 1, 1, 1, 2, 2, 2])
+    assert example["touches"](before, after).tolist() == [2.0, 1.0, 1.0]
+
+
+def test_thermal_capture():
+    """Cross-sections of Eq. 14 give c = 1; c ∝ v² gives its mean over Maxwell's distribution with the weight v^(-1/3).
+
+    ⟨c⟩ of c = a m̄v²/2k_BT = a x is a Γ(7/3)/Γ(4/3) = 4a/3, which Gauss–Laguerre quadrature gives to rounding.
+    """
+    example = runpy.run_path(str(EXAMPLES / "thermal_capture.py"))
+    mean_rate = example["mean_rate"]
+    spread = math.sqrt(1.380649e-23 * 100.0 / example["REDUCED"])
+
+    class Found:
+        c_error = 0.0
+
+        def __init__(self, c):
+            self.c = c
+
+    for law, mean in ((lambda v: 1.0, 1.0), (lambda v: 0.1 * 0.5 * (v / spread) ** 2, 0.1 * 4.0 / 3.0)):
+        mean_rate.__globals__["cross_section"] = lambda law=law, **options: Found(law(options["speed"]))
+        c, error, rate, rows = mean_rate(100.0, 150.0, 0.02)
+        assert c == pytest.approx(mean, rel=1e-12, abs=0.0) and error == 0.0 and len(rows) == 6
+    kernel = sand.theory.kinetics.capture(
+        "10 nm", example["MASS"], 200 * example["MASS"], "100 K", reading="aligned", speed="thermal"
+    )
+    assert rate / c == pytest.approx(kernel(example["MASS"], example["MASS"]), rel=1e-9, abs=0.0)

@@ -188,7 +188,7 @@ FAULTS = (
           'raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error', "return",
           "unit/test_files.py::test_a_failed_write_leaves_the_old_file"),
     # commands
-    Fault("the last frame of a slice", "off by one", "command", "cli/export.py",
+    Fault("the last frame of a slice", "off by one", "command", "cli/options.py",
           "first + 1 if first != -1 else None", "first + 1",
           "unit/test_results.py::test_the_export_command"),
     Fault("wrong input ends with exit code 0", "swallowed error", "command", "cli/program.py",

@@ -360,7 +360,7 @@ def test_mistakes_with_screened_charges(make, line):
 def test_the_taylor_scheme_needs_rates():
     """Forces without a rate of change are refused with far = "taylor", by name."""
     grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], 1e-9, sand.SILICA, charge=1e-19)
-    forces = [sand.Contact(), sand.Charges(), sand.ScreenedCharges("1 um")]
+    taylor, contact = sand.Verlet(far="taylor"), sand.Contact()
     with pytest.raises(BadInput, match=r"^stepping: far = 'taylor' needs the rate .* which screened_charges lacks"):
-        sand.Simulation(grains, forces, stepping=sand.Verlet(far="taylor"))
-    sand.Simulation(grains, forces[:2], stepping=sand.Verlet(far="taylor"))
+        sand.Simulation(grains, [contact, sand.ScreenedCharges("1 um")], stepping=taylor)
+    sand.Simulation(grains, [contact, sand.Charges()], stepping=taylor)

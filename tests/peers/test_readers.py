@@ -25,6 +25,7 @@ def run(tmp_path_factory):
         velocity=rng.normal(size=(6, 3)) * 0.1,
         moment=rng.normal(size=(6, 3)) * 1e-18,
         charge=[1.6e-19] * 6,
+        own={"heating": (np.linspace(-1.0, 1.0, 6), "W/m^2"), "Oberfläche": "2 cm^2"},
     )
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box="0.5 um", out=folder, frame_every="10 ps")
     sim.run(until="40 ps")
@@ -55,6 +56,7 @@ def test_ase_reads_xyz(opened_run, tmp_path):
     for theirs, ours in zip(frames, opened_run.frames, strict=True):
         assert theirs.get_positions() == pytest.approx(ours.position * 1e10, rel=1e-9, abs=1e-6)
         assert theirs.arrays["radius"] == pytest.approx(ours.radius * 1e10, rel=1e-9, abs=0)
+        assert all((theirs.arrays[name] == values).all() for name, values in ours.own.items())
         assert theirs.arrays["moment"] == pytest.approx(ours.moment, rel=1e-8, abs=0)
         assert theirs.pbc.all() and theirs.cell.lengths() == pytest.approx(
             np.array(ours.drawn) * 1e10, rel=1e-9, abs=0.0
@@ -73,6 +75,7 @@ def test_vtk_reads_vtp(opened_run, tmp_path):
     mesh, last = reader.read()[0], opened_run.frames[-1]
     assert np.asarray(mesh.points) == pytest.approx(last.position, rel=1e-12, abs=0)
     assert mesh.point_data["radius"] == pytest.approx(last.radius, rel=1e-12, abs=0)
+    assert all((mesh.point_data[name] == values).all() for name, values in last.own.items())
     assert mesh.point_data["moment"] == pytest.approx(last.moment, rel=1e-12, abs=0)
     inside = np.abs(np.diff(last.position[last.pair], axis=1)).max(axis=(1, 2)) < 2e-7
     assert mesh.n_verts == 6 and mesh.n_lines == inside.sum() == len(last.pair) - 1
@@ -95,6 +98,9 @@ def test_ovito_reads_xyz_dump_and_gsd(run, opened_run, tmp_path):
         places = data.particles.positions[...][order]
         assert places == pytest.approx(last.position * unit, rel=1e-6, abs=1e-17 * unit)
         assert data.particles["Radius"][...][order] == pytest.approx(last.radius * unit, rel=1e-6, abs=0)
+        own = {name: name if unit > 1.0 else f"d_{name.lower()}" for name in last.own}
+        for name, values in last.own.items():  # OVITO reads 17 digits to some roundings
+            assert data.particles[own[name]][...][order] == pytest.approx(values, rel=1e-15, abs=0.0)
         assert np.diag(data.cell[:3, :3]) == pytest.approx(np.array(last.drawn) * unit, rel=1e-6, abs=0.0)
         assert all(data.cell.pbc)
     data = ovito_io.import_file(str(run / "trajectory.gsd")).compute(4)
@@ -102,6 +108,7 @@ def test_ovito_reads_xyz_dump_and_gsd(run, opened_run, tmp_path):
     assert {tuple(sorted(pair)) for pair in data.particles.bonds.topology[...].tolist()} == {
         tuple(sorted(pair)) for pair in last.pair.tolist()
     }
+    assert all((data.particles[name][...] == values).all() for name, values in last.own.items())
     scale = last.radius.mean()
     assert 0.5 * data.particles["Radius"][...].mean() * 2 == pytest.approx(
         last.radius.mean() / scale, rel=1e-6, abs=0.0

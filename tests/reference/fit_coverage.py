@@ -5,16 +5,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import t as student
 
-from sand.analysis.fits import mean_interval, power_law, rate_law
+from sand.analysis.fits import mean_interval, power_law
 from sand.analysis.fractal import ensemble_dimension
+from sand.analysis.growth_law import rate_law
 from sand.errors import BadInput
 from sand.experiments.growth import FIRST_SIZE, LARGEST_PART, _within
 from sand.io.table import write_table
+from sand.theory import kinetics
+from sand.theory.smoluchowski import coagulate, log_sizes
 
 TABLE = Path(__file__).with_name("fit-coverage.csv")
 BOXES = 8
@@ -71,33 +76,71 @@ def dimension(rng: np.random.Generator) -> tuple[Interval, float]:
     return (found.value - half, found.value + half), 1.5
 
 
-def _coagulated(rng: np.random.Generator, times: np.ndarray, grains: int) -> np.ndarray:
-    """S(t) of one box with a constant kernel, by Gillespie's algorithm; S = 1 + 2t for many grains."""
-    clusters, now, squares = [1] * grains, 0.0, float(grains)
+def coagulated(rng: np.random.Generator, table: np.ndarray, times: np.ndarray, largest: float) -> np.ndarray:
+    """S(t) of one box by Gillespie's algorithm until S exceeds `largest`, then constant.
+
+    `table` (N + 1, N + 1) is K of all pairs of sizes relative to K of two grains; two clusters collide at the rate K/N,
+    so that dS/dt = 1 at S = 1 for many grains.
+    """
+    grains = len(table) - 1
+    size, count, now, squares = np.ones(grains, int), grains, 0.0, float(grains)
+    rates = np.full(grains, grains - 1.0)  # of each cluster with all others
     at, sizes = [0.0], [1.0]
-    while len(clusters) > 1:
-        count = len(clusters)
-        now += rng.exponential(grains / (count * (count - 1)))  # every pair at the rate 2/N
-        first = clusters.pop(int(rng.integers(count)))
-        other = int(rng.integers(count - 1))
-        squares += 2.0 * first * clusters[other]
-        clusters[other] += first
+    while count > 1 and sizes[-1] <= largest:
+        sums = np.cumsum(rates[:count])
+        now += rng.exponential(2.0 * grains / sums[-1])
+        first = int(np.searchsorted(sums, rng.uniform(0.0, sums[-1])))
+        own = table[size[first], size[:count]]
+        own[first] = 0.0
+        sums = np.cumsum(own)
+        other = int(np.searchsorted(sums, rng.uniform(0.0, sums[-1])))
+        squares += 2.0 * size[first] * size[other]
+        new = table[size[first] + size[other], size[:count]]
+        rates[:count] += new - own - table[size[other], size[:count]]
+        size[first] += size[other]
+        new[[first, other]] = 0.0
+        rates[first] = new.sum()
+        count -= 1
+        size[other], rates[other] = size[count], rates[count]
         at.append(now)
         sizes.append(squares / grains)
     return np.array(sizes)[np.searchsorted(at, times, side="right") - 1]
 
 
-def exponent(rng: np.random.Generator, grains: int = GRAINS) -> tuple[Interval, float]:
-    """Interval of z of a constant kernel, z = 1, in the window of `sand analyse`."""
-    times = np.linspace(0.1, 12.0, 120)
-    sizes = np.array([_coagulated(rng, times, grains) for _ in range(BOXES)])
-    found = rate_law(*_within(times, sizes, (FIRST_SIZE, LARGEST_PART * grains)))
-    return (found.low, found.high), 1.0
+KERNELS: dict[str, Callable[[float], Callable[[np.ndarray, np.ndarray], np.ndarray]]] = {
+    "constant": lambda _: kinetics.constant(1.0),
+    "Brownian": lambda degree: kinetics.power(1.0, 1.0, degree + 0.5, -0.5),
+    "product": lambda degree: lambda one, other: (one * other) ** (0.5 * degree),
+    "sum": lambda degree: lambda one, other: 0.5 * (one**degree + other**degree),
+    "reduced mass": lambda degree: kinetics.power(1.0, 1.0, 0.0, degree),
+}
+"""Kernels of a degree; "product" and "sum" are not among those that are fitted."""
 
 
-def exponent_of_larger_boxes(rng: np.random.Generator) -> tuple[Interval, float]:
-    """The same with 1000 grains per box, which are hardly depleted."""
-    return exponent(rng, 1000)
+@lru_cache
+def _kernel_table(kernel: str, degree: float, grains: int) -> tuple[np.ndarray, np.ndarray]:
+    """K of all pairs of sizes, and 120 times at which an infinite system grows to S = 0.15 N, evenly."""
+    function = KERNELS[kernel](degree)
+    n = np.arange(1.0, grains + 1.0)
+    table = np.zeros((grains + 1, grains + 1))
+    table[1:, 1:] = function(n[:, None], n[None, :])
+    times, largest = np.geomspace(0.1, 1e4, 400), 0.15 * grains
+    grown = coagulate(function, log_sizes(100.0 * largest, 20), 1.0, times, mass=1.0, until_size=largest, accuracy=1e-5)
+    return table, np.linspace(0.0, grown.times[-1], 121)[1:]
+
+
+def boxes(rng: np.random.Generator, kernel: str, z: float, grains: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times, and S (boxes, times) of one ensemble, in the window of `sand analyse`."""
+    table, times = _kernel_table(kernel, 1.0 - 1.0 / z, grains)
+    largest = BOXES * LARGEST_PART * grains  # of one box, if the others had none
+    sizes = np.array([coagulated(rng, table, times, largest) for _ in range(BOXES)])
+    return _within(times, sizes, (FIRST_SIZE, LARGEST_PART * grains))
+
+
+def exponent(rng: np.random.Generator, kernel: str, z: float, grains: int) -> tuple[Interval, float]:
+    """Interval of z of stochastic coagulation."""
+    found = rate_law(*boxes(rng, kernel, z, grains), grains)
+    return (found.low, found.high), z
 
 
 CASES = {
@@ -106,8 +149,15 @@ CASES = {
     "mean ln S, lognormal": log_size,
     "gamma": moment,
     "fractal dimension": dimension,
-    "z, constant kernel, 125 grains": exponent,
-    "z, constant kernel, 1000 grains": exponent_of_larger_boxes,
+    **{
+        f"z = {z:g}, {kernel}, {grains} grains": partial(exponent, kernel=kernel, z=z, grains=grains)
+        for grains, kernels in (
+            (GRAINS, ("Brownian", "product", "sum", "reduced mass")),
+            (1000, ("Brownian", "product")),
+        )
+        for z, names in ((1.0, ("constant",)), (2.0, kernels), (3.33, kernels))
+        for kernel in names
+    },
 }
 
 
@@ -131,8 +181,7 @@ def coverage(name: str, ensembles: int, seed: int = 1) -> dict[str, float | str]
     }
 
 
-ENSEMBLES = {name: 300 if name.startswith("z") else 4000 for name in CASES}
-ENSEMBLES["z, constant kernel, 1000 grains"] = 100
+ENSEMBLES = {name: 4000 if not name.startswith("z") else 40 if name.endswith("1000 grains") else 200 for name in CASES}
 
 if __name__ == "__main__":
     write_table(TABLE, [coverage(name, count) for name, count in ENSEMBLES.items()])

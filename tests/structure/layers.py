@@ -20,6 +20,7 @@ LAYERS = (
     ("descriptions",),
     ("arguments",),
     ("material", "ramps", "schema", "threads"),
+    ("own_quantities",),
     ("compiler",),
     ("numerics",),
     ("box",),

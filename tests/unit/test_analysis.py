@@ -9,7 +9,7 @@ import pytest
 
 from sand import BadInput
 from sand.analysis.clusters import aggregate_moments
-from sand.analysis.fits import power_law, rate_law, separation
+from sand.analysis.fits import power_law, separation
 from sand.analysis.fractal import box_dimension, correlation_dimension, ensemble_dimension, grains_within
 from sand.analysis.frame_statistics import COLUMNS, aggregate_statistics, size_distribution
 from sand.analysis.network import network
@@ -263,32 +263,6 @@ def test_errors_depend_on_boxes_not_on_points():
     assert np.isnan(power_law(np.array([1.0, 2]), np.array([1.0, 2]), np.zeros(2)).error)
 
 
-def test_laws_of_growth():
-    """S = (1 + t/zτ)^z is recovered to 1e-6 (tolerance of the optimiser), z = 1, 2, 3.2, and an exponential.
-
-    With a factor e^±0.1 in τ per box the mean over boxes differs by less than its square, 1 %.
-    """
-    time = np.linspace(0.01, 10, 200)
-    for z in (1.0, 2.0, 3.2):
-        found = rate_law(time, (1 + time / (z * 0.7))[None] ** z)
-        assert (found.exponent, found.time) == (
-            pytest.approx(z, rel=1e-5, abs=0.0),
-            pytest.approx(0.7, rel=1e-5, abs=0.0),
-        )
-        assert found.at(time) == pytest.approx((1 + time / (z * 0.7)) ** z, rel=1e-5, abs=0.0)
-        assert np.isnan(found.error)
-    for faster in (np.exp(time / 3), 1.0 / (1.0 - time / 11)):
-        with pytest.raises(BadInput, match="faster than any power"):
-            rate_law(time, faster[None] * (1 + 1e-9 * time))
-    boxes = np.array([(1 + time * math.exp(0.1 * x) / 2) ** 2 for x in RNG.normal(size=8)])
-    found = rate_law(time, boxes)
-    assert found.low <= found.exponent <= found.high
-    assert found.exponent == pytest.approx(2.0, rel=0.01, abs=0.0)
-    assert found.groups == 8
-    with pytest.raises(BadInput, match="grow beyond 1"):
-        rate_law(time, np.ones((2, 200)))
-
-
 def test_separation():
     """Welch by hand: means 3 and 1, variances 1 and 0.25 of 4 boxes each."""
     first, second = np.array([2.0, 4, 3, 3]), np.array([1.0, 1, 0.5, 1.5])
@@ -326,6 +300,10 @@ def test_cluster_table_across_periodic_faces():
     assert rows["mass"].tolist() == [8, 4]
     assert rows["gyration_radius"] == pytest.approx([math.sqrt(15 / 3), 1.0], rel=1e-6, abs=0.0)
     assert rows["moment"].tolist() == [4, 2]
+    # as `COLUMNS` says: N a³/((5/3)^(3/2) r_g³), r_g² = 15/3 + 3/5 and 1 + 3/5 with the extent of the grains
+    assert "(5/3)^(1/2) r_g, r_g with the extent of grains" in COLUMNS["filling_factor"][1]
+    filled = [n / (5 / 3 * (square + 3 / 5)) ** 1.5 for n, square in ((4, 5.0), (2, 1.0))]
+    assert rows["filling_factor"] == pytest.approx(filled, rel=1e-6, abs=0.0)
     assert rows["longest"].tolist() == [4, 2]
     assert rows["rings"].tolist() == [0, 0]
     assert size_distribution(np.array([0, 0, 0, 0, 1, 1, 2]))[0].tolist() == [1, 2, 4]

@@ -24,11 +24,11 @@ def contacts(*pairs):
 
 @pytest.fixture
 def trajectory(tmp_path):
-    """A trajectory of grains 0-4, then without 1, then also with 5 (ice, warm), then without 5."""
+    """A trajectory of grains 0-4 at 77 K, then without 1, then also with 5 (ice, 300 K), then without 5."""
     x = np.arange(5) * 30e-9
-    first = sand.Grains(np.stack([x, 0 * x, 0 * x], axis=1), "10 nm", "silica")
+    first = sand.Grains(np.stack([x, 0 * x, 0 * x], axis=1), "10 nm", "silica", own={"heat": "77 K"}, charge="1e-19 C")
     less = subset(first, np.array([0, 2, 3, 4]))
-    warm = sand.Grains([[0, 1e-7, 0]], "8 nm", "ice", own={"internal_temperature": 300.0})
+    warm = sand.Grains([[0, 1e-7, 0]], "8 nm", "ice", own={"heat": "300 K"})
     more = joined(less, warm, np.array([5], np.uint32))
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     for step, (grains, pair) in enumerate([(first, [0, 1]), (less, [1, 2]), (more, [1, 4]), (less, [1, 2])]):
@@ -42,8 +42,8 @@ def test_frames_keep_identities_and_own_quantities(trajectory):
     frames = read_frames(trajectory)
     ids = [[0, 1, 2, 3, 4], [0, 2, 3, 4], [0, 2, 3, 4, 5], [0, 2, 3, 4]]
     assert [frame.id.tolist() for frame in frames] == ids
-    assert frames[2].internal_temperature.tolist() == [0, 0, 0, 0, 300.0]
-    assert not frames[1].internal_temperature.any() and len(frames[1].internal_temperature) == 4
+    assert frames[2].heat.tolist() == [77.0, 77.0, 77.0, 77.0, 300.0]
+    assert frames[1].heat.tolist() == [77.0] * 4 and frames[1].own.units == {"heat": "K"}
     assert [frames[2].materials[k] for k in frames[2].material] == ["silica"] * 4 + ["ice"]
 
 
@@ -51,6 +51,8 @@ def test_rows_are_identities_and_absent_grains_have_no_position(trajectory):
     """Row k is grain k in every frame: position NaN where it is absent, and contacts in these rows."""
     frames = ByIdentity(LiveTrajectory(trajectory))
     assert frames.identity.tolist() == [0, 1, 2, 3, 4, 5] and frames.materials == ["silica", "ice"]
+    assert [np.flatnonzero(np.isnan(frames[k].own["heat"])).tolist() for k in range(4)] == [[5], [1, 5], [1], [1, 5]]
+    assert frames[2].own["heat"][[0, 5]].tolist() == [77.0, 300.0] and (frames[2].charge > 0.0).tolist()[5] is False
     absent = [np.flatnonzero(np.isnan(frames[k].position[:, 0])).tolist() for k in range(4)]
     assert absent == [[5], [1, 5], [1], [1, 5]]
     assert [frames[k].pair.tolist() for k in range(4)] == [[[0, 1]], [[2, 3]], [[2, 5]], [[2, 3]]]
@@ -66,7 +68,7 @@ def test_grains_added_later_begin_a_new_generation(trajectory):
     """The page reloads the constant quantities when a frame has a grain that no earlier one had."""
     frames = ByIdentity(LiveTrajectory(trajectory))
     before = frames.generation
-    grains = sand.Grains([[0, 0, 0], [0, 0, 3e-8]], "9 nm", "iron")
+    grains = sand.Grains([[0, 0, 0], [0, 0, 3e-8]], "9 nm", "iron", own={"heat": "5 K"})
     grains.arrays.id[:] = [6, 7]
     writer = TrajectoryWriter(trajectory, resume_at=3 * 1e-9, written=[k * 1e-9 for k in range(4)])
     writer.write(4, 4e-9, grains, Box.open(), contacts())

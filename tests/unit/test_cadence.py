@@ -2,12 +2,15 @@
 
 import itertools
 import math
+import os
+import signal
 
+import numpy as np
 import pytest
 
 import sand
 from sand.config.case import check_case
-from sand.simulation.cadence import Schedule, read_cadence
+from sand.simulation.cadence import Schedule, chosen_cadence, read_cadence
 from sand.simulation.condition import read_condition
 
 CASE = {"run": {"until": "1 us"}, "grains": {"number": 2, "radius": "10 nm"}, "box": {"periodic": "1 um"}}
@@ -136,3 +139,78 @@ def test_two_conditions_are_refused():
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], "10 nm", "iron"))
     with pytest.raises(sand.BadInput, match="until and stop are both conditions"):
         sim.run(until=lambda sim: True, stop="clusters == 1")
+
+
+def falling(**options):
+    """Two grains that fly apart, in a simulation that chooses its cadence unless it is given."""
+    grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], "10 nm", "iron", velocity=[[0, 0, 0], [1, 0, 0]])
+    return sand.Simulation(grains, [sand.Contact()], **options)
+
+
+def test_a_chosen_cadence_belongs_to_one_run():
+    """200 frames for each run to a time; kept only for the same end, to which an interrupted run goes on."""
+    first = chosen_cadence(0.0, 1e-9)
+    assert first == (pytest.approx(5e-12, rel=1e-12, abs=0.0), 1e-9) and chosen_cadence(4e-10, 1e-9, first) == first
+    # 201 intervals of time 0 to the end, of which 200.8 lie in the run
+    assert chosen_cadence(1e-9, 1e-6, first) == (pytest.approx(1e-6 / 201, rel=1e-12, abs=0.0), 1e-6)
+    assert chosen_cadence(1e-9, math.inf, first) is None is chosen_cadence(1e-9, 1e-9, None)
+
+
+@pytest.mark.compiled("contacts")
+def test_a_second_run_has_a_cadence_of_its_own():
+    """A long run after a short one has 200 further frames, not as many as the cadence of the first would give."""
+    sim = falling()
+    sim.run(until="1 ns")
+    sim.run(until="1 us")
+    times = sim.ledger["time"]
+    assert len(times) == 1 + 200 + 201 and sim.frame_every is None
+    assert times[201:] == pytest.approx(1e-6 / 201 * np.arange(1, 202), rel=1e-9, abs=0.0)
+    sim.run(steps=50)
+    assert len(sim.ledger) == 403, "a run without an end in time has frames at its ends only"
+    given = falling(frame_every="0.5 ns")
+    given.run(until="1 ns")
+    given.run(until="10 ns")
+    assert len(given.ledger) == 1 + 20, "a cadence of the user stays"
+
+
+@pytest.mark.compiled("contacts")
+def test_a_resumed_run_keeps_the_chosen_cadence_to_its_end(tmp_path):
+    """Interrupted and resumed in another process, all frames are those of one run; a later end has its own cadence."""
+    whole = falling()
+    whole.run(until="100 ns")
+    part = falling(out=tmp_path / "run")
+    part.writer.draws = False
+    with pytest.raises(sand.Interrupted):
+        part.observers = [_Interrupts()]
+        part.run(until="100 ns")
+    assert 10 < len(part.ledger) < 150
+    resumed = sand.resume(tmp_path / "run")
+    resumed.writer.draws = False
+    resumed.run()
+    assert resumed.ledger["time"].tolist() == whole.ledger["time"].tolist()
+    resumed = sand.resume(tmp_path / "run")
+    resumed.writer.draws = False
+    resumed.run(until="10 us")
+    assert len(resumed.ledger) == 201 + 201 and "frame_every" not in (tmp_path / "run" / "case.toml").read_text("utf-8")
+
+
+@pytest.mark.compiled("contacts")
+def test_frames_do_not_change_the_motion():
+    """The same bits in one run with its 200 frames, in three runs with cadences of their own, and without frames."""
+    ends = []
+    for pieces in (["100 ns"], ["1 ns", "40 ns", "100 ns"]):
+        sim = falling()
+        for until in pieces:
+            sim.run(until=until)
+        ends.append(sim.regular_state.grains.position)
+    rare = falling(frame_every="1 s")
+    rare.run(until="100 ns")
+    assert (ends[0] == ends[1]).all() and (ends[0] == rare.regular_state.grains.position).all()
+
+
+class _Interrupts(sand.Observer):
+    """Sends SIGINT to this process at the hundredth row."""
+
+    def see(self, simulation, row):
+        if len(simulation.ledger) == 100:
+            os.kill(os.getpid(), signal.SIGINT)

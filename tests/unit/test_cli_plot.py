@@ -11,7 +11,7 @@ from sand.plotting.plots import HISTORY
 
 @pytest.mark.compiled("fields")
 def test_default_figures(run_in_field, tmp_path, capsys):
-    """Five figures over time and a still picture in DIR/plots; the written files are listed."""
+    """All figures over time and a still picture in DIR/plots; the written files are listed."""
     assert main(["plot", str(run_in_field), "--json"]) == 0
     message = json.loads(capsys.readouterr().out)["files"]
     assert message == [str(run_in_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]

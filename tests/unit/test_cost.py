@@ -1,15 +1,24 @@
 """Expected cost of a run: steps, wall time, memory and compilation, and the table that runs write."""
 
+import contextlib
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sand
 from sand.cli.main import main
+from sand.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.simulation import cost
+from sand.simulation import expected_steps as steps
+from sand.simulation.cadence import number_in, read_cadence
+from sand.state.state import CONTACTS
 from sand.theory.contact import contact
+from sand.theory.kinetics import brownian
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 CASE = """
 [run]
@@ -32,10 +41,10 @@ GASES = {
 
 @pytest.fixture(autouse=True)
 def table(tmp_path, monkeypatch):
-    """An empty table of costs for each test."""
+    """An empty table of speeds for each test."""
     monkeypatch.setattr(cost, "cache_folder", lambda: tmp_path / "cache" / "code")
     (tmp_path / "cache").mkdir()
-    return tmp_path / "cache" / "run-costs.json"
+    return tmp_path / "cache" / "step-speeds.json"
 
 
 def simulation(count=20, **changes):
@@ -48,72 +57,199 @@ def rows(capsys, *words):
     return dict(line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines()[1:])
 
 
-def test_the_step_is_a_fraction_of_the_fastest_period():
-    """Δt = 2π/(ω n) with ω² the largest of the four modes of two grains; or the step given."""
-    sim = simulation()
+def test_the_step_with_contacts_is_a_fraction_of_the_fastest_period():
+    """Δt = 2π/(ω n) with ω² the largest of the four modes of two grains."""
     c = contact("silica", "20 nm")
     fastest = min(c.normal_period, c.slide_period, c.roll_period, c.twist_period)
-    assert cost.shortest_step(sim) == pytest.approx(fastest / 25.0, rel=1e-9, abs=0.0)
-    assert cost.shortest_step(simulation(stepping=sand.Verlet(step="3 ps"))) == 3e-12
+    assert steps.contact_step(simulation()) == pytest.approx(fastest / 25.0, rel=1e-9, abs=0.0)
     half = simulation(stepping=sand.Verlet(steps_per_period=50.0))
-    assert cost.shortest_step(half) == pytest.approx(0.5 * cost.shortest_step(sim), rel=1e-12, abs=0.0)
+    assert steps.contact_step(half) == pytest.approx(fastest / 50.0, rel=1e-9, abs=0.0)
 
 
 def test_free_grains_have_the_step_of_their_flight():
     """Without contacts: at most a sixteenth of the smallest radius, and 0.05 rad, in one step."""
     grains = sand.Grains([[0, 0, 0], [1e-6, 0, 0]], 1e-8, "iron", velocity=[[3, 0, 4], [0, 0, 0]], spin=[0, 1e9, 0])
-    sim = sand.Simulation(grains)
-    assert cost.shortest_step(sim) == pytest.approx(min(1e-8 / 16 / 5, 0.05 / 1e9), rel=1e-12, abs=0.0)
+    step = min(1e-8 / 16 / 5, 0.05 / 1e9)
+    assert steps.flight_step(sand.Simulation(grains)) == pytest.approx(step, rel=1e-12, abs=0.0)
+    found = steps.expected_steps(sand.Simulation(grains), 1e-9, math.inf)
+    assert (found.free, found.contact) == (pytest.approx(1e-9 / step, rel=1e-12, abs=0.0), 0.0)
 
 
-def test_a_measured_run_sets_the_estimate(table, monkeypatch):
-    """steps = T/(ratio Δt) and wall time = steps N c for the ratio and cost c of the table; N scales all pairs."""
-    sim, end = simulation(), 1e-6
-    step = cost.shortest_step(sim)
-    rough = cost.expected_cost(sim, end, math.inf)
-    assert rough.measured == "" and rough.steps == pytest.approx(end / step, rel=1e-6, abs=0.0) and rough.seconds > 0.0
-    kind = cost.kind_of(sim)
-    assert kind == "contact jkr; all pairs; verlet; 1 thread"
-    one = {"ns_per_grain_step": 50.0, "step_ratio": 2.0, "seconds": 9.0}
-    table.write_text(json.dumps({kind: {"20": one, "2000": one | {"ns_per_grain_step": 1e6}}}))
-    known = cost.expected_cost(sim, end, math.inf)
-    assert known.measured == "a run of 20 grains on this machine" and known.step == pytest.approx(
-        2.0 * step, rel=1e-6, abs=0.0
+def thermal(count, side, kelvin, **options):
+    """A gas of iron grains of 10 nm radius with the same speed √(3kT/m) in different directions, on a lattice."""
+    sites = np.argwhere(np.ones((6, 6, 6)))[:count] * side / 6.0
+    direction = np.random.default_rng(1).normal(size=(count, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    mass = sand.Grains([[0, 0, 0]], 1e-8, "iron").mass[0]
+    speed = math.sqrt(3.0 * BOLTZMANN * kelvin / mass)
+    return sand.Grains(sites - side / 2.0, 1e-8, "iron", velocity=speed * direction, **options)
+
+
+def test_the_time_of_coagulation_is_that_of_the_kernels():
+    """τ = 2/(K n): K of the ballistic kernel of two grains, and of magnetic capture with c = 0.5, at kT."""
+    side, kelvin = 1.5e-6, 100.0
+    gas = thermal(100, side, kelvin)
+    mass, density = float(gas.mass[0]), 100 / side**3
+    plain = sand.Simulation(gas, [sand.Contact()], box=side)
+    found = steps.coagulation_time(plain, steps.bodies_of(plain))
+    assert found == pytest.approx(2.0 / (brownian(1e-8, mass, kelvin)(mass, mass) * density), rel=1e-6, abs=0.0)
+    moment = 200.0 * mass
+    magnets = sand.Simulation(
+        thermal(100, side, kelvin, moment=[moment, 0, 0]), [sand.Contact(), sand.Dipoles()], box=side
     )
-    assert known.seconds == pytest.approx(0.5 * end / step * 20 * 50e-9, rel=1e-6, abs=0.0)
-    assert cost.expected_cost(sim, end, 1000).seconds == pytest.approx(1000 * 20 * 50e-9, rel=1e-6, abs=0.0)
-    assert cost.expected_cost(sim, math.inf, math.inf).seconds is None
-    larger = cost.expected_cost(simulation(40), end, 1000)
-    assert larger.seconds == pytest.approx(2 * 1000 * 40 * 50e-9, rel=1e-6, abs=0.0)
-    table.write_text('{"a": 3}')
-    assert cost.expected_cost(sim, end, math.inf) == rough  # a damaged table is empty
+    found = steps.coagulation_time(magnets, steps.bodies_of(magnets))
+    # σ of Eq. 14 at m̄v² = kT, with α for the largest attraction 2kμ²/r³, and the mean relative speed
+    alpha = 2.0 * MAGNETIC * moment**2
+    area = 0.5 * 3.0 * math.pi * (alpha / (BOLTZMANN * kelvin)) ** (2.0 / 3.0)
+    speed = math.sqrt(8.0 * BOLTZMANN * kelvin / (math.pi * 0.5 * mass))
+    assert found == pytest.approx(2.0 / (area * speed * density), rel=1e-6, abs=0.0)
 
 
-def test_a_run_is_recorded(table, monkeypatch):
-    """Wall time without compilation over N and the steps; short runs do not count, nor replace much longer ones."""
-    clock, compiled = [0.0], [0.0]
-    monkeypatch.setattr(cost.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(cost, "compilation_seconds", lambda: compiled[0])
+def test_charges_focus_bodies():
+    """σ/σ₀ is the mean of 1 − U/kT over pairs, not below 0: U/kT = ±5 in a neutral mixture gives (6 + 0)/2 = 3."""
+    side, kelvin = 1.5e-6, 100.0
+    gas = thermal(100, side, kelvin)
+    charge = math.sqrt(5.0 * BOLTZMANN * kelvin * 2e-8 / COULOMB)
+    charged = sand.Grains(
+        gas.position, 1e-8, "iron", velocity=gas.velocity, charge=charge * np.where(np.arange(100) % 2, 1.0, -1.0)
+    )
+    plain, other = (
+        sand.Simulation(one, forces, box=side)
+        for one, forces in ((gas, [sand.Contact()]), (charged, [sand.Contact(), sand.Charges(cutoff="0.5 um")]))
+    )
+    times = [steps.coagulation_time(one, steps.bodies_of(one)) for one in (plain, other)]
+    assert times[0] / times[1] == pytest.approx(3.0, rel=1e-9, abs=0.0)
+
+
+def test_steps_before_and_after_the_first_touch():
+    """Free steps up to τ/N, contact steps from there; a limit of steps takes the free ones first."""
+    side = 1.5e-6
+    sim = sand.Simulation(thermal(100, side, 100.0), [sand.Contact()], box=side)
+    first = steps.coagulation_time(sim, steps.bodies_of(sim)) / 100
+    long, short = steps.flight_step(sim), steps.contact_step(sim)
+    found = steps.expected_steps(sim, 3.0 * first, math.inf)
+    assert found.free == pytest.approx(first / long, rel=1e-9, abs=0.0)
+    assert found.contact == pytest.approx(2.0 * first / short, rel=1e-9, abs=0.0)
+    assert (found.bound, found.span) == ("", pytest.approx(3.0 * first, rel=1e-9, abs=0.0))
+    few = steps.expected_steps(sim, math.inf, 0.5 * first / long)
+    assert few.contact == 0.0 and few.span == pytest.approx(0.5 * first, rel=1e-9, abs=0.0)
+    # of n bodies N₀ (1 − ln(1 + x)/x) have merged on average up to x τ
+    x = 3.0 / 100
+    assert found.contacts == pytest.approx(100 * (1.0 - math.log(1.0 + x) / x), rel=1e-9, abs=0.0)
+
+
+def test_what_cannot_be_known_is_a_bound():
+    """In open space the first touch is unknown, and a condition may end a run: at most so many steps."""
+    open_gas = sand.Simulation(thermal(20, 1e-6, 100.0), [sand.Contact()])
+    assert steps.expected_steps(open_gas, 1e-9, math.inf).bound == "at most"
+    assert steps.expected_steps(simulation(), 1e-9, math.inf, may_end_earlier=True).bound == "at most"
+    stuck = sand.Simulation(sand.setup.chain(3, radius="10 nm", material="iron"), [sand.Contact()])
+    assert steps.expected_steps(stuck, 1e-9, math.inf).bound == ""
+
+
+def test_contact_steps_of_rigid_clusters_follow_the_touches():
+    """N x/(1 + x) touches with awake time 3 t_awake each, but never more than the run is long."""
+    side = 1.5e-6
+    forces = [sand.Contact(damping="critical", settling_time="5 ns")]
+    sim = sand.Simulation(thermal(100, side, 100.0), forces, box=side, stepping=sand.RigidClusters())
+    tau, awake = steps.coagulation_time(sim, steps.bodies_of(sim)), sim._engine.parameters.flight_limits.longest_awake
+    found = steps.expected_steps(sim, tau, math.inf)
+    assert found.awake == pytest.approx(50.0 * 3.0 * awake / steps.contact_step(sim), rel=1e-9, abs=0.0)
+    assert found.free == found.contact == 0.0 and found.bodies > 0.0
+    brief = steps.expected_steps(sim, 1e-15, math.inf)
+    assert brief.awake <= 1e-15 / steps.contact_step(sim) * (1.0 + 1e-12)
+
+
+@pytest.mark.compiled("small")  # two examples build aggregates
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.toml")))
+def test_every_example_has_an_estimate(name, capsys):
+    """A wall time of each example of `sand run`, `sand grow`, `sand collide` and `sand scatter`, with no run before."""
+    found = rows(capsys, EXAMPLES / f"{name}.toml")["wall time"]
+    assert found.strip().startswith(("about ", "at most ")) and "rough estimate" in found
+
+
+def test_a_measured_speed_scales_the_estimate(table):
+    """Wall time = Σ steps × rough time of a step × measured ratio; other runs tell the speed of the machine."""
+    sim, end = simulation(), 1e-6
+    rough = cost.expected_cost(sim, end, math.inf)
+    kind = cost.kind_of(sim)
+    assert kind == "contact jkr; all pairs; verlet; 1 thread" and rough.measured == ""
+    table.write_text(json.dumps({kind: {"contact": {"ratio": 3.0, "seconds": 9.0}}}))
+    known = cost.expected_cost(sim, end, math.inf)
+    assert known.measured == "as in a run of this kind on this machine" and known.steps == rough.steps
+    assert known.parts["stepping"] == pytest.approx(3.0 * rough.parts["stepping"], rel=1e-9, abs=0.0)
+    table.write_text(json.dumps({"others": {"bodies": {"ratio": 2.0, "seconds": 9.0}}}))
+    other = cost.expected_cost(sim, end, math.inf)
+    assert other.measured == "as in other runs on this machine"
+    assert other.seconds == pytest.approx(2.0 * rough.seconds, rel=1e-9, abs=0.0)
+    for damaged in (
+        '{"a": 3}',
+        '{"a": {"contact": {"ratio": 0.0, "seconds": 1.0}}}',
+        '{"a": {"b": {"ratio": 1, "seconds": 1}}}',
+    ):
+        table.write_text(damaged)
+        assert cost.expected_cost(sim, end, math.inf) == rough  # a damaged table is empty
+
+
+class Clock:
+    """A clock that stands still but for the steps."""
+
+    def __init__(self):
+        self.stepping = 0.0
+
+    @contextlib.contextmanager
+    def measure(self, part):
+        yield
+
+
+def timed(sim, pieces):
+    """The table after a run whose calls of the driver took steps, seconds and contacts at their ends, as given."""
+    state, engine = type("State", (), {"count": np.zeros(40, np.int64)})(), sim._engine
+
+    class Engine:
+        steps, awake_work, _state, parameters, long_range = 0, (0, 0.0), state, engine.parameters, engine.long_range
 
     class Counted:
-        start, forces, box, stepping = np.zeros(10), (), sand.Box.open(), sand.Verlet(step=1e-9)
-        _engine = simulation(stepping=sand.Verlet(step=1e-9))._engine
-        steps, time = 100, 1e-6
+        _engine, _clock, start = Engine(), Clock(), sim.start
+        forces, stepping, box = sim.forces, sim.stepping, sim.box
 
-    def run(seconds, steps, compilation=0.0):
-        sim = Counted()
-        timer = cost.RunTimer(sim)
-        clock[0], compiled[0] = clock[0] + seconds + compilation, compiled[0] + compilation
-        sim.steps, sim.time = 100 + steps, 1e-6 + 2e-9 * steps
-        timer.record()
-        return json.loads(table.read_text())[cost.kind_of(sim)]["10"] if table.exists() else None
+    one = Counted()
+    timer = cost.StepTimer(one)
+    for number, seconds, contacts in pieces:
+        with timer.steps():
+            one._engine.steps += number
+            one._clock.stepping += seconds
+            state.count[CONTACTS] = contacts
+    timer.record()
+    return cost._read().get(cost.kind_of(sim), {})
 
-    assert run(0.5, 1000) is None
-    assert run(4.0, 1000, 30.0) == pytest.approx(
-        {"ns_per_grain_step": 4e5, "step_ratio": 2.0, "seconds": 4.0}, rel=1e-6, abs=0.0
-    )
-    assert run(40.0, 1000)["seconds"] == pytest.approx(40.0, rel=1e-6, abs=0.0)
-    assert run(2.0, 1000)["seconds"] == pytest.approx(40.0, rel=1e-6, abs=0.0)
+
+def test_only_enough_steps_of_one_kind_are_recorded(table):
+    """Not the first call, which loads code; nothing of a tiny run; steps with and without contacts apart."""
+    sim = simulation()
+    assert timed(sim, [(17, 12.0, 0)]) == {}
+    assert timed(sim, [(10_000, 30.0, 0)]) == {} == timed(sim, [(64, 1.0, 0), (400, 9.0, 0)])
+    found = timed(sim, [(64, 5.0, 0), (1000, 0.2, 0), (1000, 7.0, 3), (5000, 0.5, 3)])
+    assert found.keys() == {"free", "contact"}, "the call in which contacts formed counts for neither"
+    free, with_three = (cost.step_seconds(sim, mode, n, 0.0) for mode, n in (("free", 0), ("contact", 3)))
+    assert found["free"]["ratio"] == pytest.approx(0.2e-3 / free, rel=1e-9, abs=0.0)
+    assert found["contact"]["ratio"] == pytest.approx(1e-4 / with_three, rel=1e-9, abs=0.0)
+    assert timed(sim, [(64, 5.0, 3), (600, 0.11, 3)])["contact"]["seconds"] == pytest.approx(0.11, rel=1e-9, abs=0.0)
+    long = timed(sim, [(64, 5.0, 3), (10**6, 100.0, 3)])
+    assert timed(sim, [(64, 5.0, 3), (600, 0.2, 3)]) == long, "a short run does not replace a much longer one"
+
+
+def test_output_is_counted():
+    """Frames and rows by time, steps and logarithm, as `Schedule` has them."""
+    for setting, span, number in (
+        ("10 ns", 105e-9, 10),
+        ("100 steps", 1e-9, 7),
+        ("log(5 per decade, from 1 ns)", 1e-7, 11),
+    ):
+        cadence = read_cadence(setting, "frame_every")
+        assert number_in(cadence, span, 799) == number
+    sim = simulation(row_every="10 ns")
+    assert cost.outputs(sim, 1e-6, 1.0) == pytest.approx(2.0 + 200.0 + 100.0, rel=0.0, abs=2.0)
 
 
 def test_memory_grows_with_the_grains():
@@ -126,12 +262,14 @@ def test_info_of_a_case(tmp_path, capsys, table):
     """Steps, wall time, memory and compilation, for people and for machines; nothing is compiled."""
     (tmp_path / "a.toml").write_text(CASE)
     found = rows(capsys, tmp_path / "a.toml")
-    assert found["steps"].strip().startswith("about ") and found["steps"].endswith(" steps")
-    assert "rough estimate: no such run was measured" in found["wall time"] and "MB" in found["memory"]
+    assert found["steps"].strip().startswith("about ") and found["steps"].endswith(" each")
+    assert "rough estimate: no run was measured" in found["wall time"] and "MB" in found["memory"]
     assert "compilation" in found
     assert main(["info", str(tmp_path / "a.toml"), "--json"]) == 0
     machine = json.loads(capsys.readouterr().out)["cost"]
-    assert {"step", "steps", "seconds", "memory", "measured", "compiled", "compilation_seconds"} == machine.keys()
+    assert {"step", "steps", "contact_steps", "seconds", "parts", "memory", "measured", "bound"} < machine.keys()
+    assert {"compiled", "compilation_seconds"} < machine.keys() and machine["bound"] == ""
+    assert machine["seconds"] == pytest.approx(sum(machine["parts"].values()), rel=1e-12, abs=0.0)
     assert machine["steps"] * machine["step"] == pytest.approx(1e-6, rel=1e-6, abs=0.0) and machine["measured"] is False
     (tmp_path / "b.toml").write_text(CASE.replace('until = "1 us"', 'stop = "clusters == 1"'))
     assert "depends on the condition" in rows(capsys, tmp_path / "b.toml")["wall time"]

@@ -215,6 +215,81 @@ def test_verlet_list_and_all_pairs_are_the_same_sum():
         assert np.abs(ours - theirs).max() < 1e-12 * np.abs(theirs).max()
 
 
+@pytest.mark.compiled("small")
+def test_all_images_act_by_default_in_a_periodic_box():
+    """40 charges ±5 e at random: `Charges()` against an Ewald sum in NumPy of which no term above exp(−25) is left out.
+
+    rms error of the force at most the accuracy, 1e-3, of F = √3 k q²/a², a = (3V/4πN)^(1/3); largest-case factor 2 for
+    the spread of one sample of 40.  Nearest images with the automatic cut-off err by more than half of the forces.
+    """
+    e, rng = 1.602176634e-19, np.random.default_rng(1)
+    position, charge = CUBE * (rng.random((40, 3)) - 0.5), 5 * e * np.where(np.arange(40) % 2, 1.0, -1.0)
+    exact, potential = ewald_in_numpy(position, charge, CUBE, 5.0 / CUBE[0])
+    size = math.sqrt((exact**2).sum(axis=1).mean())
+    energy = 0.5 * charge @ potential
+    force, own = loads(position, charge, CUBE, periodic="auto")
+    a = (3 * CUBE.prod() / (4 * math.pi * 40)) ** (1 / 3)
+    error = math.sqrt(((force - exact) ** 2).sum(axis=1).mean())
+    assert error < 2e-3 * math.sqrt(3) * COULOMB * (5 * e) ** 2 / a**2 < 0.01 * size
+    assert own == pytest.approx(energy, abs=2e-3 * 40 * COULOMB * (5 * e) ** 2 / a)
+    with pytest.warns(UserWarning, match="charges: the cut-off, .* ends an interaction that is not small there"):
+        cut, _ = loads(position, charge, CUBE, periodic="nearest image")
+    assert math.sqrt(((cut - exact) ** 2).sum(axis=1).mean()) > 0.5 * size
+
+
+@pytest.mark.parametrize(
+    ("box", "options", "radius", "parts"),
+    [
+        (
+            1e-6,
+            {},
+            None,
+            ["all images, as the box is periodic along x, y and z and no cut-off is given: radius of the"],
+        ),
+        (1e-6, {"accuracy": 1e-5}, None, ["all images", "accuracy 1e-05"]),
+        (1e-6, {"periodic": "ewald"}, None, ["radius of the real part of an Ewald sum"]),
+        (1e-6, {"periodic": "nearest image"}, 0.5e-6 / 1.35, ["smooth, half the box / 1.35"]),
+        (1e-6, {"cutoff": "0.2 um"}, 0.2e-6, ["smooth, given by the user"]),
+        (1e-6, {"cut": "sharp"}, 0.5e-6 / 1.35, ["sharp, half the box / 1.35"]),
+        (1e-6, {"cutoff": None}, "none", ["no cut-off, given by the user: nearest images"]),
+        (None, {}, "none", ["open box: all pairs"]),
+        (
+            (1e-6, 1e-6, None),
+            {},
+            0.5e-6 / 1.35,
+            ["half the box / 1.35; no Ewald sum: the box is periodic 1 um x 1 um x o"],
+        ),
+        ((1e-4, 1e-4, 1e-7), {}, 0.5e-7 / 1.35, ["; no Ewald sum: ", "needs more than 1000000 wave vectors"]),
+    ],
+)
+def test_what_acts_in_a_box_is_chosen_and_stated(box, options, radius, parts):
+    """`Charges()`: all images where that is possible and no cut-off is given; a resumed run chooses the same."""
+    grains = sand.Grains([[0, 0, 0], [5e-8, 0, 0]], 1e-9, sand.SILICA, charge=[Q, -Q])
+    force, sides = sand.Charges(**options), sand.Box.open()
+    if box is not None:
+        sides = sand.Box.periodic(*(box if isinstance(box, tuple) else (box,)))
+    choice = force.choose(grains, sides)
+    assert all(part in choice.reason for part in parts)
+    ewald = radius is None
+    assert force.uses_ewald(grains, sides) == ewald
+    assert choice.radius == (None if radius == "none" else pytest.approx(radius or 0.5e-6, rel=1e-12, abs=0.0))
+    again = sand.Charges(**force.resolved(grains, sides))
+    assert again.choose(grains, sides).radius == choice.radius and again.uses_ewald(grains, sides) == ewald
+
+
+def test_a_scheme_without_rates_takes_nearest_images():
+    """far = "taylor" needs rates, which an Ewald sum lacks: "auto" takes nearest images, and "ewald" is refused."""
+    position, charge = ions(10)
+    grains, contact = sand.Grains(position, 1e-9, sand.SILICA, charge=charge), sand.Contact()
+    taylor = {"box": tuple(SIDES), "stepping": sand.Verlet(far="taylor")}
+    with pytest.warns(UserWarning) as warned:
+        sim = sand.Simulation(grains, [contact, sand.Charges()], **taylor)
+    assert any("charges: the cut-off" in str(each.message) for each in warned)
+    assert sim.choices["charges cut-off"].endswith("(smooth, half the box / 1.35)")
+    with pytest.raises(BadInput, match=r"^stepping: far = 'taylor' needs the rate of change of every pair"):
+        sand.Simulation(grains, [contact, sand.Charges(periodic="ewald")], **taylor)
+
+
 def test_forces_of_grains_in_contact():
     """The force that acts in every step of a cycle: that of two bare charges at their nearest images."""
     grains = sand.Grains([[0.49e-6, 0, 0], [-0.495e-6, 2e-9, 0]], 1e-9, sand.SILICA, charge=[Q, -2 * Q])
@@ -270,7 +345,19 @@ def test_the_choice_and_a_net_charge_are_stated():
                 "charges: boundary = 'vacuum' is for dipoles only",
             ],
         ),
-        (lambda: sand.Charges(accuracy=1e-4), ["charges: accuracy is used only with periodic = 'ewald'"]),
+        (
+            lambda: sand.Charges(periodic="nearest image", accuracy=1e-4),
+            ["charges: accuracy is used only with periodic = 'ewald'"],
+        ),
+        (
+            lambda: sand.Charges(cut="sharp", accuracy=1e-4),
+            ["charges: accuracy is used only by an Ewald sum, which has no cut; leave it out"],
+        ),
+        (lambda: sand.Charges(boundary="vacuum"), ["charges: boundary = 'vacuum' is for dipoles only"]),
+        (
+            lambda: simulation([[0, 0, 0]], Q, (1e-6, 1e-6, None), periodic="auto", accuracy=1e-4),
+            ["charges: accuracy is used only by an Ewald sum, and there is none: the box is periodic 1 um x 1 um x"],
+        ),
         (
             lambda: simulation([[0, 0, 0]], Q, (1e-6, 1e-6, None)),
             ["charges: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is periodic 1 um"],

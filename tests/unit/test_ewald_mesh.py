@@ -327,7 +327,10 @@ GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
     [
         (lambda: sand.Dipoles(periodic="ewald", reciprocal="pme"), "dipoles: reciprocal = 'pme'; allowed: auto, dir"),
         (lambda: sand.Dipoles(reciprocal="mesh"), "dipoles: reciprocal is used only with periodic = 'ewald'"),
-        (lambda: sand.Charges(reciprocal="mesh"), "charges: reciprocal is used only with periodic = 'ewald'"),
+        (
+            lambda: sand.Charges(periodic="nearest image", reciprocal="mesh"),
+            "charges: reciprocal is used only with periodic = 'ewald'",
+        ),
         (
             lambda: sand.Simulation(
                 GRAINS,

@@ -9,8 +9,9 @@ import pytest
 
 import sand
 from sand import theory
-from sand.analysis.fits import power_law, rate_law, separation
+from sand.analysis.fits import power_law, separation
 from sand.analysis.fractal import correlation_dimension
+from sand.analysis.growth_law import rate_law
 from sand.experiments import kernel_table
 from sand.theory import kinetics
 from sand.theory.exponents import Outputs, exponent_fit
@@ -148,14 +149,6 @@ def test_exponents_that_add_up_to_one():
     with pytest.raises(sand.BadInput, match="not a power of time"):
         theory.dynamic_exponent(0.7 + 0.2, 0.1)
     assert theory.dynamic_exponent(0.799, 0.2) == pytest.approx(1000.0, rel=1e-9, abs=0.0)
-
-
-def test_laws_near_an_exponential_are_fitted_to_all_digits():
-    """S = (1 + t/zτ)^z at z = 1e9: (1 + 1e-9 t)^1e9 loses seven digits, e^(z ln(1 + t/zτ)) none."""
-    time = np.linspace(0.1, 5.0, 40)
-    law = rate_law(time, (1 + time / 1.4)[None] ** 2)._replace(degree=1.0 - 1e-9, time=1.0)
-    assert law.at(time) == pytest.approx(np.exp(np.log1p(1e-9 * time) / 1e-9), rel=1e-12, abs=0.0)
-    assert law._replace(degree=1.0).at(time) == pytest.approx(np.exp(time), rel=1e-12, abs=0.0)
 
 
 def test_values_equal_to_rounding_are_equal():

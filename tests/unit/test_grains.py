@@ -42,7 +42,7 @@ def test_every_quantity_of_the_table_is_there():
         assert np.shares_memory(view, getattr(grains.arrays, field.name))
         with pytest.raises(ValueError):
             view[...] = 0.0
-    assert {f.name for f in FIELDS} | {"material", "id"} == set(GrainArrays._fields)
+    assert {f.name for f in FIELDS} | {"own", "material", "id"} == set(GrainArrays._fields)
 
 
 def test_a_copy_is_independent():
@@ -104,13 +104,15 @@ def test_parts_of_grains():
     rng = np.random.default_rng(3)
     kinds = [sand.IRON, sand.SILICA, sand.SILICA, sand.IRON]
     vectors = {name: rng.normal(size=(4, 3)) for name in ("position", "velocity", "spin", "moment")}
-    grains = sand.Grains(**vectors, radius=[1e-8, 2e-8, 3e-8, 4e-8], material=kinds, charge=[1, 2, 3, 4])
+    grains = sand.Grains(
+        **vectors, radius=[1e-8, 2e-8, 3e-8, 4e-8], material=kinds, charge=[1, 2, 3, 4], own={"age": [4, 3, 2, 1]}
+    )
     grains.arrays.orientation[:] = rng.normal(size=(4, 4))
     for index in (2, -1, slice(1, 3), [3, 0], np.array([False, True, True, False]), slice(None, None, -1)):
         part, numbers = grains[index], np.atleast_1d(np.arange(4)[index])
         for name in GrainArrays._fields:
             if name not in ("material", "id"):
-                assert (getattr(part, name) == getattr(grains, name)[numbers]).all()
+                assert (getattr(part.arrays, name) == getattr(grains.arrays, name)[..., numbers]).all()
         assert [part.materials[k] for k in part.material] == [kinds[k] for k in numbers]
         assert part.id.tolist() == list(range(len(numbers))) and set(part.material) == set(range(len(part.materials)))
         again = sand.Grains(part.position, part.radius, [kinds[k] for k in numbers])

@@ -9,6 +9,7 @@ import tomli_w
 
 import sand
 from sand.cli.main import main
+from sand.constants import BOLTZMANN
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 
@@ -110,12 +111,16 @@ def synthetic_box(z, gamma, dimension, seed, grains=1000):
     )
 
 
+@pytest.mark.slow
 def test_exponents_of_synthetic_boxes():
-    """z, γ and D_f within four standard errors; a straight line misses z, because S begins at 1."""
-    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed) for seed in range(8)], (2.0, 100.0))
-    assert growth.z.exponent == pytest.approx(
-        2.0, rel=0.01, abs=0.0
-    )  # boxes differ in τ by a tenth, and z by its square
+    """γ and D_f within four standard errors; the local degree is that of S = (1 + t/zτ)^z, 1 − 1/z, z in its interval.
+
+    A straight line misses z, because S begins at 1. Boxes differ in τ by a tenth, which changes λ by its square.
+    """
+    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed, 10**6) for seed in range(8)], (2.0, 100.0))
+    assert growth.z.low < 2.0 < growth.z.high
+    assert len(growth.local_degrees) == 5
+    assert [one.degree for one in growth.local_degrees] == pytest.approx([0.5] * 5, abs=0.01)
     assert growth.slope.exponent < 1.8
     for law, exact in ((growth.moment, 0.63), (growth.moment_without_rings, 0.63)):
         assert abs(law.exponent - exact) < 4 * law.error < 0.04
@@ -130,8 +135,15 @@ def test_missing_results_give_a_reason(ensembles):
     growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
     assert growth.moment is None and growth.missing["moment"] == "the grains have no moments"
     assert growth.z is None and "fewer than three times have S between 2" in growth.missing["z"]
+    assert growth.local_degrees is None and "fewer than three times" in growth.missing["local_degrees"]
     with pytest.raises(sand.BadInput, match=r"different \[grains\]"):
         growth_of([synthetic_box(2, 0.6, 1.4, 1), synthetic_box(2, 0.6, 1.4, 2, grains=10)])
+
+
+def median_rotation(box, chosen):
+    """Median energy of rotation of the chosen bodies of all frames read, over 1.183 k_B [K]."""
+    energies = np.concatenate([motion.rotation[chosen(motion.grains)] for _, motion in box.bodies])
+    return np.median(energies) / (1.1829869421876689 * BOLTZMANN)
 
 
 @pytest.mark.compiled("dipoles")
@@ -145,16 +157,25 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     assert main(["analyse", *words, "--out", "told", "--json"]) == 0
     message = json.loads(capsys.readouterr().out)
     assert message["comparison"]["sigma"] > 3
+    boxes = [read_box(one) for one in boxes_in(ensembles / "magnetic")]
+    for kind, chosen in (("single", lambda n: n == 1), ("clusters", lambda n: n > 1)):
+        heat = [median_rotation(box, chosen) for box in boxes]
+        found = message["ensembles"][0]["temperatures"][kind]
+        assert found["rotation_median"] == pytest.approx(np.mean(heat), rel=1e-12, abs=0.0)
+        assert found["rotation_median_error"] == pytest.approx(np.std(heat, ddof=1) / 3**0.5, rel=1e-12, abs=0.0)
     assert message == json.loads((tmp_path / "told" / "analysis.json").read_text())
     assert [one["boxes"] for one in message["ensembles"]] == [3, 3]
     assert message["ensembles"][0]["mean_size"] > 1.5 * message["ensembles"][1]["mean_size"]
     assert (tmp_path / "told" / "growth.png").stat().st_size > 10_000
+    degrees = (tmp_path / "told" / "degrees.csv").read_text().splitlines()
+    found = message["ensembles"][0]["local_degrees"] or []
+    assert len(degrees) == 1 + len(found)
     assert len((tmp_path / "told" / "growth.csv").read_text().splitlines()) == 1 + 2 * 31
     assert main(["analyse", *words, "--out", "told"]) == 2
     assert "--overwrite" in capsys.readouterr().err
     assert main(["analyse", str(ensembles / "magnetic" / "seed-1"), "--window", "1.2", "4"]) == 0
     shown = capsys.readouterr().out
-    assert "1 of 30 grains" in shown and "nan" not in shown
+    assert "1 of 30 grains" in shown and "nan" not in shown and "single grains  translation" in shown
 
 
 @pytest.mark.compiled("dipoles")

@@ -13,6 +13,7 @@ from PIL import Image
 
 import sand
 from sand.experiments.growth import all_aggregates, growth_of
+from sand.io.ledger_table import TEMPERATURES
 from sand.plotting.chain_map import Map, Picture, chain_figure
 from sand.plotting.collisions import collision_figure
 from sand.plotting.growth import growth_figure
@@ -48,6 +49,7 @@ def rows_with_all_losses():
             "mean_cluster_size": 1.0 + k,
             "largest_cluster": 1 + k,
             "contacts": k,
+            **dict.fromkeys(TEMPERATURES, 100.0 + k),
         }
         | {key: value * (1 + k) for key, value in base.items()}
         | dict.fromkeys(names, 1e-18 * k)
@@ -69,7 +71,9 @@ def growth(guides=True):
     for name, z in (("magnetic, with a long name", 3.2), ("plain", 2.0)):
         boxes = [synthetic_box(z, 0.63, 1.4, seed) for seed in range(4)]
         units = {"unit_moment": boxes[0].moment, "unit_radius": boxes[0].radius}
-        ensembles.append((name, growth_of(boxes, (2.0, 100.0)), all_aggregates(boxes) | units))
+        temperatures = np.column_stack([np.linspace(1e-6, 1e-5, 5), np.full((5, 3), 100.0)])
+        rows = all_aggregates(boxes) | units | {"temperatures": temperatures}
+        ensembles.append((name, growth_of(boxes, (2.0, 100.0)), rows))
     return growth_figure(ensembles, guides)
 
 

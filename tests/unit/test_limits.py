@@ -75,15 +75,22 @@ def test_velocities_are_thermal_in_a_periodic_box_only():
 @pytest.mark.parametrize(
     ("radius", "temperature", "moment", "parts"),
     [
-        # 8.05 nm at 300 K; τ = 1e-9 s × exp(KV/kT) = 1e-9 s × exp(2.5133e-20/4.1419e-21) = 432 ns
-        ("5 nm", "300 K", "material", ["iron grains of radius 5 nm", "within 431.8 ns at 300 K", "below 8.051 nm"]),
-        ("5 nm", "30 K", "material", None),
-        ("10 nm", "300 K", "material", None),
+        # 12.78 nm at 300 K; τ = 1e-9 s × exp(K₁V/4kT): 1e-9 s × exp(6.2832e-21/4.1419e-21) = 4.558 ns for 5 nm, and
+        # 1e-9 s × exp(12.136) = 186.4 us for 10 nm
+        ("5 nm", "300 K", "material", ["iron grains of radius 5 nm", "within 4.558 ns at 300 K", "below 12.78 nm"]),
+        ("10 nm", "300 K", "material", ["within 186.4 us at 300 K", "with the energy barrier K1 V/4 (cubic)"]),
+        ("5 nm", "15 K", "material", None),
+        ("10 nm", "100 K", "material", None),
         # above 11.32 nm there are several domains
-        ("12 nm", "300 K", "material", ["iron grains of radius 12 nm are 100% of saturation", "above 11.32 nm"]),
-        ("12 nm", "300 K", "19 A m^2/kg", None),  # a tenth of saturation is 20 A m²/kg
-        ("12 nm", "300 K", "40 A m^2/kg", ["are 20% of saturation"]),
-        ("12 nm", "300 K", None, None),
+        (
+            "12 nm",
+            "100 K",
+            "material",
+            ["iron grains of radius 12 nm are 100% of saturation", "above 11.32 nm", "40 to"],
+        ),
+        ("12 nm", "100 K", "19 A m^2/kg", None),  # a tenth of saturation is 20 A m²/kg
+        ("12 nm", "100 K", "40 A m^2/kg", ["are 20% of saturation"]),
+        ("12 nm", "100 K", None, None),
     ],
 )
 def test_moments_that_are_not_fixed_give_a_warning(radius, temperature, moment, parts):
@@ -126,13 +133,15 @@ def test_a_fresh_contact_rings():
 def test_limits_of_the_moments_are_stated():
     """Numbers of the grains of the paper; magnetite of 20 nm keeps its moments in contact below their field."""
     row = limit_rows(thermal("10 nm", "iron", "100 K", moment="material"), FORCES, BOX)["moments"]
-    for part in ("iron: one domain up to a radius of 11.32 nm", "below 575 K (above a radius of 5.582 nm)"):
+    quoted = "(an estimate for spheres, to a factor of about two; Dominik & Nübold 2002 quote 40 to 60 nm in diameter"
+    fixed = "below 144 K (above a radius of 8.861 nm), with the energy barrier K1 V/4 (cubic)"
+    for part in ("iron: one domain up to a radius of 11.32 nm", quoted, fixed):
         assert part in row
     assert row.endswith("164.9 mT, is above the anisotropy field, 60.96 mT: moments would turn inside the grains")
     weak = limit_rows(thermal("10 nm", "iron", "100 K", moment="20 A m^2/kg"), FORCES, BOX)["moments"]
     assert "16.49 mT, is below the anisotropy field, 60.96 mT" in weak
     large = sand.Grains(np.zeros((1, 3)), "1 um", "iron", moment="material")
-    assert "fixed for 100 s at any temperature;" in limit_rows(large, FORCES, sand.Box.open())["moments"]
+    assert "fixed for 100 s at any temperature, with" in limit_rows(large, FORCES, sand.Box.open())["moments"]
 
 
 def test_info_states_the_limits(tmp_path, capsys):

@@ -57,11 +57,12 @@ def test_scales_span_nine_decades():
 
 
 def test_grains_keep_their_size(frame):
-    """Radius in units, mass, charge and material."""
+    """Radius in units, mass and material; the charge, which an updater may change, is in the packet of each frame."""
     _, arrays = decode(grains_packet(frame, 2e-8))
     assert arrays["radius"] == pytest.approx(frame.radius / 2e-8, rel=1e-7, abs=0)
     assert arrays["mass"] == pytest.approx(frame.mass, rel=1e-7, abs=0)
-    assert arrays["charge"] == pytest.approx(1.6e-19, rel=1e-7, abs=0)
+    _, of_frame = decode(frame_packet(0, frame, np.zeros(7), 2e-8))
+    assert of_frame["charge"] == pytest.approx(1.6e-19, rel=1e-7, abs=0)
     assert arrays["material"].dtype == np.uint8 and not arrays["material"].any()
 
 

@@ -83,7 +83,7 @@ def test_quantities_of_grains_cannot_be_assigned(sim, name):
         with pytest.raises(sand.BadInput, match=rf"^{name} of grains cannot be assigned; make new grains"):
             setattr(grains, name, 1.0)
     assert all((getattr(sim.grains, key) == value).all() for key, value in before.items())
-    assert not set(vars(sim.grains)) - {"arrays", "materials"}
+    assert not set(vars(sim.grains)) - {"arrays", "materials", "own_units"}
 
 
 def test_misspelt_names_are_refused(sim):

@@ -17,7 +17,7 @@ def test_series_are_the_ledgers(finished_run):
     folder, sim = finished_run
     series = run_dataset(folder).series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
-    assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
+    assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]  # fewer than ten bodies
     assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
     assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
     change = sim.ledger["total"] - sim.ledger["total"][0]

@@ -10,7 +10,7 @@ import pytest
 import sand
 from sand.errors import BadInput
 from sand.plotting.render.scene import camera_rotation
-from sand.plotting.render.still import still_picture
+from sand.plotting.render.still import contact_share, still_picture
 from sand.plotting.style import rgb
 
 from .synthetic_frames import R, at_pixel, frame_of, pixels_of_hue
@@ -206,3 +206,20 @@ def test_all_errors_are_reported_together():
         still_picture(frame_of([[np.nan, 0, 0]]))
     with pytest.raises(BadInput, match="alignment is not known: no grain in contact"):
         still_picture(frame_of([[0, 0, 0]]), colour="alignment")
+
+
+@pytest.mark.parametrize(("r", "s"), [(10.0, 25.0), (25.0, 10.0), (10.0, 10.0), (1.0, 100.0)])
+def test_contacts_are_where_the_spheres_intersect(r, s):
+    """A point of the circle in which two spheres intersect is r from one centre and s from the other.
+
+    At the share f of d it has the distance h from the axis with h² = r² − f² d² = s² − (1 − f)² d²; touching spheres
+    have f = r/(r + s).  Both sides are of the size of s²: 16 roundings of the larger radius squared.
+    """
+    for overlap in (0.0, 0.01, 0.1):
+        d = (r + s) - overlap * min(r, s)
+        f = contact_share(np.array([d]), np.array([r]), np.array([s]))[0]
+        assert r**2 - (f * d) ** 2 == pytest.approx(
+            s**2 - ((1 - f) * d) ** 2, rel=0.0, abs=16 * 2**-52 * max(r, s) ** 2
+        )
+        assert overlap or f == pytest.approx(r / (r + s), rel=1e-13, abs=0.0)
+    assert contact_share(np.array([0.0]), np.array([r]), np.array([s]))[0] in (0.0, 0.5, 1.0)

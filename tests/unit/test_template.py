@@ -172,6 +172,7 @@ def test_each_key_is_read(command, tmp_path, capsys):
             assert len(unknown) == len(more), (name, unknown)
 
 
+@pytest.mark.compiled("small")  # that of sand collide builds aggregates
 @pytest.mark.parametrize("command", list(TEMPLATES))
 def test_info_describes_each_case(command, tmp_path, monkeypatch, capsys):
     """`sand new NAME --for COMMAND` writes a case that `sand info` accepts for that command."""

@@ -1,4 +1,4 @@
-// Contacts as they are drawn: bars between grains, split in two halves at periodic faces, and their colours.
+// Contacts as they are drawn: bars between grains, cut at the contact where it lies beyond a face, and their colours.
 
 import { nearestImage } from "./clusters";
 import { colourAt, rgb, type Scale } from "./colours";
@@ -14,6 +14,7 @@ export interface Bonds {
   from: Float32Array; // (P, 3)
   to: Float32Array;
   colour: Uint8Array; // (P, 4)
+  radius: Float32Array; // (P,) of the smaller of the two grains
   contact: Uint32Array; // (P,) index of the contact
 }
 
@@ -62,10 +63,20 @@ export function loadScale(manifest: Manifest, frame: Frame): Scale {
   return { low: -top, high: top, log: false, palette: manifest.palettes.diverging };
 }
 
+/**
+ * Share of the way from the centre of a grain of radius r to that of another, of radius s, at which their spheres
+ * intersect, or between their surfaces: the plane of equal powers, (d² + r² − s²) / (2 d²) for the squared distance d².
+ */
+function contactShare(squaredDistance: number, r: number, s: number): number {
+  const share = 0.5 + (0.5 * (r * r - s * s)) / squaredDistance;
+  return Math.min(Math.max(share, 0), 1); // NaN for absent grains
+}
+
 /** Bars of all contacts between shown grains, at the positions where these are drawn. */
 export function bondPieces(
   frame: Frame,
   positions: Float32Array,
+  radius: Float32Array,
   shown: Uint8Array | null,
   manifest: Manifest,
   colourOf: BondColours,
@@ -75,6 +86,7 @@ export function bondPieces(
   const from = new Float32Array(3 * capacity);
   const to = new Float32Array(3 * capacity);
   const colours = new Uint8Array(4 * capacity);
+  const smaller = new Float32Array(capacity);
   const contact = new Uint32Array(capacity);
   const d = new Float64Array(3);
   let used = 0;
@@ -85,6 +97,7 @@ export function bondPieces(
       colours[4 * used + a] = colour[a];
     }
     colours[4 * used + 3] = 255;
+    smaller[used] = Math.min(radius[pair[2 * c]], radius[pair[2 * c + 1]]);
     contact[used++] = c;
   };
   for (let c = 0; 2 * c < pair.length; c++) {
@@ -97,13 +110,15 @@ export function bondPieces(
       wrapped ||= Math.abs(d[a] - straight) > 0.5 * box[a];
     }
     const colour = colourOf(c);
-    add(c, i, wrapped ? 0.5 : 1, colour);
-    if (wrapped) add(c, j, -0.5, colour);
+    const share = wrapped ? contactShare(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], radius[i], radius[j]) : 1;
+    add(c, i, share, colour);
+    if (wrapped) add(c, j, share - 1, colour);
   }
   return {
     from: from.subarray(0, 3 * used),
     to: to.subarray(0, 3 * used),
     colour: colours.subarray(0, 4 * used),
+    radius: smaller.subarray(0, used),
     contact: contact.subarray(0, used),
   };
 }

@@ -4,6 +4,9 @@ import type { Frame, Grains } from "./types";
 
 const MAGIC = "SANDPKT1";
 
+/** Beginning of the names of own quantities. */
+const OWN = "own/";
+
 interface Entry {
   name: string;
   type: "f4" | "f2" | "u4" | "u1";
@@ -75,5 +78,9 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   const bytes = new Set(Object.values(arrays).map((a) => a.buffer)).size === 1
     ? buffer.byteLength
     : Object.values(arrays).reduce((sum, a) => sum + a.byteLength, 0) + buffer.byteLength;
-  return { ...(header as object), ...arrays, bytes } as unknown as Frame;
+  const own = new Map<string, Numbers>();
+  for (const [name, array] of Object.entries(arrays)) {
+    if (name.startsWith(OWN)) own.set(name.slice(OWN.length), array);
+  }
+  return { ...(header as object), ...arrays, own, bytes } as unknown as Frame;
 }

@@ -126,7 +126,8 @@ export const QUANTITIES: Quantity[] = [
 /** All quantities of a run: the table and the own quantities of the user. */
 export function quantitiesOf(manifest: Manifest): Quantity[] {
   const own = manifest.own.map(({ id, label, unit }): Quantity => ({
-    id, label, unit, kind: "sequential", values: (_, { grains }) => Float32Array.from(grains[id]),
+    id, label, unit, kind: "sequential",
+    values: (frame) => frame.own.get(id) ?? new Float32Array(manifest.grains).fill(NaN),
   }));
   return [...QUANTITIES, ...own];
 }

@@ -48,9 +48,6 @@ export interface Grains {
   radius: Float32Array;
   mass: Float32Array;
   material: Uint8Array;
-  charge: Float32Array;
-  /** Own quantities, by their id in the manifest. */
-  [own: string]: Float32Array | Uint8Array;
 }
 
 /** One frame; positions and box in the manifest's `unit`, all others in SI units. */
@@ -66,6 +63,10 @@ export interface Frame {
   cluster: Uint32Array;
   /** 1 for grains of clusters at rest, 0 for those of awake clusters; with rigid clusters. */
   at_rest?: Uint8Array;
+  /** Absent if no grain is charged. */
+  charge?: Float32Array;
+  /** Own quantities of the user, by their id in the manifest. */
+  own: Map<string, Float32Array>;
   pair: Uint32Array;
   force: Float32Array;
   share: Float32Array;

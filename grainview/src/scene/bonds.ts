@@ -1,4 +1,5 @@
-// Contacts as cylinders between the centres of two grains; at true grain size only a collar at the neck is visible.
+// Contacts as cylinders between the centres of two grains, as wide as the smaller one allows; at true grain size only a
+// collar at the neck is visible.
 
 import type { Bonds } from "../data/bonds";
 import { COMMON } from "./glsl";
@@ -16,10 +17,14 @@ out float vAcross;
 flat out vec3 vFrom;
 flat out vec3 vAxis;
 flat out vec3 vColour;
+flat out float vBar;
 
 void main() {
   vec2 corner = cornerOf(gl_VertexID);
-  vec3 a = (modelViewMatrix * vec4(fetched(uFrom, gl_VertexID).xyz, 1.0)).xyz;
+  vec4 from = fetched(uFrom, gl_VertexID);
+  float bar = uBar * from.w;
+  vBar = bar;
+  vec3 a = (modelViewMatrix * vec4(from.xyz, 1.0)).xyz;
   vec3 b = (modelViewMatrix * vec4(fetched(uTo, gl_VertexID).xyz, 1.0)).xyz;
   vec4 colour = fetched(uColour, gl_VertexID);
   vFrom = a;
@@ -34,12 +39,12 @@ void main() {
 #ifdef SIMPLE
   // the square is on the side of the bar that faces the eye
   vec3 front = normalize(cross(side, along));
-  vOnQuad = middle + front * uBar + corner.x * 0.5 * vAxis + corner.y * side * uBar;
+  vOnQuad = middle + front * bar + corner.x * 0.5 * vAxis + corner.y * side * bar;
 #else
   // the square faces the eye and contains the outline of the bar, including its ends
   vec3 axial = cross(toEye, side);
-  float halfLength = 0.5 * abs(dot(vAxis, axial)) + uBar * (0.2 + abs(dot(along, toEye)));
-  vOnQuad = middle + corner.x * halfLength * axial + corner.y * side * uBar * 1.2;
+  float halfLength = 0.5 * abs(dot(vAxis, axial)) + bar * (0.2 + abs(dot(along, toEye)));
+  vOnQuad = middle + corner.x * halfLength * axial + corner.y * side * bar * 1.2;
 #endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   if (colour.a < 0.5 || (!isOrtho() && max(a.z, b.z) > 0.0)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -47,7 +52,7 @@ void main() {
 `;
 
 const FRAGMENT = /* glsl */ `
-uniform float uBar;
+flat in float vBar;
 in vec3 vOnQuad;
 in float vAcross;
 flat in vec3 vFrom;
@@ -70,7 +75,7 @@ void main() {
   vec3 offsetAcross = offset - dot(offset, axis) * axis;
   float a = dot(rayAcross, rayAcross);
   float b = dot(rayAcross, offsetAcross);
-  float c = dot(offsetAcross, offsetAcross) - uBar * uBar;
+  float c = dot(offsetAcross, offsetAcross) - vBar * vBar;
   float discriminant = b * b - a * c;
   if (discriminant < 0.0) discard;
   float rayAlong = dot(ray, axis);
@@ -78,13 +83,13 @@ void main() {
   vec3 p, normal;
   if (position >= 0.0 && position <= size && a >= 1e-12) {
     p = origin + (-b - sqrt(discriminant)) / a * ray;
-    normal = (p - vFrom - position * axis) / uBar;
+    normal = (p - vFrom - position * axis) / vBar;
   } else {
     // the flat end that faces the eye
     float end = rayAlong > 0.0 ? 0.0 : size;
     p = origin + (end - dot(offset, axis)) / rayAlong * ray;
     vec3 across = p - vFrom - end * axis;
-    if (dot(across, across) > uBar * uBar) discard;
+    if (dot(across, across) > vBar * vBar) discard;
     normal = rayAlong > 0.0 ? -axis : axis;
   }
   outColour = vec4(lit(vColour, normal, -ray, 1.0, -p.z), 1.0);
@@ -106,6 +111,7 @@ export class BondsMesh extends Squares {
     own.uColour = this.colour.uniform;
   }
 
+  /** Draw the pieces with radii of `bar` times those of the smaller grains. */
   set(pieces: Bonds, bar: number): void {
     const count = pieces.contact.length;
     this.uniforms.uBar.value = bar;
@@ -113,6 +119,7 @@ export class BondsMesh extends Squares {
       const values = column.write(count);
       for (let k = 0; k < count; k++) {
         for (let a = 0; a < 3; a++) values[4 * k + a] = ends[3 * k + a];
+        values[4 * k + 3] = pieces.radius[k];
       }
     }
     this.colour.write(count).set(pieces.colour);

@@ -33,8 +33,8 @@ export function pickGrain(
   return best < 0 ? null : { kind: "grain", index: best, distance: nearest };
 }
 
-/** The first contact along a ray; bars are cylinders of the given radius. */
-export function pickContact(ray: Ray, bonds: Bonds, radius: number): Hit | null {
+/** The first contact along a ray; bars are cylinders of `bar` times the radius of the smaller grain. */
+export function pickContact(ray: Ray, bonds: Bonds, bar: number): Hit | null {
   const o = ray.origin.toArray();
   const d = ray.direction.toArray();
   let [best, nearest] = [-1, Infinity];
@@ -52,7 +52,7 @@ export function pickContact(ray: Ray, bonds: Bonds, radius: number): Hit | null 
       da += d[a] * axis[a];
       oa += off[a] * axis[a];
     }
-    let [A, B, C] = [0, 0, -radius * radius];
+    let [A, B, C] = [0, 0, -((bar * bonds.radius[k]) ** 2)];
     for (let a = 0; a < 3; a++) {
       const [dp, op] = [d[a] - da * axis[a], off[a] - oa * axis[a]];
       A += dp * dp;

@@ -45,7 +45,7 @@ export class World {
   shown: Uint8Array | null = null;
   pieces: Bonds | null = null;
   haze = 0.5;
-  private bar = 1; // radius of contacts
+  private bar = 1; // radius of contacts over that of the smaller grain
   private medianRadius = 1;
 
   constructor(readonly stage: Stage) {

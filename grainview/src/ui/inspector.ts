@@ -39,7 +39,7 @@ export function grainRows(i: number, frame: Frame, dataset: Dataset): Row[] {
     ["moment", magnitudeAndComponents(vector(frame.moment, i), "A m²")],
   ];
   if (frame.at_rest) rows.push(["moves", frame.at_rest[i] ? "at rest, as a rigid body" : "awake, by contact steps"]);
-  if (grains.charge[i]) rows.push(["charge", quantity(grains.charge[i], "C")]);
+  if (frame.charge?.[i]) rows.push(["charge", quantity(frame.charge[i], "C")]);
   for (const q of others.filter((other) => other.available?.(dataset) ?? true)) {
     rows.push([q.label, quantity(q.values(frame, dataset)[i], q.unit)]);
   }

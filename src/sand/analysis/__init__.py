@@ -11,8 +11,8 @@ from typing import Any
 from ..errors import NoSuchAttribute, did_you_mean
 
 MODULES = (
-    "clusters", "fits", "fractal", "frame_statistics", "internal_motion", "ledger_columns", "network", "quantities",
-    "shape", "tracking",
+    "body_motion", "clusters", "fits", "fractal", "frame_statistics", "internal_motion", "ledger_columns", "network",
+    "quantities", "shape", "tracking",
 )  # fmt: skip
 """Public submodules."""
 

@@ -39,6 +39,11 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     ends = ends.reshape(-1, 2)
     if len(ends) and not 0 <= ends.min() <= ends.max() < count:
         raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
+    return labels_of(count, ends)
+
+
+def labels_of(count: int, ends: np.ndarray) -> np.ndarray:
+    """As `cluster_labels`, for pairs that need no check, int64."""
     if not len(ends):
         return np.arange(count)  # avoids the slow import of SciPy's graphs
     if count + len(ends) <= FEW:
@@ -79,8 +84,13 @@ def mean_cluster_size(labels: np.ndarray) -> float:
 
     It is the expected size of the cluster of a randomly chosen grain.
     """
-    sizes = cluster_sizes(labels).astype(np.float64)
-    return float((sizes**2).sum() / sizes.sum())
+    return mean_size(np.bincount(labels))
+
+
+def mean_size(sizes: np.ndarray) -> float:
+    """The same from the number of grains of each cluster (K,)."""
+    numbers = sizes.astype(np.float64)
+    return float((numbers**2).sum() / numbers.sum())
 
 
 @checked
@@ -101,13 +111,18 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     ndarray
         Positions; the lowest grain of each cluster keeps its image.
     """
-    count, pairs = len(position), np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    whole = np.array(position, dtype=np.float64)
+    ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    return in_one_piece(np.array(position, dtype=np.float64), ends, box)
+
+
+def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndarray | None = None) -> np.ndarray:
+    """As `unwrapped`, in place, for pairs that need no check, int64; with the labels of the clusters if known."""
+    count = len(whole)
     apart = whole[pairs[:, 1]] - whole[pairs[:, 0]]
     crosses = (box.nearest(apart) != apart).any(axis=1)
     if not crosses.any():
         return whole
-    labels = cluster_labels(count, pairs)
+    labels = labels_of(count, pairs) if labels is None else labels
     divided = np.isin(labels, labels[pairs[crosses, 0]])  # grains of clusters that cross a boundary
     neighbours: list[list[int]] = [[] for _ in range(count)]
     for a, b in pairs[divided[pairs[:, 0]]].tolist():

@@ -1,4 +1,4 @@
-"""Fits of power laws and growth laws, with jackknife errors over independent boxes.
+"""Fits of power laws, with jackknife errors over independent boxes, and intervals of means.
 
 Data of one box are correlated; the jackknife therefore omits whole boxes.
 """
@@ -11,9 +11,6 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import BadInput
-
-STEEPEST = 0.99
-"""Largest degree λ, z = 100; faster growth is indistinguishable from exponential growth."""
 
 SAME = 1e-9
 """Difference of two logarithms that is attributed to rounding."""
@@ -149,86 +146,6 @@ def mean_interval(values: np.ndarray) -> tuple[float, float]:
     centre = float(logarithms.mean()) + 0.5 * variance
     half = float(t.ppf(0.975, n - 1)) * np.sqrt(variance / n + 0.5 * variance**2 / (n - 1))
     return float(np.exp(centre - half)), float(np.exp(centre + half))
-
-
-class RateLaw(NamedTuple):
-    """Growth law dS/dt = S^degree/τ with S(0) = 1, that is S = (1 + t/zτ)^z with z = 1/(1 − degree)."""
-
-    exponent: float  # z; infinite from degree 1 on
-    error: float  # standard error, from that of the degree
-    low: float  # 95 % interval, from that of the degree
-    high: float
-    degree: float  # λ = η + ν of Eq. 20
-    degree_error: float
-    time: float  # τ [s]
-    points: int
-    groups: int
-
-    def at(self, time: np.ndarray | float) -> np.ndarray | float:
-        """S at a time [s]."""
-        return np.exp(_log_grown(np.asarray(time), self.degree, self.time))
-
-
-@checked
-def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
-    """Fit S = (1 + t/zτ)^z to ln S of the mean over boxes, with jackknife errors over boxes.
-
-    Unlike a straight line in ln S over ln t, this includes S(0) = 1, which affects the local slope for long: for S ∝
-    t² at late times, the local slope z(1 − S^(−1/z)) is 0.6 at S = 2 and 1.4 at S = 10.
-
-    Parameters
-    ----------
-    time : ndarray
-        (K,) [s] > 0.
-    sizes : ndarray
-        Mean cluster size S (boxes, K) ≥ 1.
-
-    Returns
-    -------
-    RateLaw
-        Exponent z and degree with errors, and τ.
-
-    Raises
-    ------
-    BadInput
-        If there are fewer than three times, or S does not grow.
-    """
-    t, s = np.asarray(time, float), np.asarray(sizes, float)
-    fits = t.ndim == 1 and len(t) >= 3 and s.shape[1:] == t.shape
-    if not fits or not (t > 0).all() or not (s.mean(axis=0)[-1] > 1.0 + SAME):
-        raise BadInput("a growth law needs at least three times above 0, and sizes that grow beyond 1")
-    degree, tau = _rate(t, s.mean(axis=0))
-    if degree > STEEPEST:
-        raise BadInput(f"S grows faster than any power of time (dS/dt ∝ S^{degree:.2f})")
-    boxes = len(s)
-    without = [_rate(t, np.delete(s, k, axis=0).mean(axis=0))[0] for k in range(boxes)] if boxes > 1 else []
-    degree_error, *ends = jackknife(degree, np.array(without))
-    z, low, high = (np.inf if value >= 1.0 else 1.0 / (1.0 - value) for value in (degree, *ends))
-    return RateLaw(z, degree_error * z * z, low, high, degree, degree_error, tau, t.size, boxes)
-
-
-def _log_grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
-    """ln S of the solution of dS/dt = S^degree/τ, S(0) = 1: (1 + (1 − degree) t/τ)^(1/(1 − degree)).
-
-    It is exponential at degree 1; the logarithm is accurate near it, and strongly negative after a divergence of S.
-    """
-    rest = 1.0 - degree
-    if abs(rest) < 1e-15:
-        return time / tau
-    return np.log1p(np.maximum(rest * time / tau, -1.0 + 1e-16)) / rest
-
-
-def _rate(time: np.ndarray, size: np.ndarray) -> tuple[float, float]:
-    """Degree and τ [s] = 1/Ṡ(0) of the least-squares fit to one S(t)."""
-    from scipy.optimize import least_squares
-
-    first = time[-1] / max(float(np.log(size[-1])), 1e-3)
-
-    def residuals(free: np.ndarray) -> np.ndarray:
-        return _log_grown(time, float(free[0]), first * float(np.exp(free[1]))) - np.log(size)
-
-    found = least_squares(residuals, [0.5, 0.5], bounds=([-3.0, -5.0], [1.5, 5.0]))
-    return float(found.x[0]), float(first * np.exp(found.x[1]))
 
 
 @checked

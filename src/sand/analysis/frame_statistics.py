@@ -17,7 +17,10 @@ COLUMNS = {
     "mass": ("kg", "mass"),
     "gyration_radius": ("m", "radius of gyration, centres only"),
     "elongation": ("1", "longest over shortest principal length, extent of grains included"),
-    "filling_factor": ("1", "volume of grains over that of the sphere with this radius of gyration"),
+    "filling_factor": (
+        "1",
+        "volume of grains over that of the sphere of radius (5/3)^(1/2) r_g, r_g with the extent of grains",
+    ),
     "moment": ("A m^2", "magnitude of the total moment"),
     "alignment": ("1", "magnitude of the total moment over the sum of the magnitudes"),
     "coordination": ("1", "mean number of contacts of a grain"),

@@ -8,41 +8,39 @@ import numpy as np
 
 from ..arguments import checked
 from ..box import Box
-from .clusters import cluster_labels, unwrapped
+from .body_motion import body_motion
+from .clusters import cluster_labels, in_one_piece
 
 __all__ = ["internal_kinetic_energy"]
 
 
 class RigidMotion(NamedTuple):
-    """The rigid motion of each cluster, and of its grains relative to it."""
+    """The rigid motion of K clusters, and of their n grains relative to it."""
 
-    label: np.ndarray  # (N,) cluster of each grain
-    spin: np.ndarray  # (K, 3) Ω = J⁻¹ L of each cluster [rad/s]
-    offset: np.ndarray  # (N, 3) s, from the centre of mass of the cluster [m]
-    velocity: np.ndarray  # (N, 3) relative to that of the centre of mass [m/s]
+    label: np.ndarray  # (n,) cluster of each grain
+    spin: np.ndarray  # (3, K) Ω = J⁻¹ L of each cluster [rad/s]
+    offset: np.ndarray  # (3, n) s, from the centre of mass of the cluster [m]
+    velocity: np.ndarray  # (3, n) relative to that of the centre of mass [m/s]
 
 
 def rigid_motion(grains: Any, pairs: np.ndarray, box: Box) -> RigidMotion:
     """The rigid motion of each cluster; arguments as for `internal_kinetic_energy`."""
-    labels = cluster_labels(len(grains), pairs)
-    count = int(labels.max()) + 1
+    label, pairs = cluster_labels(len(grains), pairs), np.asarray(pairs, np.int64).reshape(-1, 2)
     mass, inertia = np.asarray(grains.mass), np.asarray(grains.inertia)
-    velocity, spin = np.asarray(grains.velocity), np.asarray(grains.spin)
-    position = unwrapped(np.asarray(grains.position), pairs, box)
-    total = _summed(mass, labels, count)[:, None]
-    s = position - (_summed(mass[:, None] * position, labels, count) / total)[labels]
-    u = velocity - (_summed(mass[:, None] * velocity, labels, count) / total)[labels]
-    angular = _summed(mass[:, None] * np.cross(s, u) + inertia[:, None] * spin, labels, count)
-    own = (mass * (s * s).sum(axis=1) + inertia)[:, None, None] * np.eye(3)
-    tensor = _summed(own - mass[:, None, None] * s[:, :, None] * s[:, None, :], labels, count)
-    return RigidMotion(labels, np.linalg.solve(tensor, angular[:, :, None])[:, :, 0], s, u)
+    count = int(label.max()) + 1
 
+    def summed(values: np.ndarray) -> np.ndarray:
+        """Sums over the grains of each cluster, of values (…, n): (…, K)."""
+        flat = values.reshape(-1, len(label))
+        return np.array([np.bincount(label, each, count) for each in flat]).reshape(*values.shape[:-1], count)
 
-def _summed(values: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
-    """Sum of the values of the grains of each of `count` clusters."""
-    total = np.zeros((count, *values.shape[1:]))
-    np.add.at(total, labels, values)
-    return total
+    position = in_one_piece(np.array(grains.position), pairs, box, label).T
+    velocity, total = np.asarray(grains.velocity).T, summed(mass)
+    s = position - (summed(mass * position) / total)[:, label]
+    u = velocity - (summed(mass * velocity) / total)[:, label]
+    angular = summed(mass * np.cross(s, u, axis=0) + inertia * np.asarray(grains.spin).T)
+    tensor = summed(mass * (s * s).sum(axis=0) + inertia) * np.eye(3)[:, :, None] - summed(mass * s[:, None] * s[None])
+    return RigidMotion(label, np.linalg.solve(tensor.T, angular.T[:, :, None])[:, :, 0].T, s, u)
 
 
 @checked
@@ -69,16 +67,5 @@ def internal_kinetic_energy(grains: Any, pairs: np.ndarray, box: Box) -> tuple[n
     degrees : ndarray
         Internal degrees of freedom of each cluster, (K,).
     """
-    labels = cluster_labels(len(grains), pairs)
-    count = int(labels.max()) + 1
-    members = np.bincount(labels, minlength=count)
-    degrees = np.where(members > 1, 6 * members - 6, 0)
-    if count == len(labels):
-        return np.zeros(count), degrees
-    motion = rigid_motion(grains, pairs, box)
-    # as the energy of velocities relative to the rigid motion, which has no differences of large numbers
-    turning = motion.spin[labels]
-    v, w = motion.velocity - np.cross(turning, motion.offset), np.asarray(grains.spin) - turning
-    kinetic = 0.5 * np.asarray(grains.mass) * (v * v).sum(axis=1)
-    energy = _summed(kinetic + 0.5 * np.asarray(grains.inertia) * (w * w).sum(axis=1), labels, count)
-    return np.where(members > 1, energy, 0.0), degrees
+    motion = body_motion(grains, pairs, box)
+    return motion.internal, np.where(motion.grains > 1, 6 * motion.grains - 6, 0)

@@ -11,7 +11,6 @@ from ..arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.frame import MODES as SHARES
 from ..io.frame import REST
-from ..schema import BY_NAME, OWN
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 
@@ -112,16 +111,6 @@ def _floats(of: Callable[[Any], Any]) -> Callable[[Any, np.ndarray | None], np.n
     return lambda frame, _: np.asarray(of(frame), dtype=np.float64)
 
 
-def _own(name: str) -> Callable[[Any, np.ndarray | None], np.ndarray]:
-    """An own quantity of the user; NaN in frames in which no grain has a value."""
-
-    def values(frame: Any, _: np.ndarray | None) -> np.ndarray:
-        found = np.asarray(getattr(frame, name, np.zeros(len(frame.radius))), dtype=np.float64)
-        return found if found.any() else np.full(len(found), np.nan)
-
-    return values
-
-
 GRAINS = (
     Quantity("cluster", "1", "cluster", "categorical", _floats(lambda f: cluster_rank(len(f.radius), f.pair)), ""),
     Quantity("size", "1", "grains in its cluster", "sequential", _floats(_cluster_size), ""),
@@ -148,12 +137,8 @@ GRAINS = (
     ),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
     Quantity(REST, "1", "awake or at rest", "categorical", _at_rest, "only runs with rigid clusters have it"),
-    *(
-        Quantity(name, BY_NAME[name].unit, name.replace("_", " "), "sequential", _own(name), "no grain has a value")
-        for name in OWN
-    ),
 )
-"""Quantities of grains (N,)."""
+"""Quantities of grains (N,), besides own quantities of the user."""
 CONTACTS = (
     Quantity("load", "N", "normal force, above 0 if pressed", "diverging", _load, "the file holds no forces"),
     Quantity("mode", "1", "mode at its limit", "categorical", _mode, "the file has no contact displacements"),
@@ -164,11 +149,24 @@ CONTACT_NAMES = tuple(one.name for one in CONTACTS)
 _QUANTITIES: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS)}
 
 
+def own_label(name: str) -> str:
+    """An own quantity in legends: its name with spaces."""
+    return name.replace("_", " ")
+
+
+def names_of(frame: Any) -> tuple[str, ...]:
+    """Quantities of the grains of a frame, own quantities of the user included."""
+    return (*GRAIN_NAMES, *getattr(frame, "own", ()))
+
+
 @checked
-def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
-    """Look up a quantity by name. Raises BadInput if it is not one of `allowed`."""
+def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES, frame: Any = None) -> Quantity:
+    """Look up a quantity by name, also an own quantity of `frame`. Raises BadInput if it is not one of `allowed`."""
+    own: Any = getattr(frame, "own", {})
+    if name in own:
+        return Quantity(name, own.units[name], own_label(name), "sequential", _floats(lambda f: f.own[name]), "")
     if name not in allowed:
-        raise BadInput(f"there is no quantity '{name}'; {did_you_mean(name, allowed)}")
+        raise BadInput(f"there is no quantity '{name}'; {did_you_mean(name, (*allowed, *own))}")
     return _QUANTITIES[name]
 
 
@@ -181,7 +179,7 @@ def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarr
     frame : Frame
         Frame of a trajectory, or any object with its attributes.
     name : str
-        Name in `GRAINS` or `CONTACTS`.
+        Name in `GRAINS` or `CONTACTS`, or of an own quantity of the frame.
     field : ndarray or None, optional
         External flux density (3,) [T].
 
@@ -190,8 +188,8 @@ def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarr
     BadInput
         If there is no such quantity, or all its values are undefined.
     """
-    found = quantity(name, GRAIN_NAMES + CONTACT_NAMES)
     refuse_other(frame, "radius", "pair")
+    found = quantity(name, GRAIN_NAMES + CONTACT_NAMES, frame)
     values = found.of(frame, field)
     if values.size and np.isnan(values).all():
         raise BadInput(f"{name} is not known: {found.missing or 'no number is finite'}")

@@ -28,9 +28,9 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     "--out",
     metavar="FOLDER",
     type=options.FOLDER,
-    help="Folder for analysis.json, growth.csv, aggregates.csv and growth.png.",
+    help="Folder for analysis.json, growth.csv, degrees.csv, aggregates.csv and growth.png.",
 )
-@click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S in which z is fitted.")
+@click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S, mean over boxes, for z and λ(S).")
 @click.option("--guides", is_flag=True, help="Draw the power laws of the paper in growth.png, too.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
 @options.output
@@ -44,8 +44,9 @@ def command(
 ) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 
-    Results are S(t) with its exponent z, moments against size, and the fractal dimension, each with an error from the
-    scatter between boxes. Two DIRs are also compared with each other.
+    Results are S(t) with its exponent z and local degree λ(S) = d ln(dS/dt)/d ln S, moments against size, the fractal
+    dimension, and the temperatures of single grains and of clusters, each with an error from the scatter between boxes;
+    that of z includes the unknown kernel. Two DIRs are also compared with each other.
     """
     from ..experiments.growth_report import NAMES, compare_growth, ensemble_summary, read_ensemble, write_analysis
 
@@ -77,15 +78,18 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
     from ..units import format_quantity
 
     for one in content["ensembles"]:
-        fitted = f", fitted from S = {one['window'][0]:g} until a box has {one['window'][1]:.4g}"
+        fitted = f" for large S; fitted from S = {one['window'][0]:g} to {one['window'][1]:.4g}"
         rows = [
             ("boxes", f"{one['boxes']} of {one['grains']} grains"),
             ("S", f"{one['mean_size']:.3g}{_error(one['mean_size_error'])} at {format_quantity(one['time'], 's')}"),
-            ("z", _law(one, "z", "S = (1 + t/zτ)^", fitted)),
+            ("z", _law(one, "z", "S ∝ t^", fitted)),
+            ("λ", _kernels(one["z"]) if one["z"] else ""),
+            ("λ(S)", _local_degrees(one)),
             ("", _law(one, "slope", "slope of ln S over ln t: ") if one["slope"] else ""),
             ("moments", _law(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
             ("", _law(one, "moment_without_rings", "without rings N^") if one["moment"] else ""),
             ("D_f", _law(one, "dimension", "", " from N(r_g)")),
+            *_temperatures(one["temperatures"]),
         ]
         report.show(one["name"], [row for row in rows if row[1]])
     comparison = content["comparison"]
@@ -100,8 +104,39 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
         report.show("files", [("folder", str(folder))])
 
 
+def _kernels(law: dict[str, Any]) -> str:
+    """Degree λ = 1 − 1/z with its error from the scatter between boxes, and what each kernel gives."""
+    each = ", ".join(f"{degree:.2f} ({name})" for name, degree in law["degrees"].items())
+    return f"1 − 1/z = {law['degree']:.2f}{_error(law['degree_error'])} of the kernel: {each}"
+
+
+def _local_degrees(one: dict[str, Any]) -> str:
+    """λ(S) in each window of S, or why it is unknown."""
+    if one["local_degrees"] is None:
+        return f"unknown: {one['missing']['local_degrees']}"
+    return ", ".join(
+        f"{found['degree']:.2f}{_error(found['error'])} (S {found['low_size']:.3g} to {found['high_size']:.3g})"
+        for found in one["local_degrees"]
+    )
+
+
+def _temperatures(kinds: dict[str, Any]) -> list[tuple[str, str]]:
+    """Temperatures of single grains and of clusters, a line each."""
+    rows = []
+    for kind, name in (("single", "single grains"), ("clusters", "clusters")):
+        found = kinds.get(kind, {})
+        if found.get("rotation") is None:
+            continue
+        translation, rotation, median = (
+            f"{found[key]:.3g}{_error(math.nan if found[f'{key}_error'] is None else found[f'{key}_error'])} K"
+            for key in ("translation", "rotation", "rotation_median")
+        )
+        rows.append((name, f"translation {translation}, rotation {rotation} (median {median})"))
+    return rows
+
+
 def _error(error: float) -> str:
-    return "" if math.isnan(error) else f" ± {error:.2g}"
+    return f" ± {error:.2g}" if math.isfinite(error) else ""
 
 
 def _law(one: dict[str, Any], key: str, before: str, after: str = "") -> str:
@@ -109,7 +144,8 @@ def _law(one: dict[str, Any], key: str, before: str, after: str = "") -> str:
     law = one[key]
     if law is None:
         return f"unknown: {one['missing'][key]}"
-    value = law.get("exponent", law.get("value"))
-    low = law.get("low", math.nan)
-    interval = "" if math.isnan(low) else f" (95 % from {low:.3g} to {law['high']:.3g})"
-    return f"{before}{value:.3g}{_error(law['error'])}{interval}{after}"
+    value, low, high = law.get("exponent", law.get("value")), law.get("low", math.nan), law.get("high", math.nan)
+    ends = f"above {low:.3g}" if math.isinf(high) else f"from {low:.3g} to {high:.3g}"
+    interval = "" if math.isnan(low) else f" (95 % {ends})"
+    error = "" if key == "z" else _error(law["error"])  # the interval of z is not symmetric
+    return f"{before}{value:.3g}{error}{interval}{after}"

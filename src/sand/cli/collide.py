@@ -62,7 +62,7 @@ def collide(job: Any, heading: str, *, workers: int, as_json: bool, quiet: bool,
     several, hidden = len(job.case.impact.seeds) > 1, as_json or quiet
     observers: list[Any] = [] if several or hidden else [Progress(math.inf, math.inf)]
     with (
-        report.progress_bar(1.0, hidden or not several, bar_format="{percentage:3.0f}% {desc}") as bar,
+        report.progress_bar(1.0, hidden or not several, bar_format=report.LAYOUT) as bar,
         running_job(job.folder, workers if several else 1, quiet=hidden, **execution) as (executor, interrupts),
     ):
 
@@ -94,6 +94,8 @@ def _collision(r: dict[str, Any]) -> str:
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
     unfinished = "" if r["quiet"] else " (stopped before it came to rest)"
+    if r["outcome"] == "miss" and r.get("end"):
+        return f"miss{unfinished}: no contact formed; {r['end']}; drift {r['drift']:.1e}"
     return (
         f"{r['outcome']}{unfinished}: {pieces}; {events}; lost {lost:.2g} of the impact energy; drift {r['drift']:.1e}"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -58,13 +59,24 @@ def boxes(
     from .job import running_job
 
     outcomes: dict[int, str] = {}
+    hidden = quiet or as_json
+    with (
+        # elsewhere the lines of the boxes show the progress
+        report.progress_bar(len(seeds), hidden or not sys.stderr.isatty(), bar_format=report.LAYOUT) as bar,
+        running_job(folder, quiet=quiet, **execution) as (executor, interrupts),
+    ):
 
-    def finished(seed: int, outcome: str) -> None:
-        outcomes[seed] = outcome
-        if not (quiet or as_json):
-            report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
+        def finished(seed: int, outcome: str) -> None:
+            outcomes[seed] = outcome
+            if not hidden:
+                report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
+            show()
 
-    with running_job(folder, quiet=quiet, **execution) as (executor, interrupts):
+        def show() -> None:
+            bar.set_description_str(f"{len(outcomes)} of {len(seeds)} boxes", refresh=False)
+            bar.update(len(outcomes) - bar.n)
+
+        show()
         grow(content, seeds, folder, executor, finished, [interrupts])
     text = f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}"
     found = {"folder": str(folder), "seeds": seeds, "outcomes": outcomes}

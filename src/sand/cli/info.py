@@ -13,7 +13,7 @@ import click
 from ..config.commands import command_for
 from ..errors import BadInput
 from ..io import run_folder as files
-from ..io.checkpoint import checkpoint_files
+from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
 from . import options, parsing, report
 from .collide import collision_rows
@@ -163,34 +163,58 @@ def describe_case(path: Path) -> Description:
     steps = math.inf if case.run.steps is None else case.run.steps
     limits = _limits(simulation)
     ends = (end, steps, case.run.stop)
-    cost, costs = _cost(simulation, end, steps)
+    cost, costs = _cost(simulation, *ends)
     content = {"kind": "case", "case": case_of(simulation, *ends), "choices": simulation.choices, "limits": limits}
     rows = report.opening(simulation, *ends, Path(case.run.out or path.stem))
     return "a valid case", [*rows, *costs, *limits.items()], content | {"cost": cost}
 
 
-def _cost(simulation: Any, end: float, last_step: float) -> tuple[dict[str, Any], report.Rows]:
-    """Expected steps, wall time, memory and compilation of a run."""
+def _cost(
+    simulation: Any, end: float, last_step: float, condition: str | None, runs: int = 1, figures: int = 1
+) -> tuple[dict[str, Any], report.Rows]:
+    """Expected cost of a run, or of several like it one after the other, which draw one figure or one each."""
     from ..compiler.jit import COMPILE_TIMES
     from ..compiler.progress import compile_times
     from ..simulation.cost import expected_cost
-    from ..units import format_quantity
 
-    cost, missing = expected_cost(simulation, end, last_step), simulation._engine.uncompiled()
+    cost, missing = expected_cost(simulation, end, last_step, condition), simulation._engine.uncompiled()
+    if cost.seconds is not None:
+        parts = {name: (figures if name == "start" else runs) * value for name, value in cost.parts.items()}
+        cost = cost._replace(parts=parts, seconds=sum(parts.values()))
     known = compile_times(COMPILE_TIMES)
     compilation = sum(known.get(name, COMPILATION) for name in missing)
-    source = f"as in {cost.measured}" if cost.measured else "rough estimate: no such run was measured on this machine"
-    steps = "" if cost.steps is None else f", {cost.steps:.2g} steps"
-    wall = "depends on the condition" if cost.seconds is None else f"about {report.format_wall_time(cost.seconds)}"
     names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
     rows = [
-        ("steps", f"about {format_quantity(cost.step, 's')} each{steps}"),
-        ("wall time", f"{wall} ({source})"),
+        ("steps", _steps(cost)),
+        ("wall time", _wall_time(cost)),
         ("memory", f"about {cost.memory / 1e6:.0f} MB" if cost.memory < 1e9 else f"about {cost.memory / 1e9:.2g} GB"),
         ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
     ]
     content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": missing}
     return content | {"compilation_seconds": compilation}, rows
+
+
+def _steps(cost: Any) -> str:
+    """Expected steps, for people."""
+    from ..units import format_quantity
+
+    each = f"about {format_quantity(float(f'{cost.step:.2g}'), 's')} each"
+    if cost.steps is None:
+        return each
+    number = f"{cost.bound or 'about'} {cost.steps:.2g}"
+    if cost.contact_steps is None:
+        return f"{number}, {each}"
+    return f"{number} of bodies, {each}, and about {cost.contact_steps:.2g} contact steps of awake clusters"
+
+
+def _wall_time(cost: Any) -> str:
+    """Expected wall time and its parts, for people."""
+    if cost.seconds is None:
+        return "depends on the condition"
+    stepping, output, start = (report.format_wall_time(float(f"{v:.2g}")) for v in cost.parts.values())
+    total = report.format_wall_time(float(f"{cost.seconds:.2g}"))
+    source = f"speed {cost.measured}" if cost.measured else "rough estimate: no run was measured on this machine"
+    return f"{cost.bound or 'about'} {total}: steps {stepping}, output {output}, start and figure {start} ({source})"
 
 
 def _limits(simulation: Any) -> dict[str, str]:
@@ -201,31 +225,61 @@ def _limits(simulation: Any) -> dict[str, str]:
 
 
 def _collision_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.collision import INTERVAL, MOST_CHECKS, expected_end
     from ..experiments.collision_case import read_collision
+    from ..units import format_quantity
 
     case = read_collision(path)
+    seeds = case.impact.seeds
     with report.naming(path):
-        simulation = case.check()
+        simulation, start_of_first = case.check(), case.approach(seeds[0])
     bodies = f"{case.projectile.kind} on {case.target.kind}, {len(simulation.grains)} grains"
-    rows = [("bodies", bodies), ("seeds", str(len(case.impact.seeds))), start]
-    return "a valid collision case", rows, {"kind": "collision case", "case": files.read_toml(path)}
+    cost, costs = _cost(simulation, expected_end(start_of_first), math.inf, None, len(seeds))
+    longest = start_of_first.flight + MOST_CHECKS * INTERVAL * start_of_first.check_every
+    note = f"the contacts decide when a collision ends, at {format_quantity(longest, 's')} at the latest"
+    rows = [
+        ("bodies", bodies),
+        ("seeds", str(len(seeds))),
+        *_of_each(costs, len(seeds), "collision"),
+        ("end", note),
+        start,
+    ]
+    content = {"kind": "collision case", "case": files.read_toml(path), "cost": cost}
+    return "a valid collision case", rows, content
+
+
+def _of_each(costs: report.Rows, number: int, name: str) -> report.Rows:
+    """Rows of the cost of several runs: the steps are those of one of them, the wall time that of all by one worker."""
+    if number == 1:
+        return costs
+    texts = dict(costs)
+    texts["steps"] += f", in each {name}"
+    texts["wall time"] += f"; all {number} by one worker"
+    return list(texts.items())
 
 
 def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     from ..config.build import simulation_of
     from ..config.case import check_case
     from ..experiments.growth_case import read_growth
+    from .grow import DEFAULT_SEEDS
 
-    content, seeds = read_growth(path)
+    content, given = read_growth(path)
+    seeds = given or DEFAULT_SEEDS
+    case = check_case(content, "")
     with report.naming(path):
-        simulation = simulation_of(check_case(content, ""), None)
-    limits = _limits(simulation)
-    rows = [("boxes", f"{len(seeds or [])} of {len(simulation.grains)} grains"), *limits.items(), start]
-    return "a valid growth case", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}, "limits": limits}
+        simulation = simulation_of(case, None)
+    limits, ends = _limits(simulation), (case.run.until or math.inf, case.run.steps or math.inf)
+    cost, costs = _cost(simulation, *ends, None, len(seeds), len(seeds))
+    boxes = ("boxes", f"{len(seeds)} of {len(simulation.grains)} grains")
+    rows = [boxes, *_of_each(costs, len(seeds), "box"), *limits.items(), start]
+    content = {"kind": "growth case", "case": {**content, "seeds": given}, "limits": limits, "cost": cost}
+    return "a valid growth case", rows, content
 
 
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
     from ..experiments.scattering.case import read_scattering
+    from ..experiments.scattering.cost import expected_flights
     from ..units import format_quantity
 
     case, flights = read_scattering(path)
@@ -233,7 +287,15 @@ def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
     for flight in flights:
         capture = f", b_max = {format_quantity(flight.scales.capture, 'm')}" if flight.scales.capture else ""
         rows.append((f"{flight.speed:.4g} m/s", f"from {format_quantity(flight.distance, 'm')}{capture}"))
-    return "a valid scattering case", [*rows, start], {"kind": "scattering case", "case": files.read_toml(path)}
+    number, seconds, source = expected_flights(case, flights)
+    took = report.format_wall_time(float(f"{seconds:.2g}"))
+    rows += [("flights", f"about {number:.2g}"), ("wall time", f"about {took} by one worker ({source})"), start]
+    content = {
+        "kind": "scattering case",
+        "case": files.read_toml(path),
+        "cost": {"flights": number, "seconds": seconds},
+    }
+    return "a valid scattering case", rows, content
 
 
 def describe_trajectory(path: Path) -> Description:

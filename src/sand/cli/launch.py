@@ -11,7 +11,7 @@ from typing import Any
 from ..config.case import with_absolute_files
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
-from ..io.checkpoint import checkpoint_files
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..simulation.outcome import Outcome, Result

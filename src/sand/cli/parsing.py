@@ -9,8 +9,23 @@ import click
 
 from ..errors import BadInput
 
-Check = Callable[[Mapping[str, Any]], Iterable[str]]
-"""Errors, one line each, of the values of all options by name; None stands for a value that could not be read."""
+
+class OptionValues(dict[str, Any]):
+    """Values of the parameters of a command by name; None stands for one that was not given or could not be read.
+
+    Attributes
+    ----------
+    given : set of str
+        Names of the parameters on the command line, those that could not be read included.
+    """
+
+    def __init__(self, values: Mapping[str, Any], given: set[str]):
+        super().__init__(values)
+        self.given = given
+
+
+Check = Callable[[OptionValues], Iterable[str]]
+"""Errors of values, one line each."""
 
 
 class WrongOptions(click.UsageError):
@@ -64,7 +79,8 @@ class Command(click.Command):
             raise WrongOptions([*usage, *values] or [_text(error)], ctx) from None
         if swallowed := self._swallowed(ctx.params):
             raise WrongOptions(list(swallowed.values()), ctx)
-        if problems := list(self._check(ctx.params)):
+        given = {name for name, value in ctx.params.items() if value is not None}
+        if problems := list(self._check(OptionValues(ctx.params, given))):
             raise BadInput(problems)
         return rest
 
@@ -96,7 +112,8 @@ class Command(click.Command):
                 usage.append(_text(error))
         given = {str(param.name): probe.params.get(str(param.name)) for param in self.params if param.name in found}
         read = {name: value for name, value in given.items() if isinstance(value, (str, int, float, list, tuple))}
-        return usage, [*values, *self._check({str(param.name): None for param in self.params} | read)]
+        known = {str(param.name): None for param in self.params} | read
+        return usage, [*values, *self._check(OptionValues(known, set(given)))]
 
     def _errors_of_form(
         self, ctx: click.Context, words: list[str]

@@ -69,18 +69,19 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     """Errors of the values of options."""
     if all(values[name] is None for name in ("what", "colour", "bonds", "view", "size")):
         return
-    from ..analysis.quantities import GRAIN_NAMES
+    from ..analysis.quantities import names_of
     from ..plotting.plots import HISTORY
     from ..plotting.render.still import check_picture_options
 
-    allowed, names = (*HISTORY, STILL, *GRAIN_NAMES), values["what"] or []
+    one = None if values["source"] is None else _first_frame(Path(values["source"]))
+    allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
     yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
     if values["cluster"] is not None and (others := [name for name in names if name != STILL]):
         yield f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
     size = DEFAULT_SIZE if values["size"] is None else values["size"]
     shown = values["colour"] or "cluster", _bonds(values["bonds"]), values["view"] or "iso"
     try:
-        check_picture_options(*shown, size.pixels(values["dpi"] or DPI))
+        check_picture_options(*shown, size.pixels(values["dpi"] or DPI), values["dpi"] or DPI, one)
     except BadInput as error:
         yield from error.problems
 
@@ -145,10 +146,11 @@ def command(
 ) -> None:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
-    WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
-    a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with the
-    moment of their cluster), field_alignment, material, at_rest (with rigid clusters). As a colour of grains, size is
-    the number of grains in their cluster.
+    WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
+    QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
+    alignment (of moments with the moment of their cluster), field_alignment, material, at_rest (with rigid clusters),
+    or an own quantity of the run, such as temperature. As a colour of grains, size is the number of grains in their
+    cluster.
     """
     from ..io.run_folder import make_folder, replace_file
 
@@ -200,6 +202,15 @@ def _open_source(path: Path) -> Source:
     if not frames.written_by_sand:
         raise BadInput(f"{path} is not a trajectory of SAND, or has no frame")
     return Source(path, frames, None)
+
+
+def _first_frame(path: Path) -> Any:
+    """The first frame, for the names of own quantities; None if it cannot be read, which is reported later."""
+    try:
+        frames = _open_source(path).frames
+        return frames[0] if len(frames) else None
+    except BadInput:
+        return None
 
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:

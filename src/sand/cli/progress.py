@@ -8,10 +8,8 @@ from typing import Any
 
 from ..simulation.observers import Observer
 from ..units import format_quantity
-from .report import progress_bar
+from .report import LAYOUT, progress_bar
 
-FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
-"""Layout of the bar, at most 80 columns."""
 NUMBERS_EVERY = 1.0
 """Wall time [s] between two readings of clusters, S and drift."""
 WITHOUT_END = "{desc} [{elapsed}{postfix}]"
@@ -55,7 +53,7 @@ class Progress(Observer):
         if self._bar is None:
             self._read_row(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
             known = math.isfinite(total)
-            layout = FORMAT if known else WITHOUT_END
+            layout = LAYOUT if known else WITHOUT_END
             self._bar = progress_bar(total if known else None, False, initial=position, bar_format=layout)
         bar = self._bar
         bar.set_description_str(format_quantity(simulation.time, "s"), refresh=False)

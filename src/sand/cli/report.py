@@ -10,7 +10,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,8 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput, FilesFailed
-from ..io.checkpoint import checkpoint_files
+from ..io.checkpoint_files import checkpoint_files
+from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml
 
 Rows = list[tuple[str, str]]
@@ -38,7 +39,9 @@ def clean(text: str) -> str:
 
 def write_line(text: str, *, err: bool = False) -> None:
     """Print one line for people; everything printed to the terminal passes through here or through `clean`."""
-    click.echo(clean(text), err=err)
+    shows_progress = sys.modules.get("sand.cli.progress_line")  # not imported for this
+    with shows_progress.line_removed() if shows_progress else nullcontext():
+        click.echo(clean(text), err=err)
 
 
 def note(text: str) -> None:
@@ -157,6 +160,8 @@ def listed(folder: Path) -> str:
     return f"{folder}/  " + "  ".join(files_of(folder))
 
 
+LAYOUT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
+"""Layout of a line of progress whose end is known."""
 LINE_EVERY, LINE_PART, LINE_AT_LEAST = 30.0, 0.05, 1.0
 """Where there is no terminal: a line after this wall time [s], or this part of the work but not before the last [s]."""
 
@@ -226,14 +231,12 @@ class ProgressLines:
 
 
 def progress_bar(total: float | None, hidden: bool, **layout: Any) -> Any:
-    """Progress bar of tqdm on a terminal, otherwise `ProgressLines`."""
+    """One line of progress on a terminal, otherwise `ProgressLines`."""
     if not (hidden or sys.stderr.isatty()):
         return ProgressLines(total, layout.get("initial", 0.0), layout.get("desc", ""))
-    from tqdm import tqdm
+    from .progress_line import progress_line
 
-    tqdm.monitor_interval = 0  # no monitor thread: updates are frequent enough
-    settings = {"dynamic_ncols": True, "miniters": 0, "delay": 0.2, "leave": False}
-    return tqdm(total=total, disable=hidden or None, **settings, **layout)
+    return progress_line(total, disable=hidden, **layout)
 
 
 def opening(simulation: Any, end: float, last_step: float, condition: str | None, folder: Path) -> Rows:
@@ -246,12 +249,13 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
     condition : str or None
         Condition that ends the run.
     """
-    from ..simulation.cadence import read_cadence
+    from ..simulation.cadence import chosen_cadence, read_cadence
     from ..units import format_quantity
 
     every = simulation.frame_every
-    if every is None:  # the default of `run`
-        every = (end - simulation.time) / 200.0
+    if every is None:
+        chosen = chosen_cadence(simulation.time, end, simulation._chosen)
+        every = math.inf if chosen is None else chosen.every
     if isinstance(every, str):
         frames = f"frames {read_cadence(every, 'frame_every')}"
     else:
@@ -308,11 +312,7 @@ def results(summary: dict[str, Any]) -> Rows:
     """The most important numbers of summary.json."""
     from ..units import format_quantity
 
-    rate = summary["ns_per_grain_step"]
-    wall = format_wall_time(summary["wall_seconds"])
     rigid = summary.get("rigid_clusters")
-    if rigid:  # steps of bodies have no cost of their own
-        rate = None
     awake: Rows = [("awake", awake_share(rigid))] if rigid else []
     return [
         ("time", f"{format_quantity(summary['time'], 's')} in {summary['steps']} steps"),
@@ -323,9 +323,28 @@ def results(summary: dict[str, Any]) -> Rows:
             f"{summary['contacts']} ({summary['contacts_made']} made, {summary['contacts_moved']} moved, "
             f"{summary['contacts_broken']} broken)",
         ),
+        *temperatures(summary),
         ("energy drift", f"{summary['drift']:.2g} of the dissipated and kinetic energy"),
-        ("wall time", wall if rate is None else f"{wall}, {rate:.3g} ns per grain and step"),
+        ("wall time", wall_time(summary)),
     ]
+
+
+def wall_time(summary: dict[str, Any]) -> str:
+    """Wall time of a run and its parts, and the speed of its steps; older summaries lack the parts."""
+    total, rate = format_wall_time(summary["wall_seconds"]), summary["ns_per_grain_step"]
+    # steps of bodies have no cost of their own
+    speed = "" if rate is None or "rigid_clusters" in summary else f"{rate:.3g} ns per grain and step"
+    if "wall_stepping" not in summary:
+        return f"{total}, {speed}" if speed else total
+    steps = f"steps {format_wall_time(summary['wall_stepping'])}" + (f" ({speed})" if speed else "")
+    names = {"output": "output", "compilation": "compiled code", "start": "start", "other": "other"}
+    parts = {name: summary[f"wall_{part}"] for part, name in names.items()}
+    shown = [
+        f"{name} {format_wall_time(seconds)}"
+        for name, seconds in parts.items()
+        if seconds >= 0.01 * summary["wall_seconds"]
+    ]
+    return f"{total}: " + ", ".join([steps, *shown])
 
 
 def awake_share(rigid: dict[str, Any]) -> str:
@@ -341,6 +360,15 @@ def clusters(row: dict[str, Any]) -> str:
     return (
         f"{int(row['clusters'])}, mean size S = {row['mean_cluster_size']:.4g}, largest {int(row['largest_cluster'])}"
     )
+
+
+def temperatures(row: dict[str, Any]) -> Rows:
+    """Temperatures of the bodies at one time, from a summary or a row of the ledger; none from older ones."""
+    found = [row.get(name) for name in TEMPERATURES]
+    if row["clusters"] < 2 or None in found:
+        return []
+    translation, rotation, median = (f"{value:.3g} K" for value in found)
+    return [("bodies", f"translation {translation}, rotation {rotation} (median {median})")]
 
 
 def format_wall_time(seconds: float) -> str:

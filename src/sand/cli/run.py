@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,11 @@ from ..threads import set_threads
 from . import options, parsing, report
 
 
-def _check(values: Mapping[str, Any]) -> Iterator[str]:
+def _check(values: parsing.OptionValues) -> Iterator[str]:
     """Errors of options that need others."""
-    if values["source"] is None and values["frame"] is not None:
+    if "source" not in values.given and values["frame"] is not None:
         yield "--frame selects the frame of --from FILE to start with; give --from, too"
-    if values["source"] is None and values["case"] is None:
+    if not {"source", "case"} & values.given:
         yield "give a case file: sand run CASE.toml; or an earlier run: sand run --from DIR"
 
 

@@ -82,7 +82,7 @@ def scatter(
 
     hidden = quiet or as_json
     with (
-        report.progress_bar(1.0, hidden, bar_format="{percentage:3.0f}% {desc}") as bar,
+        report.progress_bar(1.0, hidden, bar_format=report.LAYOUT) as bar,
         running_job(folder, quiet=quiet, **execution) as (executor, _),
     ):
 
@@ -104,14 +104,17 @@ def result_rows(content: dict[str, Any]) -> report.Rows:
         return [row for one in content["cross_sections"] for row in _cross_section(one)]
     if "cells" in content:
         hits, flights = (sum(cell[k] for cell in content["cells"]) for k in ("hits", "flights"))
-        return [("cells", f"{len(content['cells'])}, {flights} flights, {hits} hits")]
+        return [("cells", f"{len(content['cells'])}, {flights} flights, {hits} hits{_drift(content)}")]
+    from ..experiments.scattering.flights import LARGEST_DRIFT
+
     unit = content["b_max"]
     return [
         (
             f"set-up {one['setup']}, b = {one['impact_parameter'] / unit:.4g} b_max" if unit else "flight",
             one["end"]
             + (f"; the target has {one['exchanged']:.1%} of the energy" if one["end"] != "hit" else "")
-            + f"; drift {one['drift']:.0e}",
+            + f"; drift {one['drift']:.0e}"
+            + (f", above {LARGEST_DRIFT:g}: lower the tolerance" if one["drift"] > LARGEST_DRIFT else ""),
         )
         for one in content["trajectories"]
     ]
@@ -123,4 +126,12 @@ def _cross_section(one: dict[str, Any]) -> report.Rows:
         text += f", c = {one['c']:.3f} +- {one['c_error']:.3f}"
     rate = one["flights"] / max(one["seconds"], 1e-9)
     lost = "".join(f", {one[k]} {k}" for k in ("bound", "failed") if one[k])
-    return [(f"{one['speed']:.4g} m/s", f"{text} ({one['flights']} flights{lost}, {rate:.0f}/s)")]
+    return [(f"{one['speed']:.4g} m/s", f"{text} ({one['flights']} flights{lost}, {rate:.0f}/s{_drift(one)})")]
+
+
+def _drift(one: dict[str, Any]) -> str:
+    """The largest energy error, and how many flights exceed its limit."""
+    from ..experiments.scattering.flights import LARGEST_DRIFT
+
+    above = f", {one['inaccurate']} above {LARGEST_DRIFT:g}" if one["inaccurate"] else ""
+    return f"; drift up to {one['drift']:.0e}{above}"

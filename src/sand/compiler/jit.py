@@ -24,7 +24,7 @@ from numba.core import event
 from numba.extending import register_jitable
 
 from .cache import private_folder
-from .progress import CompilationListener, acquire_lock
+from .progress import CompilationListener, acquire_lock, making_code
 
 __all__ = ["COMPILED", "COMPILE_TIMES", "cache_folder", "caller", "compile_error", "formula", "in_cache", "kernel"]
 __all__ += ["loop", "rare", "separate"]
@@ -183,7 +183,8 @@ def _share_cache(compiled: Any) -> None:
 
     def compile_with_lock(signature: Any) -> Any:
         try:
-            return compile_or_load(signature)
+            with making_code:
+                return compile_or_load(signature)
         finally:
             while held:
                 held.pop().release()

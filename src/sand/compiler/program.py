@@ -26,7 +26,7 @@ _NATIVE = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 4, ctypes.c_int6
 
 
 def _first_call(
-    stage: Stage, parameters: Any, table: weakref.ref[Table], entry: np.ndarray, failures: list[BaseException]
+    stage: Stage, parameters: Any, tables: list[weakref.ref[Table]], entry: np.ndarray, failures: list[BaseException]
 ) -> Any:
     """A function in place of a compiled stage, which compiles it, or loads it from the disk, and calls it."""
 
@@ -35,7 +35,7 @@ def _first_call(
         try:
             for check in before_first_calls:
                 check()
-            address = stage.address(table(), parameters)  # type: ignore[arg-type]
+            address = stage.address(tables[0](), parameters)  # type: ignore[arg-type]
             status = int(_NATIVE(address)(*arguments))
             entry[0] = address
         except BaseException as error:  # Ctrl-C, an error in a formula: passed on by `Program.run`
@@ -47,13 +47,15 @@ def _first_call(
     return compile_and_call
 
 
-def _python_call(stage: PythonStage, parameters: Any, table: weakref.ref[Table], failures: list[BaseException]) -> Any:
-    """A function in place of a compiled stage, which calls a Python function."""
+def _python_call(
+    stage: PythonStage, parameters: Any, tables: list[weakref.ref[Table]], failures: list[BaseException]
+) -> Any:
+    """A function in place of a compiled stage, which calls a Python function with the parts of the present table."""
 
     @_NATIVE
     def call(result: int, _exception: Any, _table: Any, _parameters: Any, block: int) -> int:
         try:
-            ctypes.c_int64.from_address(result).value = stage.in_python(table(), parameters, block)  # type: ignore[arg-type]
+            ctypes.c_int64.from_address(result).value = stage.in_python(tables[0](), parameters, block)  # type: ignore[arg-type]
         except BaseException as error:  # passed on by `Program.run`
             failures.append(error)
             return FAILED
@@ -89,13 +91,14 @@ class Program:
     def __init__(self, table: Table, stages: Mapping[int, tuple[Stage | PythonStage, Any]], size: int):
         self.stages, self.entries, self._failures = dict(stages), np.zeros((size, 3), np.int64), list[BaseException]()
         self._rows, self._calls = list[np.ndarray](), list[Any]()
+        self._tables = [weakref.ref(table)]  # the table of the present call
         if COMPILED:
             for number, (stage, parameters) in self.stages.items():
                 entry, row = self.entries[number], np.array([*words_of(parameters), 0], np.int64)
                 if isinstance(stage, PythonStage):
-                    call = _python_call(stage, parameters, weakref.ref(table), self._failures)
+                    call = _python_call(stage, parameters, self._tables, self._failures)
                 else:
-                    call = _first_call(stage, parameters, weakref.ref(table), entry, self._failures)
+                    call = _first_call(stage, parameters, self._tables, entry, self._failures)
                 ready = READY if isinstance(stage, PythonStage) else NOT_READY
                 entry[:] = ctypes.cast(call, ctypes.c_void_p).value, row.ctypes.data, ready
                 self._rows.append(row)
@@ -104,6 +107,7 @@ class Program:
     def run(self, stage: Stage, table: Table) -> int:
         """Call a stage that calls the stages of this program.  Raises what the compilation of one of them raised."""
         self._failures.clear()
+        self._tables[0] = weakref.ref(table)
         try:
             return stage.run(table)
         except SystemError as error:

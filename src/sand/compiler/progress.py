@@ -15,7 +15,7 @@ from numba.core import event
 from .cache import read_record, write_record
 
 __all__ = ["CompilationListener", "acquire_lock", "announce", "compilation_notes", "compilation_seconds"]
-__all__ += ["compile_times", "describe", "suppress_notes"]
+__all__ += ["compile_times", "describe", "making_code", "suppress_notes"]
 
 LONGEST_WAIT = 300.0
 """Wall time [s] to wait for a process that compiles the same code."""
@@ -84,13 +84,30 @@ def acquire_lock(path: Path, what: str) -> BaseFileLock | None:
     return lock
 
 
-_spent = [0.0]
-"""Wall time [s] of all compilations in this process."""
+class _Spent:
+    """Wall time of all compilations in this process, and of loading compiled code; nested ones count once."""
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._began = 0.0, 0, 0.0
+
+    def __enter__(self) -> None:
+        if not self._depth:
+            self._began = time.perf_counter()
+        self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += time.perf_counter() - self._began
+
+
+making_code = _Spent()
+"""Measures blocks in which machine code is made, or loaded from the disk."""
 
 
 def compilation_seconds() -> float:
-    """Wall time [s] that this process has spent on compilation."""
-    return _spent[0]
+    """Wall time [s] that this process has spent on compilation and on loading compiled code."""
+    return making_code.seconds
 
 
 def compile_times(record: Path) -> dict[str, float]:
@@ -135,7 +152,6 @@ class CompilationListener(event.Listener):
         self._depth -= 1
         if self._current and self._depth == 0:
             seconds = time.perf_counter() - self._began
-            _spent[0] += seconds
             durations = self._durations() | {self._current: round(seconds, 3)}
             self._current = ""
             if sys.exc_info()[0] is not None:  # numba's `event.is_failed` is true for every compilation

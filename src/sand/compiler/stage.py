@@ -27,6 +27,7 @@ from numba.extending import lower_builtin, type_callable
 from .jit import COMPILED, caller, in_cache, kernel, loop, rare, separate
 from .native_calls import call_from_python
 from .processor import FAST_512_BIT, SLOW_GATHER, target
+from .progress import making_code
 from .table import (
     ANY_TABLE,
     BLOCK,
@@ -125,7 +126,8 @@ class Stage:
         key = self._key(table, parameters)
         if key not in self._compiled:
             dispatcher, signature = self._to_compile(table, parameters)
-            dispatcher.compile(signature)
+            with making_code:  # also of uncached code
+                dispatcher.compile(signature)
             found = dispatcher.overloads[signature.args]
             self._compiled[key] = found, _machine_code(found).get_pointer_to_function(found.fndesc.llvm_func_name)
         return int(self._compiled[key][1])

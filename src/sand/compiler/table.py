@@ -152,11 +152,32 @@ def words_of(value: Any) -> list[int]:
         return [address_of(value), *value.shape]
     if isinstance(value, tuple):
         if isinstance(kind_of(structure_of(value)), Group):
-            return [*map(address_of, value), *(length for each in value for length in each.shape)]
+            return _group_words(value)
         return [word for each in value for word in words_of(each)]
     if isinstance(value, (bool, np.bool_, int, np.integer)):
         return [int(value)]
     return [int(np.float64(value).view(np.int64))]
+
+
+def _group_words(value: tuple[np.ndarray, ...]) -> list[int]:
+    """The words of a tuple of arrays."""
+    return [*map(address_of, value), *(length for each in value for length in each.shape)]
+
+
+def _is_group_like(value: Any, before: Any) -> bool:
+    """Whether two values are tuples of arrays of the same types."""
+    return (
+        isinstance(value, tuple)
+        and hasattr(value, "_fields")
+        and type(value) is type(before)
+        and all(
+            isinstance(one, np.ndarray)
+            and isinstance(other, np.ndarray)
+            and one.dtype is other.dtype
+            and one.ndim == other.ndim
+            for one, other in zip(value, before, strict=True)
+        )
+    )
 
 
 def address_of(array: np.ndarray) -> int:
@@ -197,14 +218,17 @@ class Table:
         if type(value) in NUMBERS and type(before) is type(value) and value == before != 0:
             return
         self._parts[name] = value
-        if COMPILED and value is not None:
+        if COMPILED and _is_group_like(value, before):  # the same types: only addresses and lengths are new
+            self._rows[name] = np.array(_group_words(value), np.int64)
+            self._addresses[self._names[name]] = address_of(self._rows[name])
+        elif COMPILED and value is not None:
             self._rows[name] = np.array(words_of(value), np.int64)
             if type(value) is not type(before) or type(value) not in NUMBERS:
                 self._structures[name] = structure_of(value)
                 key = _number_of(self.place(name))
                 if self._keys.get(name) != key:
                     self._keys[name] = key
-                    self.stages.clear()
+                    self.stages = {}
             self._addresses[self.index(name)] = address_of(self._rows[name])
 
     def snapshot(self) -> Table:
@@ -214,6 +238,12 @@ class Table:
         other._structures, other._keys = dict(self._structures), dict(self._keys)
         other._addresses[:] = self._addresses
         return other
+
+    def follow(self, other: Table) -> None:
+        """Take all parts of another table, whose arrays and addresses of stages are then the same."""
+        self._parts, self._rows = dict(other._parts), dict(other._rows)
+        self._structures, self._keys = dict(other._structures), dict(other._keys)
+        self._addresses[:], self.stages = other._addresses, other.stages
 
     def __getitem__(self, name: str) -> Any:
         return self._parts[name]

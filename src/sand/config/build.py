@@ -13,7 +13,8 @@ from ..box import Box, as_box
 from ..errors import BadInput
 from ..forces.own import import_modules
 from ..grains import Grains
-from ..io.checkpoint import checkpoint_files, newest_checkpoint
+from ..io.checkpoint import newest_checkpoint
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..setup.from_file import TEXT_SUFFIXES, body_from_file, from_trajectory
@@ -214,7 +215,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     library = case.materials_by_name()
     try:
         index = arrays["grains/material"]
-        grains = grains_from_arrays(arrays, [library[names[i]] for i in index])
+        grains = grains_from_arrays(arrays, [library[names[i]] for i in index], meta.get("own", {}))
     except (KeyError, IndexError) as error:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
     if (grains.arrays.material != index).any():

@@ -59,7 +59,7 @@ class RunSection(Section):
     step. "wall > 23 h" stops the run after this wall time, to be continued. See `Simulation.run`."""
     frame_every: Cadence | None = None
     """Frames: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default 1/200
-    of `until`."""
+    of the run."""
     row_every: Cadence | None = None
     """Further rows of the ledger, in the same forms; every frame has a row."""
     checkpoint_every: SaveCadence | None = None
@@ -109,6 +109,7 @@ class MaterialSection(Section):
     specific_moment: Any = None
     anisotropy: Any = None
     exchange_stiffness: Any = None
+    anisotropy_kind: str | None = None
 
     def build(self, name: str) -> Material:
         """Build the material.  Raises BadInput for missing or impossible numbers."""

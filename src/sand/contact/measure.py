@@ -91,8 +91,9 @@ def contacts_stage(law: ContactLaw) -> Stage:
     normal_force, normal_energy = law.force, law.energy
 
     @stage("the table of contacts")
-    def measure_contacts(grains, contacts, count, span, follow, out):
-        """Fill `out` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
+    def measure_contacts(grains, contacts, count, span, settings, parameters):
+        """Fill `parameters[0]` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
+        out, follow = parameters[0], settings.follow
         for c in range(count[CONTACTS]):
             i, j = contacts.pair[0, c], contacts.pair[1, c]
             r1, r2 = grains.radius[i], grains.radius[j]

@@ -27,11 +27,16 @@ from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
 from ..units import seed_given, si
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
+from .parting import cannot_touch
 
 QUIET = 3
 """Number of consecutive intervals without contacts formed, slipped or broken that end a collision."""
 MOST_CHECKS = 400
 """Largest number of intervals."""
+INTERVAL = 10.0
+"""Length of an interval, in units of `Approach.check_every`."""
+USUAL_CHECKS = 60
+"""Intervals that two aggregates of silica take to come to rest (`examples/collision.toml`: 75 to 130)."""
 
 
 @checked
@@ -156,18 +161,28 @@ def run_to_end(start: Approach, simulation: Simulation) -> Collision:
     record = simulation.writer
     if record is not None:
         record.draws = False  # the figure is drawn once at the end, not after each interval
-    quiet = _until_quiet(simulation, start)
-    found = classify_collision(simulation, start, before, quiet)
+    end = _until_quiet(simulation, start)
+    found = classify_collision(simulation, start, before, end)
     simulation.title = collision_title([asdict(found)], start.bodies())
     if record is not None:
         record.draw(simulation)
     return found
 
 
-def _until_quiet(simulation: Simulation, start: Approach) -> bool:
-    """Run until contacts neither form, slip nor break for `QUIET` intervals; False after `MOST_CHECKS` intervals.
+def expected_end(start: Approach) -> float:
+    """Time [s] at which a collision with contacts usually ends; it takes `MOST_CHECKS` intervals at most."""
+    return start.flight + USUAL_CHECKS * INTERVAL * start.check_every
+
+
+def _until_quiet(simulation: Simulation, start: Approach) -> str:
+    """Run until contacts neither form, slip nor break for `QUIET` intervals, or bodies that miss cannot touch any more.
 
     Checks made before an interruption are repeated with the ledger: each uses the row of its time.
+
+    Returns
+    -------
+    str
+        Why it ended; "" after `MOST_CHECKS` intervals.
     """
     across = float(np.ptp(start.grains.position, axis=0).max())
     until, unchanged, last = start.flight, 0, (-1, -1, -1)
@@ -178,16 +193,21 @@ def _until_quiet(simulation: Simulation, start: Approach) -> bool:
             if result.outcome.is_physics:
                 raise BadInput(f"the collision cannot be computed: {result}")
             row = simulation.ledger.rows[-1]
-        until = row["time"] + 10.0 * start.check_every
+        until = row["time"] + INTERVAL * start.check_every
+        now = (int(row["made"]), int(row["moved"]), int(row["broken"]))
+        # had it been so at an earlier row, the collision would have ended there
+        if not any(now) and row["time"] >= simulation.time:
+            parted = cannot_touch(simulation, len(start.target))
+            if parted:
+                return parted
         if check == 0:
             continue
-        now = (int(row["made"]), int(row["moved"]), int(row["broken"]))
         unchanged = unchanged + 1 if now == last else 0
         last = now
         contact = now[0] > 0 or row["time"] > start.flight + across / start.speed
         if contact and unchanged >= QUIET:
-            return True
-    return False
+            return "contacts no longer change"
+    return ""
 
 
 @checked

@@ -11,7 +11,7 @@ from typing import Any
 from ..compiler.progress import announce
 from ..config.case import with_absolute_files
 from ..errors import BadInput
-from ..io.checkpoint import checkpoint_files
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import (
     CASE,

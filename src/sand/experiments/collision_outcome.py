@@ -101,6 +101,8 @@ class Collision:
         Relative energy error of the ledger.
     quiet : bool
         False if the simulation was stopped while contacts still changed.
+    end : str
+        Why the simulation ended: contacts no longer change, or bodies that miss each other cannot touch any more.
     """
 
     outcome: str
@@ -123,6 +125,7 @@ class Collision:
     steps: int = 0
     drift: float = 0.0
     quiet: bool = True
+    end: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Dictionary for JSON."""
@@ -148,7 +151,7 @@ def collision_title(results: Sequence[dict[str, Any]], bodies: str) -> str:
     return text.replace(" um", " µm")
 
 
-def classify_collision(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
+def classify_collision(simulation: Simulation, start: Approach, before: int, end: str) -> Collision:
     """Classify the outcome of a collision and measure the final bodies.
 
     Parameters
@@ -159,8 +162,8 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
         Initial state.
     before : int
         Initial number of contacts.
-    quiet : bool
-        False if the simulation was stopped while contacts still changed.
+    end : str
+        Why the simulation ended; "" if it was stopped while contacts still changed.
     """
     target, projectile, speed = start.target, start.projectile, start.speed
     grains, row = simulation.grains, simulation.ledger.rows[-1]
@@ -193,7 +196,8 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
         time=simulation.time,
         steps=simulation.steps,
         drift=simulation.ledger.drift,
-        quiet=quiet,
+        quiet=bool(end),
+        end=end or "stopped while contacts still changed",
     )
 
 

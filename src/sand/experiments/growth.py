@@ -8,28 +8,42 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.fits import PowerLawFit, RateLaw, mean_interval, power_law, rate_law
+from ..analysis.body_motion import BodyMotion, BodyTemperatures, body_motion, body_temperatures
+from ..analysis.fits import PowerLawFit, mean_interval, power_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
+from ..analysis.growth_law import LocalDegree, RateLaw, local_degrees, rate_law
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..results import Run
 from .growth_boxes import grow, run_box, shared_settings
 
-__all__ = ["BoxResult", "GrowthResult", "boxes_in", "grow", "growth_of", "read_box", "run_box", "shared_settings"]
+__all__ = [
+    "BoxResult",
+    "GrowthResult",
+    "Temperatures",
+    "boxes_in",
+    "grow",
+    "growth_of",
+    "read_box",
+    "run_box",
+    "shared_settings",
+]
 
 LOOKS = 10
 """Number of frames of each box in which aggregates are measured, evenly over the run, including the last."""
 FIRST_SIZE = 2.0
 """Smallest S of the fit; below it most grains have not collided."""
 LARGEST_PART = 0.1
-"""Largest S of the fit as a fraction of all grains; beyond it collision partners are depleted.
-
-With 0.15 the 95 % interval of z contained z = 1 of a constant kernel in only 87 % of ensembles of eight boxes of 125
-grains, with 0.1 in 91 % (tests/reference/fit_coverage.py).
-"""
+"""Largest S of the fit as a fraction of all grains; beyond it few clusters are left in a box."""
 LEAST = 3
 """Smallest number of grains of an aggregate in the fit of moments."""
+KINDS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "all": lambda grains: grains > 0,
+    "single": lambda grains: grains == 1,
+    "clusters": lambda grains: grains > 1,
+}
+"""Kinds of bodies, by their numbers of grains."""
 
 
 class BoxResult(NamedTuple):
@@ -43,6 +57,7 @@ class BoxResult(NamedTuple):
     moment: float  # mean magnitude of the non-zero moments of the grains [A m²]; 0 if there are none
     aggregates: dict[str, np.ndarray]  # columns of `aggregate_statistics` of all frames read, and `time` [s]
     case: dict[str, Any]  # settings that boxes of an ensemble share
+    bodies: tuple[tuple[float, BodyMotion], ...] = ()  # time [s] and motion of all bodies of all frames read
 
 
 def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResult:
@@ -68,10 +83,12 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         raise BadInput(f"{folder} contains a run without frames or ledger")
     numbers = np.unique(np.linspace(0, len(frames) - 1, looks + 1).round().astype(int)[1:])
     found: list[dict[str, np.ndarray]] = []
+    bodies = []
     for number in numbers:
         frame = frames[int(number)]
         rows = aggregate_statistics(frame, least)
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
+        bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
     first = frames[0]
     frames.close()
     moments = np.linalg.norm(first.moment, axis=1)
@@ -84,6 +101,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         float(moments[moments > 0.0].mean()) if moments.any() else 0.0,
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
         shared_settings(run.case),
+        tuple(bodies),
     )
 
 
@@ -104,18 +122,32 @@ def boxes_in(folder: str | Path) -> list[Path]:
     return sorted(found, key=lambda one: (len(one.name), one.name))
 
 
+class Temperatures(NamedTuple):
+    """Temperatures [K] of the bodies of an ensemble: of all of them, and of some.
+
+    Single grains and clusters apart. `value` is the mean over boxes of the temperatures of the bodies of a box, those
+    of all frames read; `error` the standard error of this mean, NaN for a single box. NaN if no box has such a body.
+    """
+
+    value: BodyTemperatures
+    error: BodyTemperatures
+    bodies: float  # mean number of such bodies in a frame
+
+
 class GrowthResult(NamedTuple):
     """Growth laws of an ensemble; a law that cannot be fitted is None, with the reason in `missing`."""
 
     time: np.ndarray  # (K,) [s], common to all boxes
     sizes: np.ndarray  # S(t), (boxes, K)
     window: tuple[float, float]  # range of S of the fit of z
-    z: RateLaw | None  # dS/dt ∝ S^λ, S = (1 + t/zτ)^z
+    z: RateLaw | None  # degree λ of the kernel, z = 1/(1 − λ)
+    local_degrees: list[LocalDegree] | None  # λ(S) = d ln(dS/dt)/d ln S
     slope: PowerLawFit | None  # fit S ∝ t^slope
     moment: PowerLawFit | None  # μ/μ1 = N^γ
     moment_without_rings: PowerLawFit | None  # fit of μ for aggregates without rings
     dimension: Dimension | None  # N = k (r_g/a)^D
     missing: dict[str, str]
+    temperatures: dict[str, Temperatures]  # of "all" bodies, "single" grains and "clusters"; empty if unknown
 
     @property
     def mean(self) -> np.ndarray:
@@ -130,21 +162,26 @@ class GrowthResult(NamedTuple):
         return self.sizes.std(axis=0, ddof=1) / np.sqrt(len(self.sizes))
 
     @property
+    def fitted(self) -> np.ndarray:
+        """Whether a time belongs to the fits of z and λ(S), (K,)."""
+        return _in_window(self.time, self.sizes, self.window)
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the mean of S at the last time (`analysis.fits.mean_interval`)."""
         return mean_interval(self.sizes[:, -1])
 
 
 def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = None) -> GrowthResult:
-    """Fit growth exponent, moment exponent and fractal dimension of an ensemble.
+    """Fit growth exponent, local degree, moment exponent and fractal dimension of an ensemble.
 
     Parameters
     ----------
     boxes : sequence of BoxResult
         Boxes with equal settings except for the seed.
     window : tuple of float or None, optional
-        Range of S for the fit of z: from the time when the mean over boxes reaches the first value until any box
-        exceeds the second. By default 2 and 0.1 N, beyond which depletion affects growth.
+        Range of S, mean over boxes, for the fits of z and of the local degree. By default 2 and 0.1 N, beyond which
+        few clusters are left in a box of N grains.
 
     Returns
     -------
@@ -189,24 +226,54 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
         time,
         sizes,
         chosen,
-        law("z", lambda: rate_law(*_within(time, sizes, chosen))),
+        law("z", lambda: rate_law(*_within(time, sizes, chosen), boxes[0].grains)),
+        law("local_degrees", lambda: local_degrees(*_within(time, sizes, chosen), boxes[0].grains)),
         law("slope", lambda: _slope(*_within(time, sizes, chosen))),
         law("moment", lambda: moment_law(heavy)),
         law("moment_without_rings", lambda: moment_law(heavy & (rows["rings"] == 0))),
         law("dimension", lambda: ensemble_dimension(rows["grains"], rows["gyration_radius"], boxes[0].radius, of_box)),
         missing,
+        _temperatures(boxes),
     )
 
 
+def _temperatures(boxes: Sequence[BoxResult]) -> dict[str, Temperatures]:
+    """Temperatures of the bodies by kind, see `Temperatures`."""
+    if not all(box.bodies for box in boxes):
+        return {}
+    motions = [joined([motion for _, motion in box.bodies]) for box in boxes]
+    found = {}
+    for kind, chosen in KINDS.items():
+        of_boxes = np.array([body_temperatures(one, chosen(one.grains)) for one in motions])
+        known = of_boxes[~np.isnan(of_boxes).any(axis=1)]
+        none = np.full(3, np.nan)
+        value = known.mean(axis=0) if len(known) else none
+        error = known.std(axis=0, ddof=1) / np.sqrt(len(known)) if len(known) > 1 else none
+        number = sum(int(chosen(one.grains).sum()) for one in motions) / sum(len(box.bodies) for box in boxes)
+        found[kind] = Temperatures(BodyTemperatures(*value.tolist()), BodyTemperatures(*error.tolist()), number)
+    return found
+
+
+def joined(motions: Sequence[BodyMotion]) -> BodyMotion:
+    """The bodies of several frames or boxes together."""
+    return BodyMotion(*map(np.concatenate, zip(*motions, strict=True)))
+
+
 def _within(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Times from which the mean over boxes is in the window until any box leaves it, and S (boxes, K) at these."""
-    used = (sizes.mean(axis=0) >= window[0]) & (sizes.max(axis=0) <= window[1]) & (time > 0.0)
+    """Times at which the mean over boxes is in the window, and S (boxes, K) at these."""
+    used = _in_window(time, sizes, window)
     if used.sum() < 3:
         raise BadInput(
             f"fewer than three times have S between {window[0]:g} and {window[1]:g}; "
             f"the mean of S goes from {sizes.mean(axis=0)[0]:.3g} to {sizes.mean(axis=0)[-1]:.3g}"
         )
     return time[used], sizes[:, used]
+
+
+def _in_window(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> np.ndarray:
+    """Whether the mean of S over boxes is in the window, until it first leaves it."""
+    mean = sizes.mean(axis=0)
+    return (mean >= window[0]) & (np.maximum.accumulate(mean) <= window[1]) & (time > 0.0)
 
 
 def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLawFit:

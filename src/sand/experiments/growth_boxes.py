@@ -13,7 +13,7 @@ from ..config.build import resume, simulation_of
 from ..config.case import check_case
 from ..errors import BadInput, warn
 from ..io import run_folder as files
-from ..io.checkpoint import checkpoint_files
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..simulation.serialise import case_of
 from .executors import results_of

@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..analysis.body_motion import body_temperatures
 from ..analysis.fits import separation
 from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
-from .growth import BoxResult, GrowthResult, all_aggregates, boxes_in, growth_of, read_box
+from .growth import BoxResult, GrowthResult, Temperatures, all_aggregates, boxes_in, growth_of, joined, read_box
 
-NAMES = ("analysis.json", "growth.csv", "aggregates.csv", "growth.png")
+NAMES = ("analysis.json", "growth.csv", "degrees.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
 
 
@@ -62,8 +63,18 @@ def ensemble_summary(one: Ensemble) -> dict[str, Any]:
         "mean_size_interval": [None if np.isnan(end) else end for end in growth.interval],
         "window": list(growth.window),
         **{name: None if law is None else law._asdict() for name, law in laws.items()},
+        "local_degrees": None if growth.local_degrees is None else [one._asdict() for one in growth.local_degrees],
         "missing": growth.missing,
+        "temperatures": {kind: _described(found) for kind, found in growth.temperatures.items()},
     }
+
+
+def _described(found: Temperatures) -> dict[str, Any]:
+    """Temperatures of one kind of bodies as an entry of analysis.json; None where unknown."""
+    entry: dict[str, Any] = {"bodies": found.bodies}
+    for name, value, error in zip(found.value._fields, found.value, found.error, strict=True):
+        entry[name], entry[f"{name}_error"] = (None if np.isnan(number) else number for number in (value, error))
+    return entry
 
 
 def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
@@ -83,7 +94,7 @@ def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
 
 
 def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any], guides: bool = False) -> None:
-    """Write analysis.json, the tables of S(t) and of all aggregates, and the figure, with `guides` or without.
+    """Write analysis.json, tables of S(t), of local degrees and of aggregates, and the figure, with `guides` or not.
 
     Raises
     ------
@@ -98,12 +109,23 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     write_json(folder / NAMES[0], content)
     most = max(len(one.boxes) for one in ensembles)
     write_table(folder / NAMES[1], [row for one in ensembles for row in _growth_rows(one, most)])
-    write_table(folder / NAMES[2], [row for one in ensembles for row in _aggregate_rows(one)])
+    write_table(folder / NAMES[2], [row for one in ensembles for row in _degree_rows(one)])
+    write_table(folder / NAMES[3], [row for one in ensembles for row in _aggregate_rows(one)])
     drawn = []
     for one in ensembles:
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
-        drawn.append((one.name, one.growth, all_aggregates(one.boxes) | units))
-    save(growth_figure(drawn, guides), folder / NAMES[3])
+        rows = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
+        drawn.append((one.name, one.growth, rows))
+    save(growth_figure(drawn, guides), folder / NAMES[4])
+
+
+def temperatures_over_time(boxes: Sequence[BoxResult]) -> np.ndarray:
+    """Rows of time [s] and `BodyTemperatures` [K] of all bodies of all boxes, one for each frame read, (K, 4)."""
+    rows = []
+    for looks in zip(*(box.bodies for box in boxes), strict=False):
+        together = joined([motion for _, motion in looks])
+        rows.append([float(np.mean([time for time, _ in looks])), *body_temperatures(together)])
+    return np.array(rows).reshape(-1, 4)
 
 
 def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:
@@ -116,6 +138,11 @@ def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:
         own = growth.sizes[:, k].tolist()
         rows.append(row | {f"box_{b + 1}": own[b] if b < len(own) else "" for b in range(most)})
     return rows
+
+
+def _degree_rows(one: Ensemble) -> list[dict[str, Any]]:
+    """One row for each window of S."""
+    return [{"ensemble": one.name, **found._asdict()} for found in one.growth.local_degrees or []]
 
 
 def _aggregate_rows(one: Ensemble) -> list[dict[str, Any]]:

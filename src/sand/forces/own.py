@@ -25,7 +25,7 @@ from .external.formulas import GrainState
 from .pair.cutoff import CutoffForce, cutoff_for
 from .pair.generic_loops import PairGrain, PairParameters, pair_sums
 from .pair.loops import LongRangeSums
-from .pair.pair_force import contact_energy
+from .pair.pair_force import contact_energy, energy_at
 from .registry import FORCES, column_of
 from .vectors import components, three
 
@@ -322,6 +322,10 @@ class OwnPair(_Own, CutoffForce):
     def energy_scale(self, grains: Grains) -> float:
         """Largest |U| [J] of equal grains in contact, among those with extreme quantities."""
         return contact_energy(self.formula, self.constants(), grains)
+
+    def largest_energy(self, grains: Grains, distance: float) -> float:
+        """Largest |U| [J] of two grains at a distance [m], without the cut-off."""
+        return energy_at(self.formula, self.constants(), grains, distance)
 
 
 def own_force(table: dict[str, Any]) -> OwnExternal | OwnPair:

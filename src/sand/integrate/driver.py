@@ -63,6 +63,8 @@ from .respa import (
     update_constant_loads,
 )
 from .stages import (
+    BATH_WALL_WORK,
+    BATH_WORK,
     CONTACT_PASS,
     CONTACT_STEP,
     DRIFT,
@@ -76,6 +78,7 @@ from .stages import (
     GATHER,
     GATHER_AND_KICK,
     INNER_LIST,
+    NEXT_STEP,
     PAIR_LIST,
     PREPARE_RATES,
     REMOVE_BROKEN,
@@ -155,6 +158,11 @@ def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, q
     driven = has_stage(program, DRIVE)
     if driven:
         call_stage(program, DRIVE, table, HOLD)
+    if clock[STEP] != dt:
+        if has_stage(program, BATH_WORK):
+            call_stage(program, BATH_WORK, table, NEXT_STEP)
+        if has_stage(program, BATH_WALL_WORK):
+            call_stage(program, BATH_WALL_WORK, table, NEXT_STEP)
     for_each_block(program, DRIFT, table, queue.words, blocks)
     if driven:
         call_stage(program, DRIVE, table, RELEASE)

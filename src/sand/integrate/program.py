@@ -74,6 +74,8 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     if given.walls is not None:
         of_walls = stages.wall_stages(given.law, variant_of(parameters.settings))
         program |= {number: (each, given.walls) for number, each in of_walls.items()}
+        if variant_of(parameters.settings) == THERMAL:
+            program[stages.BATH_WALL_WORK] = stages.bath_wall_work, given.walls
     number = stages.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:
@@ -110,6 +112,8 @@ def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, 
         stages.CONTACT_STEP: stages.set_contact_step,
         stages.REMOVE_BROKEN: stages.remove_broken,
     }
+    if damping == THERMAL:
+        found[stages.BATH_WORK] = stages.bath_work
     if parameters.settings.follow:
         found[stages.STIFFNESS_WORK] = events[stages.STIFFNESS_WORK]
     if parameters.settings.settling_time < math.inf:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..compiler.jit import loop
 from ..compiler.stage import Stage, stage
+from ..contact.bath_work import half_kick_weight, record_half_kicks, record_half_kicks_at_walls
 from ..contact.events import compact_contacts, forming_loops, settle_loop
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
@@ -57,8 +58,12 @@ DRIVE = 20
 WALL_CONTACTS = 21
 WALL_LOADS = 22
 WALL_STEP = 23
-FIRST_FORCE = 24  # from here on the stages of forces, see force_stages
+BATH_WORK = 24
+BATH_WALL_WORK = 25
+FIRST_FORCE = 26  # from here on the stages of forces, see force_stages
 
+NEXT_STEP, NO_STEP = range(2)
+"""What follows the work of a bath: a step of `scratch[DT]`, or none, as at a row of the ledger."""
 INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
 
@@ -187,6 +192,22 @@ def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
         return Stop.NONE.value
 
     return {WALL_CONTACTS: update_walls, WALL_LOADS: wall_loads, WALL_STEP: wall_step}
+
+
+@stage("the work of the noise of contacts")
+def bath_work(grains, contacts, clock, count, lost, scratch, span, block):
+    """Record the work of the half kick that ended the last step, and take back that of the next one."""
+    weight = half_kick_weight(clock[STEP], scratch[DT] if block == NEXT_STEP else 0.0)
+    record_half_kicks(grains, contacts, count, lost, span, weight)
+    return 0
+
+
+@stage("the work of the noise of contacts with walls")
+def bath_wall_work(grains, walls, wall_contacts, clock, count, lost, scratch, parameters, block):
+    """As `bath_work`, of contacts with walls; `parameters` are their `WallNumbers`."""
+    weight = half_kick_weight(clock[STEP], scratch[DT] if block == NEXT_STEP else 0.0)
+    record_half_kicks_at_walls(grains, walls, wall_contacts, count, lost, parameters, weight)
+    return 0
 
 
 @stage("the time step of contacts")

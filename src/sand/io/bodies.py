@@ -14,7 +14,6 @@ from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
-from ..schema import own_values
 from ..units import si
 from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
 from .frame import MODES
@@ -100,7 +99,7 @@ def _read_gsd(path: Path) -> Columns:
         if frames.written_by_sand:
             frame = frames[-1]
             names = [frame.materials[k] for k in frame.material]
-            moment, own = np.asarray(frame.moment), own_values(frame)
+            moment, own = np.asarray(frame.moment), frame.own
             return Columns(frame.position, frame.radius, moment, names, 1.0, own, frame.charge)
         stored = frames.stored(-1)
         size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)

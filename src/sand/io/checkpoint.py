@@ -10,7 +10,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | lost | energy lost per channel [J] |
 | cutoff | the cut-off of dipoles that follows the largest clusters, and the choice; meta.json names all entries |
 | ledger | all rows so far, (K, columns of ledger.csv) |
-| grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
+| grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials; `own`: own quantities (K, N) |
 | contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
 | pair_list/… | the list of candidate pairs, and the positions at its last rebuild |
 | order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
@@ -39,15 +39,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInput, FilesFailed
+from .checkpoint_files import META, checkpoint_files
 from .damage import set_aside
-from .run_folder import CHECKPOINT, refuse_devices, replace_file
+from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
 VERSION = 10
 """Version of the file format; other versions are refused. Versions before 9 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
-_META = "meta.json"
 
 
 def _checksum(arrays: dict[str, np.ndarray]) -> str:
@@ -62,27 +62,6 @@ def _checksum(arrays: dict[str, np.ndarray]) -> str:
 def checkpoint_name(steps: int) -> str:
     """File name of the checkpoint after `steps` steps; alphabetical order is the order of steps."""
     return f"checkpoint-{int(steps):015d}.npz"
-
-
-def checkpoint_files(folder: Path) -> list[Path]:
-    """The checkpoints of a folder, oldest first: files with the names that SAND gives, by the steps stored in them.
-
-    A copy with a name that the user gave is none, and a copy of an older one under a later name stays the older one.
-    """
-    found = [path for path in folder.glob("checkpoint-*.npz") if CHECKPOINT.fullmatch(path.name)]
-    return sorted(found, key=lambda path: (_stored_steps(path), path.name))
-
-
-def _stored_steps(path: Path) -> int:
-    """Number of steps stored in a checkpoint; that of its name if it cannot be read."""
-    match = CHECKPOINT.fullmatch(path.name)
-    named = int(match.group(1)) if match else -1
-    try:
-        with zipfile.ZipFile(path) as archive, archive.open(f"{_META}.npy") as member:
-            steps = json.loads(np.lib.format.read_array(member, allow_pickle=False).tobytes())["steps"]
-            return int(steps)
-    except Exception:  # numpy and zipfile raise various exceptions for broken files
-        return named
 
 
 def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Path:
@@ -103,7 +82,7 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     header = {"format": "SAND checkpoint", "version": VERSION, "sha256": _checksum(arrays), **meta}
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     memory = io.BytesIO()
-    np.savez(memory, **{_META: text}, **arrays)  # type: ignore[arg-type]
+    np.savez(memory, **{META: text}, **arrays)  # type: ignore[arg-type]
     path = folder / checkpoint_name(meta["steps"])
     replace_file(path, memory.getvalue())
     for old in checkpoint_files(folder)[:-KEPT]:
@@ -148,7 +127,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
                 raise zipfile.BadZipFile
         with np.load(io.BytesIO(content), allow_pickle=False) as saved:
             arrays = {name: saved[name] for name in saved.files}
-        meta = json.loads(arrays.pop(_META).tobytes())
+        meta = json.loads(arrays.pop(META).tobytes())
         is_dictionary = isinstance(meta, dict)
     except MemoryError as error:
         raise _unreadable(path, error) from error
@@ -161,6 +140,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         raise OtherFormat(f"{path} has format {meta['version']}, and this SAND reads format {VERSION}; {advice}")
     if _checksum(arrays) != meta.get("sha256"):
         raise BadInput(f"{path} is damaged: its checksum is wrong")
+    _name_own(arrays, meta)
     try:
         check_state(arrays, meta)
     except BadInput as error:
@@ -176,6 +156,14 @@ def _unreadable(path: Path, error: BaseException) -> FilesFailed:
         f"cannot read {path}: {reason}; it may be whole, so it stays as it is, and no older one is taken: try again "
         "when it can be read, or move it elsewhere to continue from the one before"
     )
+
+
+def _name_own(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    """Own quantities of a checkpoint that was written when the only one was the temperature of the grain."""
+    only = arrays.pop("grains/internal_temperature", None)
+    if only is not None and "grains/own" not in arrays:
+        meta["own"] = {"internal_temperature": "K"} if only.any() else {}
+        arrays["grains/own"] = only[None][: len(meta["own"])]
 
 
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

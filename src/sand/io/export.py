@@ -11,27 +11,34 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from ..errors import BadInput
-from .extended_xyz import ANGSTROM, format_rows, xyz_frame
+from ..errors import BadInput, warn
+from .extended_xyz import ANGSTROM, format_rows, own_columns, xyz_frame
 from .run_folder import replace_file
 from .trajectory import Frame
 
 
 def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as extended XYZ: species, position [Å], radius [Å], velocity, moment, spin, cluster (SI)."""
+    """Format a frame as extended XYZ: species, position [Å], radius [Å], velocity, moment, spin, mass, charge (SI).
+
+    Then own quantities in SI, whose units are in the second line, and the cluster.
+    """
     periodic = " ".join("T" if v is not None else "F" for v in frame.box.lengths)
+    own, units = own_columns(frame.own)
     x, y, z = (v / ANGSTROM for v in frame.drawn)
     head = (
         f'Lattice="{x:.10g} 0 0 0 {y:.10g} 0 0 0 {z:.10g}" Origin="{-x / 2:.10g} {-y / 2:.10g} {-z / 2:.10g}" '
-        "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:moment:R:3:spin:R:3:cluster:I:1 "
-        f'Time={frame.time!r} Step={frame.step} pbc="{periodic}" length_unit=angstrom other_units=SI'
+        "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:moment:R:3:spin:R:3:mass:R:1:charge:R:1"
+        f"{own}:cluster:I:1 "
+        f'Time={frame.time!r} Step={frame.step} pbc="{periodic}" length_unit=angstrom other_units=SI{units}'
     )
-    columns = [frame.position / ANGSTROM, frame.radius / ANGSTROM, frame.velocity, frame.moment, frame.spin, cluster]
-    return xyz_frame(frame.materials, frame.material, head, columns, "%.10g " * 4 + "%.9g " * 9 + "%d")
+    columns = [frame.position / ANGSTROM, frame.radius / ANGSTROM, frame.velocity, frame.moment, frame.spin]
+    columns += [frame.mass, frame.charge, *frame.own.values(), cluster]
+    form = "%.10g " * 4 + "%.9g " * 11 + "%.17g " * len(frame.own) + "%d"
+    return xyz_frame(frame.materials, frame.material, head, columns, form)
 
 
 def _table(columns: Sequence[np.ndarray], form: str) -> str:
@@ -52,9 +59,11 @@ def _file_names(stem: str, ending: str, steps: Sequence[int]) -> list[str]:
 
 
 def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as a snapshot of a custom dump: id, type, position, radius, velocity, spin, moment, cluster.
+    """Format a frame as a snapshot of a custom dump.
 
-    It has step numbers but no times, because some readers do not accept `ITEM: TIME`.
+    Columns: id, type, position, radius, velocity, spin, moment, cluster, mass, charge, and own quantities in SI, with
+    the prefix d_ that LAMMPS gives such numbers. The snapshot has a step number but no time, because some readers do
+    not accept `ITEM: TIME`.
     """
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
@@ -62,16 +71,18 @@ def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
         f"ITEM: TIMESTEP\n{frame.step}\n"
         f"ITEM: NUMBER OF ATOMS\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {walls}\n{box}"
-        "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz c_cluster\n"
+        "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz c_cluster mass q"
+        f"{''.join(f' d_{name}' for name in frame.own)}\n"
     )
-    columns = (frame.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, cluster + 1)
-    return head + _table(columns, "%d" + " %.10g" * 13 + " %d")
+    columns = [frame.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, cluster + 1]
+    columns += [frame.mass, frame.charge, *frame.own.values()]
+    return head + _table(columns, "%d" + " %.10g" * 13 + " %d %.9g %.9g" + " %.17g" * len(frame.own))
 
 
 def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
     """Format a frame as a data file of `atom_style hybrid sphere dipole`: grains, velocities and spins.
 
-    Columns of an atom: id type x y z diameter density q mux muy muz.
+    Columns of an atom: id type x y z diameter density q mux muy muz. There is no place for own quantities.
     """
     box = "".join(
         f"{-0.5 * v:.17g} {0.5 * v:.17g} {axis}lo {axis}hi\n" for v, axis in zip(frame.drawn, "xyz", strict=True)
@@ -86,19 +97,22 @@ def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
     )
 
 
-def _array(name: str, values: np.ndarray) -> str:
-    """Format a DataArray of a VTK file, as text to full precision."""
+def _array(name: str, values: np.ndarray, unit: str = "") -> str:
+    """Format a DataArray of a VTK file, as text to full precision; `unit` is what ParaView shows beside its name."""
     parts = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
     kind, form = ("Int64", "%d") if np.issubdtype(values.dtype, np.integer) else ("Float64", "%.17g")
     text = " ".join(form % v for v in values.ravel().tolist())
-    return f'<DataArray type="{kind}" Name="{name}"{parts} format="ascii">{text}</DataArray>'
+    # after the numbers: VTK reads these from the beginning of the element
+    key = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{escape(unit)}</InformationKey>' if unit else ""
+    return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="ascii">{text}{key}</DataArray>'
 
 
 def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
     """Format a frame as VTK: grains as points, contacts as lines with overlap and force.
 
-    Contacts across a periodic face have no line. Point data: radius [m], moment [A m²], velocity, spin, material,
-    cluster; cell data (zero for the vertices, which come first): overlap [m], force [N].
+    Contacts across a periodic face have no line. Point data: radius [m], moment [A m²], velocity, spin, mass, charge,
+    material, cluster, own quantities in SI. Cell data (zero for the vertices, which come first): overlap [m], force
+    [N].
     """
     n = len(frame)
     offset = np.diff(frame.position[frame.pair], axis=1)[:, 0]
@@ -106,8 +120,9 @@ def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
     lines = frame.pair[inside]
     overlap = np.concatenate([np.zeros(n), frame.overlap[inside]])
     force = np.concatenate([np.zeros((n, 3)), frame.force[inside]])
-    columns = ("radius", "moment", "velocity", "spin", "material")
+    columns = ("radius", "moment", "velocity", "spin", "mass", "charge", "material")
     points = [_array(name, getattr(frame, name)) for name in columns] + [_array("cluster", cluster)]
+    points += [_array(name, values, frame.own.units[name]) for name, values in frame.own.items()]
     vertices = _array("connectivity", np.arange(n)) + _array("offsets", np.arange(1, n + 1))
     joined = _array("connectivity", lines.ravel()) + _array("offsets", 2 * np.arange(1, len(lines) + 1))
     return (
@@ -174,6 +189,8 @@ def export_frames(
     place = Path(stem)
     if not place.parent.is_dir():
         raise BadInput(f"there is no folder {place.parent}; make it first")
+    if form == "lammps-data" and (own := frames[0].own):
+        warn(f"LAMMPS data files have no place for own quantities: {', '.join(own)} left out; lammps-dump has them")
     text_of, ending = FORMATS[form]
     paths = [place.with_name(name) for name in _file_names(place.name, ending, [frame.step for frame in frames])]
     texts = (text_of(frame, clusters(len(frame), frame.pair)) for frame in frames)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import BadInput
 from ..grains import Grains
+from ..own_quantities import OwnQuantities
 from ..units import in_unit
 
 ANGSTROM = 1e-10
@@ -27,8 +28,14 @@ class Columns(NamedTuple):
     moment: np.ndarray | None  # (N, 3) [A m²]
     names: list[str] | None  # N names of materials
     unit: float  # unit of length [m], unless the caller gives another
-    own: Mapping[str, np.ndarray] = {}  # own quantities of the user
+    own: OwnQuantities | None = None  # own quantities of the user
     charge: np.ndarray | None = None  # (N,) [C]
+
+
+def own_columns(own: OwnQuantities) -> tuple[str, str]:
+    """Names of the columns of own quantities in `Properties=`, and the entry with their units."""
+    units = ";".join(f"{name}={unit}" for name, unit in own.units.items())
+    return "".join(f":{name}:R:1" for name in own), f' own="{units}"' if own else ""
 
 
 def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
@@ -44,17 +51,19 @@ def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Se
 
 
 def xyz_text(grains: Grains) -> str:
-    """Format grains as extended XYZ: species, position and radius [Å], moment [A m²], material; full precision.
+    """Format grains as extended XYZ: species, position and radius [Å], moment [A m²], charge [C], own quantities.
 
-    Materials are indices; their names are in the second line.
+    Numbers are in full precision. The last column, material, is an index; names of materials, and units of own
+    quantities, are in the second line.
     """
-    names = [m.name for m in grains.materials]
+    names, (own, units) = [m.name for m in grains.materials], own_columns(grains.own)
     head = (
-        "Properties=species:S:1:pos:R:3:radius:R:1:moment:R:3:material:I:1 "
-        f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI'
+        f"Properties=species:S:1:pos:R:3:radius:R:1:moment:R:3:charge:R:1{own}:material:I:1 "
+        f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI{units}'
     )
-    columns = [grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment, grains.material]
-    return xyz_frame(names, grains.material, head, columns, "%.17g " * 7 + "%d")
+    columns = [grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment, grains.charge, *grains.own.values()]
+    form = "%.17g " * (8 + len(grains.own)) + "%d"
+    return xyz_frame(names, grains.material, head, [*columns, grains.material], form)
 
 
 def is_xyz(lines: list[str]) -> bool:
@@ -89,7 +98,26 @@ def read_xyz(path: Any, lines: list[str]) -> Columns:
     unit = in_unit(f"1 {head.get('length_unit', 'angstrom')}", "m")
     if unit is None:
         raise BadInput(f"{path}, line 2: length_unit={head['length_unit']!r} is not a unit of length")
-    return Columns(position, None if size is None else size[:, 0], moment, _names(path, rows, layout, head), unit)
+    charge = _numbers(path, rows, layout, ("charge", "charges"), 1, first)
+    return Columns(
+        position,
+        None if size is None else size[:, 0],
+        moment,
+        _names(path, rows, layout, head),
+        unit,
+        _own(path, rows, head, first),
+        None if charge is None else charge[:, 0],
+    )
+
+
+def _own(path: Any, rows: list[list[str]], head: dict[str, str], first: int) -> OwnQuantities:
+    """Own quantities named by `own="temperature=K;…"`.  Raises BadInput."""
+    units = dict(entry.partition("=")[::2] for entry in head.get("own", "").split(";") if entry)
+    layout, _ = _layout(path, head.get("Properties", ""), exact=True)
+    columns = {name: _numbers(path, rows, layout, (name,), 1, first) for name in units}
+    if missing := [name for name, column in columns.items() if column is None]:
+        raise BadInput(f"{path}, line 2: own= names {missing[0]}, but Properties has no {missing[0]}:R:1")
+    return OwnQuantities({name: column[:, 0] for name, column in columns.items() if column is not None}, units)
 
 
 def _last_frame(path: Any, lines: list[str]) -> tuple[int, int]:
@@ -104,13 +132,16 @@ def _last_frame(path: Any, lines: list[str]) -> tuple[int, int]:
     return found
 
 
-def _layout(path: Any, text: str) -> tuple[dict[str, tuple[int, int]], int]:
-    """First column and number of columns of each name, and the total number of columns.  Raises BadInput."""
+def _layout(path: Any, text: str, exact: bool = False) -> tuple[dict[str, tuple[int, int]], int]:
+    """First column and number of columns of each name, in lower case or `exact`, and the total number of columns.
+
+    Raises BadInput if the text is not such a list.
+    """
     parts, layout, at = text.split(":"), {}, 0
     if len(parts) % 3 or not all(width.isdecimal() for width in parts[2::3]):
         raise BadInput(f"{path}, line 2: Properties={text[:60]!r} is not made of name:type:number")
     for name, width in zip(parts[::3], parts[2::3], strict=True):
-        layout[name.lower()] = (at, int(width))
+        layout[name if exact else name.lower()] = (at, int(width))
         at += int(width)
     return layout, at
 

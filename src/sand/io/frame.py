@@ -17,13 +17,14 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | log/particles/position, radius | to full precision [m]; only in files of bodies |
 | bonds/group | grains in contact |
 | log/particles/id | identity of each grain; absent if it is the index, as long as no grain was removed |
-| log/particles/NAME | own quantities of the user (`sand.schema.OWN`), if any grain has a value |
+| log/particles/NAME | an own quantity of the user, in SI |
+| log/own | names and units of the own quantities, JSON as bytes: `{"temperature": "K"}`; absent without them |
 | log/particles/at_rest | 1 for grains of clusters at rest, 0 for awake ones; only with rigid clusters |
 | log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
 | log/bonds/share | stretch, slide, roll and twist as shares of their limits |
-| late/particles/id, NAME, at_rest | the same, in files whose first frame has no log/particles/id, NAME, at_rest |
+| late/particles/id, at_rest | the same, in files whose first frame has no log/particles/id, at_rest |
 | log/crc32 | checksum of step, material names and all numbers of a frame |
 
 Vectors are in the laboratory frame.
@@ -31,6 +32,7 @@ Vectors are in the laboratory frame.
 
 from __future__ import annotations
 
+import json
 import zlib
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -42,18 +44,20 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..grains import Grains
-from ..schema import OWN, own_values
+from ..own_quantities import OwnQuantities
 from ..units import format_quantity
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
 IDENTITY, LATE = "id", "late/"
 """Name of the identities of grains, and beginning of the names of chunks that the first frame lacks."""
+OWN = "own"
+"""Name of the array with names and units of own quantities."""
 REST = "at_rest"
 """Name of the array that says which grains belong to clusters at rest."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
-SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, *OWN, REST))
+SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
 """Logged arrays of grains that not all frames have."""
 
 
@@ -106,12 +110,11 @@ def stored_frame(
         "bonds/twist": contacts["twist"].astype(np.float32),
         "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
     }
-    # absent where no grain has a value, unless grains were removed: a reader would then use those of the first frame
-    own = own_values(grains)
+    if grains.own_units:
+        frame.log[OWN] = np.frombuffer(json.dumps(grains.own_units).encode(), np.uint8)
+        frame.log |= {f"particles/{name}": values.copy() for name, values in grains.own.items()}
     if not np.array_equal(grains.id, np.arange(len(grains))):
         frame.log[f"particles/{IDENTITY}"] = np.array(grains.id)
-        own = {name: getattr(grains, name) for name in OWN}
-    frame.log |= {f"particles/{name}": values.copy() for name, values in own.items()}
     if at_rest is not None:
         frame.log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
     if exact:
@@ -124,8 +127,8 @@ def stored_frame(
 def append_frame(file: Any, frame: Any) -> None:
     """Append a frame to an open GSD file.
 
-    GSD reads no logged array that the first frame lacks: identities, own quantities and what is at rest that appear
-    later are chunks of names that begin with `LATE`.
+    GSD reads no logged array that the first frame lacks: identities and what is at rest that appear later are chunks of
+    names that begin with `LATE`.
     """
     if len(file):
         for name in SOMETIMES:
@@ -179,9 +182,10 @@ class Frame:
     """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
     `material` (N,) holds indices into the names `materials`; `id` (N,) is the identity of each grain, which stays when
-    others are removed. `at_rest` (N,), True for grains of clusters at rest, single grains included, is None without
-    `sand.RigidClusters`. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,),
-    `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
+    others are removed. `own` are the own quantities (N,) by name, also attributes: `frame.temperature`. `at_rest` (N,),
+    True for grains of clusters at rest, single grains included, is None without `sand.RigidClusters`. Arrays of
+    contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3),
+    and `share` (C, 4) with columns `MODES`.
     """
 
     def __init__(self, stored: Any):
@@ -197,8 +201,10 @@ class Frame:
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
         self.id = np.asarray(stored.log.get(f"particles/{IDENTITY}", np.arange(p.N)), np.uint32)
-        for name in OWN:
-            setattr(self, name, np.array(stored.log.get(f"particles/{name}", np.zeros(p.N))))
+        # before own quantities had names, the only one was this temperature
+        before = {"internal_temperature": "K"} if "particles/internal_temperature" in stored.log else {}
+        units = json.loads(stored.log[OWN].tobytes()) if OWN in stored.log else before
+        self.own = OwnQuantities({name: stored.log[f"particles/{name}"] for name in units}, units)
         rest = stored.log.get(f"particles/{REST}")
         self.at_rest = None if rest is None else np.asarray(rest) == 1
         names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
@@ -215,6 +221,13 @@ class Frame:
         self.box = Box((x, y, z))
         self.drawn = tuple(float(v) for v in lengths)
         """Side lengths of the box as drawn [m], open axes included."""
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """Values of an own quantity."""
+        own = self.__dict__.get("own", {})
+        if name not in own:
+            raise NoSuchAttribute(f"a frame has no '{name}'; {did_you_mean(name, (*vars(self), *own))}")
+        return own[name]
 
     def __len__(self) -> int:
         """Number of grains."""
@@ -236,7 +249,6 @@ OF_GRAINS = (
     "charge",
     "material",
     REST,
-    *OWN,
 )
 OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
 
@@ -258,8 +270,9 @@ class FrameArrays(Sequence[np.ndarray]):
     """
 
     def __init__(self, frames: FrameSequence, name: str, chosen: range | None = None):
-        if name not in (*OF_GRAINS, *OF_CONTACTS):
-            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(str(name), (*OF_GRAINS, *OF_CONTACTS))}")
+        if not frames.has_array(name):
+            known = (*OF_GRAINS, *OF_CONTACTS, *frames.own_units)
+            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(str(name), known)}")
         self.frames, self.name = frames, name
         self.chosen = range(len(frames)) if chosen is None else chosen
 
@@ -331,12 +344,21 @@ class FrameSequence(Sequence[Frame]):
             raise NoSuchFrame(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
         return self._frame(index % len(self))
 
+    @property
+    def own_units(self) -> dict[str, str]:
+        """Units of the own quantities by name, those of the first frame."""
+        return self[0].own.units if len(self) else {}
+
+    def has_array(self, name: Any) -> bool:
+        """Whether the frames have an array of this name; reads the first frame if it may be an own quantity."""
+        return name in (*OF_GRAINS, *OF_CONTACTS) or name in self.own_units
+
     def arrays(self, name: str) -> FrameArrays:
         """One array of each frame, such as "position", read on access; also as `frames.position`.  Raises BadInput."""
         return FrameArrays(self, name)
 
     def __getattr__(self, name: str) -> FrameArrays:
-        if name not in (*OF_GRAINS, *OF_CONTACTS):
-            known = [*OF_GRAINS, *OF_CONTACTS, *(known for known in dir(self) if known[0] != "_")]
+        if name[0] == "_" or not self.has_array(name):
+            known = [*OF_GRAINS, *OF_CONTACTS, *self.own_units, *(known for known in dir(self) if known[0] != "_")]
             raise NoSuchAttribute(f"frames have no '{name}'; {did_you_mean(name, known)}")
         return FrameArrays(self, name)

@@ -14,6 +14,8 @@ from .run_folder import LEDGER, SUMMARY, append_text, read_json, read_text, repl
 
 ROUNDING = 1e-14
 """Difference between a total and the sum of its columns, relative to the sum of their magnitudes, due to rounding."""
+TEMPERATURES = ("temperature_translation", "temperature_rotation", "temperature_rotation_median")
+"""Columns of the temperatures of bodies [K], clusters and single grains alike; also keys of summary.json."""
 ROWS, ROWS_DIGEST = "ledger_rows", "ledger_sha256"
 """Keys of summary.json: number of rows of ledger.csv, and the digest of its text up to the last of them."""
 

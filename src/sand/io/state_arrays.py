@@ -51,6 +51,7 @@ STORED = {
     "ledger": ArraySpec("f8", (None, None)),
     **{f"grains/{field.name}": ArraySpec("f8", ("N",) if field.width == 1 else (field.width, "N")) for field in FIELDS},
     **{f"grains/{name}": ArraySpec("f8", ("N",), "above 0") for name in ("radius", "mass", "inertia")},
+    "grains/own": ArraySpec("f8", (None, "N")),
     "grains/material": ArraySpec("u4", ("N",), "any"),
     "grains/id": ArraySpec("u4", ("N",), "ascending"),
     "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
@@ -100,8 +101,9 @@ PLANNED_END = {"until": float, "last_step": int}
 """Numbers of `meta.json` that may be null."""
 TABLES = {"choices": dict, "case": dict, "ledger": list}
 """Tables of `meta.json`."""
-CHANGES = {"case_written": dict, "updaters": list}
-"""Entries of `meta.json` that a run without changes may lack: the case in case.toml, and names of updaters."""
+CHANGES = {"case_written": dict, "updaters": list, "own": dict, "wall_times": dict}
+"""Entries of `meta.json` that a run may lack: the case in case.toml, names of updaters, units of own quantities, and
+parts of the wall time in older files."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
@@ -130,6 +132,8 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
             or ("bodies/first" in arrays and name.startswith("bodies/"))
         ):
             raise BadInput(f"there is no array {name!r}")
+    if len(meta.get("own", {})) != len(arrays["grains/own"]):
+        raise BadInput(f"'grains/own' has {len(arrays['grains/own'])} rows, but meta.json names a different number")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
     if arrays["ledger"].shape[1] != len(meta.get("ledger", ())):
@@ -149,6 +153,13 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
     for name, kind in CHANGES.items():
         if name in meta and not isinstance(meta[name], kind):
             raise BadInput(f"its meta.json has {name} = {meta[name]!r}, which is not a {kind.__name__}")
+    chosen = meta.get("chosen_cadence")
+    if chosen is not None and not (
+        isinstance(chosen, list)
+        and len(chosen) == 2
+        and all(isinstance(each, (int, float)) and 0.0 < each < 1e300 for each in chosen)
+    ):
+        raise BadInput(f"its meta.json has chosen_cadence = {chosen!r}, which is not two times above 0")
     for name, table in TABLES.items():
         if not isinstance(meta.get(name), table):
             raise BadInput(f"its meta.json has {name} = {meta.get(name)!r}, which is not a {table.__name__}")

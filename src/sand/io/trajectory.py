@@ -108,7 +108,7 @@ class TrajectoryWriter:
         frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest)
         if self._is_stored(time, code_of(frame)):
             return
-        self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS
+        self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS + len(grains.own_units)
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
             if self._file is None:

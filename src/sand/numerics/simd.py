@@ -6,6 +6,7 @@ cross a boundary.  Loop lengths are padded to whole vectors, because remaining i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,13 +26,27 @@ def padded_size(number: int) -> int:
 
 def aligned(array: np.ndarray) -> np.ndarray:
     """The array itself if it is contiguous and begins at a cache line or is empty, else such a copy."""
-    if array.size == 0 or (array.ctypes.data % CACHE_LINE == 0 and array.flags.c_contiguous):
+    if array.size == 0 or (address(array) % CACHE_LINE == 0 and array.flags.c_contiguous):
         return array
-    raw = np.empty(array.nbytes + CACHE_LINE, np.uint8)
-    first = -raw.ctypes.data % CACHE_LINE
-    copy = raw[first : first + array.nbytes].view(array.dtype).reshape(array.shape)
-    copy[...] = array
-    return copy
+    return aligned_copies([array])[0]
+
+
+def aligned_copies(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Contiguous copies in one block of memory, each of which begins at a cache line."""
+    lengths = [(array.nbytes + CACHE_LINE - 1) // CACHE_LINE * CACHE_LINE for array in arrays]
+    block = np.empty(sum(lengths) + CACHE_LINE, np.uint8)
+    at, copies = -address(block) % CACHE_LINE, []
+    for array, length in zip(arrays, lengths, strict=True):
+        copy = np.ndarray(array.shape, array.dtype, block, at)
+        copy[...] = array
+        copies.append(copy)
+        at += length
+    return copies
+
+
+def address(array: np.ndarray) -> int:
+    """Address of the first number of an array."""
+    return int(array.__array_interface__["data"][0])
 
 
 def all_aligned(arrays: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Figure of an ensemble of growth simulations: S(t), moments and sizes of aggregates, with the paper's power laws."""
+"""Figure of an ensemble of growth simulations: S(t), local degree, moments, sizes, temperatures; the paper's laws."""
 
 from __future__ import annotations
 
@@ -16,41 +16,55 @@ from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, legend_above, p
 COLOURS = (RED, BLUE, GREEN, PURPLE)
 PAPER_EXPONENTS = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
 """Exponents of Dominik & Nübold (2002): growth of S (section 3.3), and μ(N) (Figure 1)."""
+TEMPERATURE_STYLES = (("translation", "o-"), ("rotation, mean", "^--"), ("rotation, median", "v:"))
+"""Label and line of each temperature."""
 
 
 def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: bool = False) -> Figure:
-    """Figure of S(t), μ(N) and N(r_g) of one or more ensembles.
+    """Figure of S(t), λ(S), μ(N), N(r_g) and the temperatures of bodies of one or more ensembles.
 
     Parameters
     ----------
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
         For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
-        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain.
+        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain, and `temperatures` (K, 4), times
+        [s] and `BodyTemperatures` [K].
     guides : bool, optional
         Whether lines show the power laws of the paper.
     """
     with plot_style():
-        figure = Figure(figsize=(9.6, 3.3 + 0.3 * len(ensembles)), layout="constrained")
-        left, middle, right = figure.subplots(1, 3)
+        figure = Figure(figsize=(14.4, 6.2 + 0.6 * len(ensembles)), layout="constrained")
+        (left, degrees, last), (middle, right, unused) = figure.subplots(2, 3)
+        unused.set_axis_off()
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _draw_growth(left, name, growth, size, colour, guides)
+            _draw_degrees(degrees, name, growth, colour)
             _draw_moments(middle, growth, rows, colour, guides)
             _draw_dimension(right, growth, rows, colour)
-        for axes in (left, middle, right):
+            _draw_temperatures(last, name, rows["temperatures"], size, colour)
+        for axes in (left, middle, right, last):
             axes.set(xscale="log", yscale="log")
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
                 axis.set_major_formatter(lambda value, _: f"{value:g}")
                 axis.set_minor_formatter(NullFormatter())
         left.set(xlabel=f"time [{unit}]", ylabel="mean size $S$ [grains]")
+        degrees.set(xscale="log", xlabel="mean size $S$ [grains]", ylabel=r"local degree $\lambda = d\ln\dot S/d\ln S$")
+        degrees.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+        degrees.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        degrees.xaxis.set_minor_formatter(NullFormatter())
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
-        for axes in (left, middle, right):
+        last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
+        empty = "no aggregates"
+        texts = {degrees: "$S$ grows too little", last: "all bodies are at rest"}
+        for axes in (left, degrees, last, middle, right):
+            text = texts.get(axes, empty)
             if axes.get_legend_handles_labels()[0]:
                 legend_above(axes)
             else:
-                axes.text(0.5, 0.5, "no aggregates", ha="center", color=MUTED, transform=axes.transAxes)
+                axes.text(0.5, 0.5, text, ha="center", color=MUTED, transform=axes.transAxes)
     return figure
 
 
@@ -60,22 +74,40 @@ def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str, g
     positive = growth.time > 0.0
     for sizes in growth.sizes:
         axes.plot(time[positive], sizes[positive], color=colour, alpha=0.25, lw=0.6)
-    label = name if growth.z is None else f"{name}: $z = {_with_error(growth.z)}$"
+    label = name if growth.z is None else f"{name}: {_exponent(growth.z)}"
     axes.plot(time[positive], growth.mean[positive], color=colour, lw=1.8, label=label)
     if len(growth.sizes) > 1:
         low, high = growth.mean - growth.error, growth.mean + growth.error
         axes.fill_between(time[positive], low[positive], high[positive], color=colour, alpha=0.2, lw=0)
     if growth.z is None:
         return
-    fitted = (growth.mean >= growth.window[0]) & (growth.sizes.max(axis=0) <= growth.window[1]) & positive
-    axes.plot(time[fitted], growth.z.at(growth.time[fitted]), color=TEXT_COLOUR, lw=0.8, ls="--")
+    axes.plot(time[growth.fitted], growth.z.at(growth.time[growth.fitted]), color=TEXT_COLOUR, lw=0.8, ls="--")
     axes.axhline(growth.window[1], color=MUTED, lw=0.6, ls=":", zorder=0)
-    centre = np.exp(np.log(growth.time[fitted]).mean())
+    centre = np.exp(np.log(growth.time[growth.fitted]).mean())
     for z in (PAPER_EXPONENTS["z, Brownian"], PAPER_EXPONENTS["z, magnetic"]) if guides else ():
         ends = centre * np.array([0.7, 1.4])
         height = float(growth.z.at(centre)) * (ends / centre) ** z
         axes.plot(ends / size, height, color=MUTED, lw=0.8)
         axes.annotate(f"$t^{{{z:g}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=7)
+
+
+def _draw_degrees(axes: Axes, name: str, growth: Any, colour: str) -> None:
+    """λ(S) in windows of S with standard errors, and the 95 % interval of the degree of the kernel."""
+    found = growth.local_degrees
+    if found:
+        low, high, degree, error = np.array([(one.low_size, one.high_size, one.degree, one.error) for one in found]).T
+        centre = np.sqrt(low * high)
+        style: dict[str, Any] = {"fmt": "o", "ms": 3, "color": colour, "lw": 0.9}
+        spread = None if np.isnan(error).any() else error
+        axes.errorbar(centre, degree, spread, [centre - low, high - centre], label=f"{name}: $\\lambda(S)$", **style)
+    if growth.z is not None:
+        ends = growth.window[0], min(growth.window[1], growth.z.largest)
+        axes.plot(ends, [growth.z.degree] * 2, color=colour, ls="--", lw=0.9)
+        if not np.isnan(growth.z.degree_low):
+            label = f"{name}: degree of the kernel, 95 %"
+            axes.fill_between(
+                ends, growth.z.degree_low, growth.z.degree_high, color=colour, alpha=0.12, lw=0, label=label
+            )
 
 
 def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str, guides: bool) -> None:
@@ -108,6 +140,23 @@ def _draw_dimension(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) 
     error = "" if np.isnan(fit.error) else f" ± {fit.error:.2f}"
     text = f"$D_f$ = {fit.value:.2f}{error}"
     axes.plot((n / fit.prefactor) ** (1.0 / fit.value), n, color=TEXT_COLOUR, ls="--", lw=0.9, label=text)
+
+
+def _exponent(law: Any) -> str:
+    """z with its 95 % interval, which is not symmetric."""
+    value = f"$z = {law.exponent:.2f}$" if np.isfinite(law.exponent) else r"$z = \infty$"
+    if np.isnan(law.low):
+        return value
+    return f"{value} (95 %: " + (f"> {law.low:.2f})" if np.isinf(law.high) else f"{law.low:.2f} to {law.high:.2f})")
+
+
+def _draw_temperatures(axes: Axes, name: str, rows: np.ndarray, size: float, colour: str) -> None:
+    """Temperatures of translation and rotation over time, of all bodies of the ensemble."""
+    for column, (label, style) in enumerate(TEMPERATURE_STYLES, 1):
+        positive = rows[:, column] > 0.0
+        if positive.any():
+            time, values = rows[positive, 0] / size, rows[positive, column]
+            axes.plot(time, values, style, color=colour, ms=3, lw=1.0, label=f"{name}: {label}")
 
 
 def _with_error(law: Any) -> str:

@@ -10,6 +10,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, Symmetrica
 
 from ..analysis.ledger_columns import AWAKE, LOSSES
 from ..constants import BOLTZMANN
+from ..io.ledger_table import TEMPERATURES
 from ..state.state import DAMPING, LOST
 from .style import (
     BLUE,
@@ -46,6 +47,11 @@ CHANNEL_LABELS = {"outside": "external", "cutoff_changed": "cut-off"}
 """Labels of loss channels that differ from the name of the ledger column."""
 OPTIONAL_CHANNELS = ("damping", "stiffness", "settling", "gas", "outside", "cutoff_changed")
 """Loss channels of forces and options that are off by default; not listed as zero in the figure."""
+
+TEMPERATURE_LINES = (("translation", BLUE), ("rotation, mean", ORANGE), ("rotation, median", PURPLE))
+"""Label and colour of each column of TEMPERATURES."""
+LEAST_BODIES = 10
+"""Bodies at the start of a run from which its figure shows their temperatures."""
 
 DECADES = 6
 """Decades shown of a quantity that spans many."""
@@ -175,6 +181,31 @@ def draw_energies(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> No
     else:
         _no_data(axes, "all energies are zero")
     axes.set_ylabel(f"energy ({unit.name})")
+
+
+def has_temperatures(ledger: Any) -> bool:
+    """Whether a ledger has the temperatures of bodies, of enough bodies for a mean, and not all at rest."""
+    if not set(TEMPERATURES) <= set(ledger.columns) or not len(ledger) or ledger["clusters"][0] < LEAST_BODIES:
+        return False
+    return any(peak(column(ledger, name)) > 0.0 for name in TEMPERATURES)
+
+
+def draw_temperatures(axes: Axes, ledger: Any, time: AxisUnit) -> None:
+    """Draw the temperatures of translation and rotation of the bodies, clusters and single grains alike."""
+    t = ledger["time"] / time.size
+    known = set(TEMPERATURES) <= set(ledger.columns)
+    drawn = [column(ledger, name) for name in TEMPERATURES] if known else []
+    top = max(map(peak, drawn), default=0.0)
+    axes.set_ylabel("bodies (K)")
+    if top == 0.0:
+        _no_data(axes, "all bodies are at rest" if known else "an earlier version of SAND wrote this ledger")
+        return
+    for values, (label, colour) in zip(drawn, TEMPERATURE_LINES, strict=True):
+        axes.plot(t, np.where(values > 0.0, values, np.nan), color=colour, label=label, **_markers(t))
+    lowest = min(float(np.min(values, where=values > 0.0, initial=top)) for values in drawn)
+    axes.set(yscale="log", ylim=(max(lowest / 1.3, top * 10.0**-DECADES), 1.3 * top))
+    _log_ticks(axes, plain=True)
+    legend_above(axes)
 
 
 def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:

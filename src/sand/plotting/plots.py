@@ -22,6 +22,7 @@ from .panels import (
     draw_contacts,
     draw_energies,
     draw_losses,
+    draw_temperatures,
     draw_time,
     energy_unit,
     time_unit,
@@ -38,6 +39,7 @@ _DRAW: dict[str, Callable[[Axes, Any, AxisUnit, AxisUnit], None]] = {
     "losses": draw_losses,
     "contacts": lambda axes, ledger, time, _: draw_contacts(axes, ledger, time),
     "balance": draw_balance,
+    "temperatures": lambda axes, ledger, time, _: draw_temperatures(axes, ledger, time),
 }
 HISTORY = tuple(_DRAW)
 """Names of the figures over time."""
@@ -90,7 +92,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     frame : Frame
         Frame of a trajectory.
     name : str
-        Name of a quantity in `analysis.quantities.GRAINS`.
+        Name of a quantity in `analysis.quantities.GRAINS`, or of an own quantity.
     field : ndarray, optional
         (3,) external flux density [T].
     dark : bool, optional
@@ -101,7 +103,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     BadInput
         If the frame does not have the quantity.
     """
-    what = quantity(name)
+    what = quantity(name, frame=frame)
     values = measured(frame, name, field)
     if not np.isfinite(values).any():
         raise BadInput(f"{name}: no grain has a finite value")

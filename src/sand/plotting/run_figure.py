@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +22,11 @@ from .panels import (
     draw_contacts,
     draw_energies,
     draw_losses,
+    draw_temperatures,
     draw_time,
     energy_unit,
     has_few_bodies,
+    has_temperatures,
     time_unit,
 )
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
@@ -34,6 +37,8 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
+LETTERS = "abcdefg"
+"""Letters of the panels."""
 MIN_GRAIN_RADIUS = 11.0
 """Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
 _METADATA: dict[str, dict[str, Any]] = {
@@ -47,7 +52,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
 _TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
 _MARGIN = 0.012
-_HEIGHTS = (1.0, 1.35, 1.1, 0.5)
+_HEIGHTS, _HEIGHTS_WITH_TEMPERATURES = (1.0, 1.35, 1.1, 0.5), (1.0, 1.25, 1.0, 0.8, 0.6)
 """Heights of the panels over time, relative to each other."""
 
 
@@ -64,10 +69,11 @@ class RunFigure(Figure):
 def run_figure(simulation: Simulation) -> Figure:
     """Figure of a run so far.
 
-    Left, over time: clusters (Eq. 17), energies, losses by channel, and the energy balance. Right: the grains at the
-    present time with their moments, coloured by cluster; if they are small, the largest clusters again, enlarged.
-    Energies are in N k_B T₀, or in joules if the grains were initially at rest. Of one or two bodies, as in a
-    collision, contacts take the place of clusters, and energies are in units of their kinetic energy at the start.
+    Left, over time: clusters (Eq. 17), energies, losses by channel, the temperatures of the bodies of a run that began
+    with ten or more, and the energy balance. Right: the grains at the present time with their moments, coloured by
+    cluster; if they are small, the largest clusters again, enlarged. Energies are in N k_B T₀, or in joules if the
+    grains were initially at rest. Of one or two bodies, as in a collision, contacts take the place of clusters, and
+    energies are in units of their kinetic energy at the start.
 
     The left half is empty if the ledger has no row, the right half if no position is finite.
     """
@@ -78,7 +84,8 @@ def run_figure(simulation: Simulation) -> Figure:
         if simulation.ledger.rows:
             _draw_history(figure, simulation)
         if scene.label.size:
-            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size)
+            letters = LETTERS[4 + has_temperatures(simulation.ledger) :]
+            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size, letters)
     return figure
 
 
@@ -137,32 +144,35 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    panels = [figure.add_axes((_LEFT[0], 0.1 * k, _LEFT[1] - _LEFT[0], 0.1)) for k in range(len(_HEIGHTS))]
+    heights = _HEIGHTS_WITH_TEMPERATURES if has_temperatures(ledger) else _HEIGHTS
+    panels = [figure.add_axes((_LEFT[0], 0.1 * k, _LEFT[1] - _LEFT[0], 0.1)) for k in range(len(heights))]
     (draw_contacts if has_few_bodies(ledger) else draw_clusters)(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
-    draw_balance(panels[3], ledger, time, unit)
+    if has_temperatures(ledger):
+        draw_temperatures(panels[3], ledger, time)
+    draw_balance(panels[-1], ledger, time, unit)
     draw_time(panels, time, ledger)
-    for name, axes in zip("abcd", panels, strict=True):
+    for name, axes in zip(LETTERS, panels, strict=False):
         axes.yaxis.set_label_coords(-0.155, 0.5)
         panel_letter(axes, name, -0.185)
-    _place_panels(figure, panels)
+    _place_panels(figure, panels, heights)
 
 
-def _place_panels(figure: Figure, panels: list[Axes]) -> None:
+def _place_panels(figure: Figure, panels: list[Axes], heights: Sequence[float]) -> None:
     """Place the panels one below the other, with space for the rows of their legends."""
     legends = [axes.get_legend() for axes in panels]
     rows = [0.0 if one is None else one.get_window_extent().height / figure.bbox.height for one in legends]
     gaps = [max(_GAP, row + 0.4 * _GAP) for row in rows]
-    height = (_TOP + _GAP - _BOTTOM - sum(gaps)) / sum(_HEIGHTS)
+    height = (_TOP + _GAP - _BOTTOM - sum(gaps)) / sum(heights)
     top = _TOP + _GAP
-    for axes, share, gap in zip(panels, _HEIGHTS, gaps, strict=True):
+    for axes, share, gap in zip(panels, heights, gaps, strict=True):
         top -= gap + share * height
         for one in axes.get_shared_x_axes().get_siblings(axes):  # with the axis on the right
             one.set_position((_LEFT[0], top, _LEFT[1] - _LEFT[0], share * height))
 
 
-def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
+def _draw_grains(figure: Figure, scene: Scene, lost: int, letters: str) -> None:
     """All grains in the box, and below it the largest clusters if grains are small; `lost` grains are not drawn."""
     full = (0.03, 0.85)
     window = view_window(scene, _pixels(full[1])[0] / _pixels(full[1])[1])
@@ -172,14 +182,14 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
     bottom, height = (full[0] + strip + 0.02, full[1] - strip - 0.02) if enlarge else full
     axes = _panel(figure, _RIGHT, bottom, height)
     draw_scene(axes, scene, _pixels(height))
-    panel_letter(axes, "e", 0.0)
+    panel_letter(axes, letters[0], 0.0)
     axes.text(
         0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=7.5, color=MUTED, va="bottom", ha="left"
     )
     if enlarge:
         axes = _panel(figure, _RIGHT, full[0], strip)
         draw_largest(axes, scene, _pixels(strip))
-        panel_letter(axes, "f", 0.0)
+        panel_letter(axes, letters[1], 0.0)
 
 
 def _caption(scene: Scene, lost: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
@@ -77,6 +78,9 @@ _STYLE = {
 _PREFIX = dict(
     zip(range(-24, 16, 3), ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"), strict=True)
 )
+_TAKES_PREFIX = re.compile(r"(?!kg\b|count\b)[^\W\d]+(?![\w^²³-])")
+"""Units whose prefix multiplies the whole unit, unlike that of m^2 or kg."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plot_style() -> AbstractContextManager[None]:
@@ -99,11 +103,15 @@ def si_prefix(largest: float, unit: str) -> tuple[float, str]:
     Returns
     -------
     tuple of (float, str)
-        Size of the prefixed unit in SI units, and its name; (1e-9, "nm") for 3e-7 m.
+        Size of the prefixed unit in SI units, and its name; (1e-9, "nm") for 3e-7 m. A unit to which no prefix can be
+        written has a power of ten: (1e-18, "10⁻¹⁸ m^2") for 3e-17 m^2.
     """
     if not (math.isfinite(largest) and largest > 0.0):
         return 1.0, unit
-    exponent = min(max(3 * math.floor(math.log10(largest) / 3 + 1e-9), min(_PREFIX)), max(_PREFIX))
+    exponent = 3 * math.floor(math.log10(largest) / 3 + 1e-9)
+    if not _TAKES_PREFIX.match(unit):
+        return float(f"1e{exponent}"), f"10{str(exponent).translate(_RAISED)} {unit}" if exponent else unit
+    exponent = min(max(exponent, min(_PREFIX)), max(_PREFIX))
     return float(f"1e{exponent}"), _PREFIX[exponent] + unit
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, shown
 from ..grains import Grains
-from ..schema import OWN, own_values
+from ..own_quantities import joined
 from ..units import MOST, in_unit, si
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def turned(body: Grains, rotation: Rotation) -> Grains:
         spin=spin,
         moment=moment,
         charge=body.charge,
-        own=own_values(body),
+        own=body.own,
         mass=body.mass,
     )
 
@@ -107,6 +107,8 @@ def encounter(
 
 def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities: Sequence[np.ndarray]) -> Grains:
     """Combine bodies into one set of grains, each shifted [m] and with a velocity [m/s] added."""
+    pair = ("target: it has", "projectile: it has")
+    called = pair if len(bodies) == 2 else [f"body {k}: it has" for k in range(len(bodies))]
 
     def all_of(name: str) -> np.ndarray:
         return np.concatenate([getattr(body, name) for body in bodies])
@@ -119,7 +121,7 @@ def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities:
         spin=all_of("spin"),
         moment=all_of("moment"),
         charge=all_of("charge"),
-        own={name: all_of(name) for name in OWN},
+        own=joined([body.own for body in bodies], called),
         mass=all_of("mass"),
     )
 

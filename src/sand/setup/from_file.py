@@ -11,7 +11,6 @@ import numpy as np
 from ..grains import Grains
 from ..io.run_folder import TRAJECTORY
 from ..material import Material
-from ..schema import own_values
 from .checks import check_body, largest_cluster
 from .from_frame import Start, StrainedContacts, from_frame
 
@@ -78,7 +77,7 @@ def largest_body(start: Start) -> tuple[Grains, StrainedContacts | None]:
         [grains.materials[k] for k in grains.material[chosen]],
         moment=grains.moment[chosen],
         charge=grains.charge[chosen],
-        own={name: values[chosen] for name, values in own_values(grains).items()},
+        own=grains.own.taken(chosen),
         mass=mass,
     )
     if contacts is None or not len(links):

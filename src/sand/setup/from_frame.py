@@ -12,7 +12,6 @@ from ..box import Box
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..grains import Grains
 from ..material import Material
-from ..schema import own_values
 from ..units import format_quantity
 
 APART = 1e-9
@@ -90,7 +89,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
         spin=frame.spin,
         moment=frame.moment,
         charge=frame.charge,
-        own=own_values(frame),
+        own=frame.own,
         mass=np.where(rounded, nominal, frame.mass),
     )
     moved = float(np.abs(frame.box.nearest(position - frame.position)).max())

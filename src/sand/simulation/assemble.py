@@ -201,6 +201,21 @@ def build_engine(
     return engine
 
 
+def fitting_forces(forces: tuple[Force, ...], stepping: Integrator) -> tuple[Force, ...]:
+    """The forces, with nearest images where "auto" would choose an Ewald sum whose rates a Taylor scheme needs."""
+    taylor = stepping.contact_stepping.far.startswith("taylor")
+    if not taylor or not any(isinstance(force, Contact) for force in forces):
+        return forces
+    return tuple(_of_nearest_images(force) for force in forces)
+
+
+def _of_nearest_images(force: Force) -> Force:
+    """The force, with nearest images instead of an automatic choice."""
+    given: Any = force
+    auto = isinstance(force, EwaldForce) and force.periodic == "auto"
+    return cast("Force", dataclasses.replace(given, periodic="nearest image")) if auto else force
+
+
 def _between_all(force: Force) -> Force:
     """The force between nearest images of all pairs of grains, without a cut-off, which would depend on time."""
     near: Any = force.of_nearest_images() if isinstance(force, EwaldForce) else force

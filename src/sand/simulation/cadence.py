@@ -15,6 +15,8 @@ SHORTEST_DURATION = 1e-21
 """Shortest accepted time span [s]; light travels less than a picometre in it."""
 MOST_PER_DECADE = 1000
 """Largest number of outputs per decade of time."""
+FRAMES = 200
+"""Frames of a run for which the user has chosen no cadence."""
 NEAR = 1e-6
 """Times nearer to an output than this fraction of the interval count as the output, as both are rounded."""
 _STEPS = re.compile(r"([+-]?[\d.eE+-]+)\s*steps?")
@@ -96,6 +98,37 @@ def read_cadence(value: Any, name: str, *, wall: bool = False) -> Cadence:
         per_decade = whole_number(number, f"outputs per decade in {name}", most=MOST_PER_DECADE)
         return Cadence("log", duration(match[2], f"first time in {name}"), per_decade)
     return Cadence("time", duration(value, name))
+
+
+def number_in(cadence: Cadence, span: float, steps: float) -> float:
+    """Number of outputs in a run of a length [s] and of so many steps, from time 0 on."""
+    if cadence.kind == "steps":
+        return steps // cadence.every
+    if cadence.kind == "time":
+        return span // cadence.every
+    return max(cadence.per_decade * math.log10(span / cadence.every) + 1.0, 0.0) // 1.0 if span > 0.0 else 0.0
+
+
+class Chosen(NamedTuple):
+    """The cadence of frames that was chosen for one run, where the user gives none."""
+
+    every: float  # [s]
+    end: float  # of the run for which it was chosen [s]
+
+
+def chosen_cadence(time: float, end: float, before: Chosen | None = None) -> Chosen | None:
+    """Choose a cadence for a run from a time to an end [s]: about `FRAMES` frames; None if the end is not a time.
+
+    The cadence chosen for an earlier run ends with that run.  It is kept if the run was interrupted and goes on to the
+    same end, so that an interruption changes no frame.
+    """
+    if before is not None and before.end == end:
+        return before
+    if not 0.0 < end - time < math.inf:
+        return None
+    # a whole number of them from time 0 to the end, so that the last is not shorter; the factor allows for rounding
+    number = math.ceil(FRAMES * end / (end - time) * (1.0 - 1e-9))
+    return Chosen(max(end / number, SHORTEST_DURATION), end)
 
 
 class Schedule:

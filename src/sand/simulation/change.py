@@ -10,12 +10,13 @@ import numpy as np
 
 from ..box import Box, as_box
 from ..contact.model import Contact
-from ..errors import BadInput, ErrorCollector, did_you_mean, shown
+from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force, LongRangeForce
 from ..forces.gas.model import Gas
 from ..grains import Grains
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
+from ..own_quantities import own_values
 from ..schema import BY_NAME, CHANGEABLE, stored
 from ..state.arrays import SAVED_LONG_RANGE
 from ..state.state import (
@@ -67,6 +68,8 @@ class Change:
         (N, 3) [m/s, rad/s, A m²] in the laboratory frame, to be changed in place or assigned.
     charge : ndarray
         (N,) [C].
+    own : dict of ndarray
+        Own quantities (N,) by name, in their units of SI, also as attributes: `change.temperature`.
     forces : tuple[Force, ...]
         The forces; `replace` exchanges one, and one that is left out acts no longer.
     box : Box
@@ -81,10 +84,11 @@ class Change:
     spin: np.ndarray
     moment: np.ndarray
     charge: np.ndarray
+    own: dict[str, Any]
     forces: tuple[Force, ...]
     box: Box
     grains: Grains
-    _before: tuple[Grains, Box]
+    _before: tuple[Grains, Box, tuple[Force, ...]]
     _kept: np.ndarray  # indices before of the grains that stay
     _pair: np.ndarray  # contacts (C, 2) before
     _next_id: int
@@ -92,14 +96,15 @@ class Change:
     _is_scaled: bool
 
     def __init__(self, grains: Grains, forces: Sequence[Force], box: Box, pair: np.ndarray, next_id: int):
-        own: dict[str, Any] = {
+        fixed: dict[str, Any] = {
             "grains": grains.copy(),
-            "_before": (grains, box),
+            "_before": (grains, box, tuple(forces)),
             "_kept": np.arange(len(grains)),
             "_pair": pair,
         }
-        own |= {"_next_id": next_id, "_errors": ErrorCollector(), "_is_scaled": False}
-        for name, value in own.items():
+        fixed |= {"_next_id": next_id, "_errors": ErrorCollector(), "_is_scaled": False}
+        fixed["own"] = {name: values.copy() for name, values in grains.own.items()}
+        for name, value in fixed.items():
             object.__setattr__(self, name, value)
         for name in QUANTITIES:
             setattr(self, name, getattr(grains, name).copy())
@@ -107,9 +112,20 @@ class Change:
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Assign a quantity, the forces or the box.  Raises BadInput for another name or an invalid box."""
+        if name in self.grains.own_units:
+            self.own[name] = value
+            return
         if name not in ASSIGNED:
-            raise BadInput(f"a change has no '{name}' to assign; {did_you_mean(name, ASSIGNED)}")
+            known = (*ASSIGNED, *self.grains.own_units)
+            raise BadInput(f"a change has no '{name}' to assign; {did_you_mean(name, known)}")
         object.__setattr__(self, name, as_box(value) if name == "box" else value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Values of an own quantity."""
+        own = self.__dict__.get("own", {})
+        if name not in own:
+            raise NoSuchAttribute(f"a change has no '{name}'; {did_you_mean(name, (*ASSIGNED, 'grains', 'id', *own))}")
+        return own[name]
 
     @property
     def id(self) -> np.ndarray:
@@ -121,6 +137,14 @@ class Change:
         """Whether grains are added or removed, or the box is another one."""
         same = np.array_equal(self.grains.id, self._before[0].id)
         return not same or self._is_scaled or self.box != self._before[1]
+
+    @property
+    def is_of_own(self) -> bool:
+        """Whether nothing but own quantities can be different, so that the motion is as without the change."""
+        before, _, forces = self._before
+        same = all(np.array_equal(np.asarray(getattr(self, name)), getattr(before, name)) for name in QUANTITIES)
+        kept = len(self.forces) == len(forces) and all(a is b for a, b in zip(self.forces, forces, strict=True))
+        return bool(before.own_units) and same and kept and not self.regroups and not self._errors.problems
 
     def remove(self, which: Any) -> None:
         """Remove grains, with their contacts.
@@ -153,6 +177,7 @@ class Change:
             self._errors.problems.append(f"remove: all {count} grains would be removed; at least one must stay")
             return
         rows = np.flatnonzero(stays)
+        self._read_own()
         self._set_grains(subset(self.grains, rows), lambda values: values[rows] if len(values) == count else values)
         object.__setattr__(self, "_kept", self._kept[stays[: len(self._kept)]])
 
@@ -176,9 +201,15 @@ class Change:
             self._errors.problems.append(f"add: a simulation can have at most {MOST_ID} grains in all")
             return
         identity = np.arange(self._next_id, self._next_id + len(grains), dtype=np.uint32)
+        self._read_own()
+        together = self._errors.take(joined, self.grains, grains, identity)
+        if together is None:
+            return
         object.__setattr__(self, "_next_id", self._next_id + len(grains))
         values = {name: np.asarray(getattr(grains, name)) for name in QUANTITIES}
-        object.__setattr__(self, "grains", joined(self.grains, grains, identity))
+        object.__setattr__(self, "grains", together)
+        for name, more in grains.own.items():
+            self.own[name] = np.concatenate([self.own[name], more])
         for name, more in values.items():
             present = np.asarray(getattr(self, name))
             fits = present.ndim == more.ndim and present.shape[1:] == more.shape[1:]
@@ -226,6 +257,24 @@ class Change:
         object.__setattr__(self, "grains", grains)
         for name in QUANTITIES:
             setattr(self, name, rows(np.atleast_1d(np.asarray(getattr(self, name)))))
+        for name in self.grains.own_units:
+            self.own[name] = rows(self.own[name])
+
+    def _read_own(self) -> None:
+        """Convert the own quantities to arrays (N,) in their units; those that cannot be used become as before."""
+        units = self.grains.own_units
+        for name in [name for name in self.own if name not in units]:
+            self._errors.problems.append(
+                f"own: the simulation has no '{name}'; a quantity is given at the start: "
+                f"sand.Grains(…, own={{'{name}': …}})"
+            )
+            del self.own[name]
+        for name, unit in units.items():
+            present = self.grains.own[name].copy()
+            if name not in self.own:
+                self._errors.problems.append(f"own: '{name}' cannot be left out of a simulation; set it to 0")
+            given = self.own.get(name, present)
+            self.own[name] = self._errors.take(own_values, name, unit, given, len(present), instead=present)
 
     def _pairs(self) -> np.ndarray:
         """Contacts (C, 2) of the grains that stay, in the numbers of the change."""
@@ -270,9 +319,12 @@ class Change:
                 for i in np.flatnonzero(changed):
                     turned = turned_back(tuple(grains.arrays.orientation[:, i]), tuple(values[:, i]))
                     grains.arrays.body_moment[:, i] = turned
+        self._read_own()
+        errors.problems += self._errors.problems
+        grains.arrays.own[...] = np.array([self.own[name] for name in grains.own_units]).reshape(-1, len(grains))
         if self.regroups:
             errors.problems += outside_box(grains, self.box)
-            before, box = self._before
+            before, box, _ = self._before
             errors.take(refuse_cut_contacts, subset(before, self._kept), box, grains, self.box, self._pairs())
         errors.done()
         return grains
@@ -344,7 +396,7 @@ def changed_engine(
     regroups = change.regroups
     cutoff = None if change.box != state.box or state.cutoff[CUT_RADIUS] == 0.0 else state.cutoff.copy()
     arrays = {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
-    same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material])
+    same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
     parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed)
     new = build_engine(*parts, fresh=False, cutoff=cutoff, driven=driven, walls=walls)
     without = [name for name in new.columns() if name not in columns]

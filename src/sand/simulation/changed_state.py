@@ -10,6 +10,7 @@ from ..analysis.clusters import cluster_labels, unwrapped
 from ..box import Box
 from ..errors import BadInput, first_problems
 from ..grains import GrainArrays, Grains
+from ..own_quantities import joined as joined_own
 from ..state.arrays import SAVED_LONG_RANGE
 from ..state.state import CONTACT_STEP, CONTACTS, CUT_FIRST, CUT_SECOND, GRAIN1, GRAIN2, PAIRS, State
 
@@ -27,11 +28,16 @@ def subset(grains: Grains, index: np.ndarray) -> Grains:
 
 
 def joined(first: Grains, second: Grains, identity: np.ndarray) -> Grains:
-    """All grains of two sets; those of the second set have no loads and these identities (uint32)."""
+    """All grains of two sets; those of the second set have no loads and these identities (uint32).
+
+    Raises BadInput if their own quantities differ.
+    """
     materials = tuple(dict.fromkeys((*first.materials, *second.materials)))
     number = np.array([materials.index(own) for own in second.materials], np.uint32)
+    joined_own([first.own, second.own], ["add: the grains of the simulation have", "add: the grains added have"])
+    own = np.array([second.own[name] for name in first.own_units]).reshape(-1, len(second))
     nothing = {name: np.zeros_like(getattr(second.arrays, name)) for name in ("force", "torque", "field")}
-    more = second.arrays._replace(material=number[second.arrays.material], id=identity, **nothing)
+    more = second.arrays._replace(material=number[second.arrays.material], id=identity, own=own, **nothing)
     other = copy.copy(first)
     other.arrays = GrainArrays(*(np.concatenate(both, axis=-1) for both in zip(first.arrays, more, strict=True)))
     object.__setattr__(other, "materials", materials)

@@ -10,10 +10,13 @@ from ..box import Box
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
+from ..forces.pair.inverse_square import Charges
+from ..forces.pair.screened_charges import ScreenedCharges
 from ..grains import Grains
 from ..units import format_quantity
 from .limits import limit_warnings
 from .solid_limits import fast_settling, grain_warnings
+from .truncation import truncation_warnings
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
@@ -45,6 +48,12 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
     """
     problems = [*outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
     warnings: list[str] = []
+    names = {force.name for force in forces}
+    if {Charges.name, ScreenedCharges.name} <= names:
+        problems.append(
+            "forces: charges (sand.Charges) and screened_charges (sand.ScreenedCharges) both act between the charges "
+            "of the grains, which would count twice; leave one of them out"
+        )
     for force in forces:
         try:
             warnings += force.check(grains, box)
@@ -63,7 +72,8 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
 
 def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
     """Warnings about limits of the model, very large grains, and overlaps without a contact law."""
-    warnings = [*limit_warnings(grains, forces, box), *grain_warnings(grains, forces).values()]
+    warnings = [*limit_warnings(grains, forces, box), *truncation_warnings(grains, forces, box)]
+    warnings += grain_warnings(grains, forces).values()
     contact = any(isinstance(force, Contact) for force in forces)
     warnings += [text for force in forces if isinstance(force, Contact) for text in fast_settling(grains, force)]
     largest = int(np.argmax(grains.radius))

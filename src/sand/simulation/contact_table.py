@@ -55,16 +55,17 @@ class Columns(dict[str, np.ndarray]):
 class ContactTable(Columns):
     """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
 
-    Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.
+    Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.  `table` is the table of the
+    stages with the arrays of the state.
     """
 
-    def __init__(self, state: State, law: ContactLaw, follow: bool):
+    def __init__(self, state: State, law: ContactLaw, table: Any):
         used = int(state.count[CONTACTS])
         contacts = state.contacts
         scalars = len(CONTACT_ROWS)
         names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
         rows = np.zeros((scalars + 3 * len(names), used))
-        contacts_stage(law)(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
+        contacts_stage(law).run(table, (rows,))
         self["pair"], self["formed"] = contacts.pair[:, :used].T.copy(), contacts.formed[:used].copy()
         self.update({name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)})
         vectors = rows[scalars:].reshape(len(names), 3, used)

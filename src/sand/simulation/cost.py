@@ -1,14 +1,15 @@
 """Expected cost of a run: length and number of steps, wall time and memory.
 
-Runs record what they cost in a table beside the cache of compiled code, by the kinds of forces and the number of
-grains; a run of the same kinds is expected to cost the same per grain and step. Kinds of which no run has been measured
-on this machine have a rough estimate.
+The number of steps follows from the state at the start and the kinetics of touches (`expected_steps`), never from
+earlier runs, which may have been in another state.  A step has a rough cost by its kind, and by the numbers of grains,
+contacts and pairs.  Runs record their speed in units of this rough cost in a table beside the cache of compiled code.
 """
 
 from __future__ import annotations
 
 import math
-import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,25 +17,37 @@ import numpy as np
 
 from ..compiler.cache import read_record, write_record
 from ..compiler.jit import cache_folder
-from ..compiler.progress import compilation_seconds
-from ..contact.law import contact_constants
 from ..contact.model import Contact
+from ..forces.pair.ewald_force import EwaldForce
 from ..integrate.rigid_clusters import RigidClusters
-from ..integrate.step_control import FLIGHT_FRACTION, MAX_SPIN_ANGLE
 from ..integrate.task_queue import uses_task_queue
 from ..neighbours.settings import share_within
+from ..state.state import CONTACTS
 from ..threads import threads
+from .cadence import FRAMES, number_in, read_cadence
+from .expected_steps import expected_steps
 
-SHORTEST = 1.0
-"""Least wall time [s] of steps that is recorded; less than a tenth of what was recorded does not replace it."""
-PER_STEP, PER_FORCE, PER_PAIR = 100e-9, 100e-9, 2e-9
-"""Rough wall times [s] per grain and step: of contacts and motion, of each long-range force, and of each pair of it."""
-MOST_PAIRS = 300
-"""Pairs per grain, at most, in the rough estimate: with more, forces are cut off or are summed once in many steps."""
+LEAST_STEPS, LEAST_SECONDS, REPLACES = 500, 0.1, 0.1
+"""Fewest steps, and least wall time [s], of a measured speed; it replaces one that was measured for ten times its time
+or less."""
+PER_STEP, PER_GRAIN, PER_CONTACT = 1e-6, 15e-9, 60e-9
+"""Rough wall times [s] of a step: of each step, for each grain, and for each contact."""
+PER_CYCLE_STEP, PER_CYCLE_GRAIN, CYCLE = 2.5e-6, 100e-9, 6.0
+"""Wall times [s] that r-RESPA adds to a step with contacts, and steps in which each long-range force is summed once."""
+PER_PAIR, PER_EWALD_PAIR, PER_WAVE = 2e-9, 5e-9, 3.5e-9
+"""Wall times [s] of a long-range sum for each grain and pair, and for each grain and wave vector."""
+PER_BODY_STEP, PER_AWAKE_STEP = 10e-6, 3e-6
+"""Wall times [s] of a step of bodies, and of a contact step of awake clusters."""
+PER_OUTPUT, PER_OUTPUT_GRAIN = 0.5e-3, 2e-6
+"""Wall times [s] of a frame and its row, and of each grain in it."""
+START, FIGURE = 1.0, 1.5
+"""Wall times [s] of the start of a run, with imports and compiled code from the disk, and of the figure at its end."""
 PROCESS_BYTES = 3.5e8
 """Memory of Python, libraries, compiled code and the figure, measured on Linux."""
 COPIES = 3
 """Copies of the arrays of a state: the present state, one at the time of an output, and what is written."""
+MODES = ("free", "contact", "bodies", "awake")
+"""Kinds of steps: without and with contacts, of bodies, and contact steps of awake clusters within these."""
 
 Simulation = Any
 """`sand.Simulation`, which imports this module."""
@@ -44,10 +57,13 @@ class Cost(NamedTuple):
     """Expected cost of a run; None where the end of the run does not determine it."""
 
     step: float  # mean step [s]
-    steps: float | None
-    seconds: float | None  # wall time of all steps and output, without compilation [s]
+    steps: float | None  # of grains, or of bodies
+    contact_steps: float | None  # of awake clusters, within steps of bodies; None without rigid clusters
+    seconds: float | None  # wall time, without compilation [s]
+    parts: dict[str, float]  # of it: stepping, output, start and figure [s]
     memory: float  # [bytes]
-    measured: str  # the run of this machine from which the cost is known; "" for a rough estimate
+    measured: str  # the runs of this machine from which the speed is known; "" for a rough estimate
+    bound: str  # "at most" where the run may need less
 
 
 def kind_of(simulation: Simulation) -> str:
@@ -63,65 +79,89 @@ def _name(force: Any, simulation: Simulation) -> str:
     words = [force.name]
     if isinstance(force, Contact):
         words += [force.law, *([] if force.damping == "none" else ["damped"])]
-    elif getattr(force, "periodic", "") == "ewald" and not simulation.box.is_open:
+    elif isinstance(force, EwaldForce) and force.uses_ewald(simulation.start, simulation.box):
         words.append("ewald")
     return " ".join(words)
 
 
-def shortest_step(simulation: Simulation) -> float:
-    """Step [s] while there are contacts, 2π/ω_max over the steps per period; without contacts that of free flight.
-
-    With rigid clusters, the longest step of bodies while a cluster is awake.
-    """
-    engine, grains = simulation._engine, simulation.start
-    criteria, verlet = engine.parameters.criteria, simulation.stepping.contact_stepping
-    if criteria.fixed > 0.0:
-        return float(criteria.fixed)
-    if isinstance(simulation.stepping, RigidClusters):  # steps of bodies; in the main job they are half as long
-        return float(engine.parameters.flight_limits.longest_awake)
-    contact = next((force for force in simulation.forces if isinstance(force, Contact)), None)
-    if contact is not None and len(grains) > 1:
-        smallest = [
-            min(np.flatnonzero(grains.material == k), key=lambda i: float(grains.radius[i]))
-            for k in range(len(grains.materials))
-        ]
-        formula, fastest = contact_constants(contact.contact_law), 0.0
-        for i in smallest:
-            for j in smallest:
-                pairing = contact.pairing(*(grains.materials[grains.material[k]] for k in (i, j)))
-                sizes = (float(grains.radius[i]), float(grains.radius[j]), float(grains.mass[i]), float(grains.mass[j]))
-                fastest = max(fastest, formula(pairing, *sizes).max_squared_frequency)
-        if fastest > 0.0:
-            return 2.0 * math.pi / math.sqrt(fastest) / float(verlet.steps_per_period)
-    speed, spin = (np.linalg.norm(vectors, axis=1).max() for vectors in (grains.velocity, grains.spin))
-    limits = [criteria.longest, *([FLIGHT_FRACTION * criteria.pair_gap / speed] if speed else [])]
-    return float(min([*limits, *([MAX_SPIN_ANGLE / spin] if spin else [])]))
-
-
-def expected_cost(simulation: Simulation, end: float, last_step: float) -> Cost:
+def expected_cost(simulation: Simulation, end: float, last_step: float, condition: str | None = None) -> Cost:
     """Expected cost of a run of a simulation that has not begun.
 
     Parameters
     ----------
     end, last_step : float
         Planned end: time [s] and step, infinite where not set.
+    condition : str or None, optional
+        Condition that may end it earlier.
     """
-    count, step = len(simulation.start), shortest_step(simulation)
-    pairs = _pairs_per_grain(simulation)
-    long_range = len(simulation._engine.long_range)
-    rate, ratio, source = PER_STEP + long_range * (PER_FORCE + PER_PAIR * min(pairs, MOST_PAIRS)), 1.0, ""
-    known = _read().get(kind_of(simulation), {})
+    memory = PROCESS_BYTES + _bytes(simulation, _pairs_per_grain(simulation))
+    if math.isinf(end) and math.isinf(last_step):
+        step = expected_steps(simulation, math.inf, 1.0)
+        return Cost(step.span, None, None, None, {}, memory, "", "")
+    found = expected_steps(simulation, end, last_step, may_end_earlier=condition is not None)
+    speeds, measured = _speeds(kind_of(simulation))
+    grains, sums = len(simulation.start), long_range_seconds(simulation)
+    stepping = math.fsum(
+        getattr(found, mode) * step_seconds(simulation, mode, found.contacts, sums) * speeds[mode] for mode in MODES
+    )
+    span = min(end, found.span)
+    output = outputs(simulation, span, found.total) * (PER_OUTPUT + PER_OUTPUT_GRAIN * grains) * speeds["output"]
+    parts = {"stepping": stepping, "output": output, "start": (START + FIGURE) * speeds["output"]}
+    rigid = isinstance(simulation.stepping, RigidClusters)
+    return Cost(
+        span / found.total,
+        found.total,
+        found.awake if rigid else None,
+        math.fsum(parts.values()),
+        parts,
+        memory,
+        measured,
+        found.bound,
+    )
+
+
+def step_seconds(simulation: Simulation, mode: str, contacts: float, sums: float) -> float:
+    """Rough wall time [s] of a step of a kind, with a number of contacts; `sums` as of `long_range_seconds`."""
+    grains, respa = len(simulation.start), simulation._engine.parameters.respa
+    if mode == "awake":
+        return PER_AWAKE_STEP
+    if mode == "bodies":
+        return PER_BODY_STEP + PER_GRAIN * grains + sums
+    own = PER_STEP + PER_GRAIN * grains + PER_CONTACT * contacts
+    if mode == "free" or not sums or respa.max_steps == 1:
+        return own + sums
+    return own + PER_CYCLE_STEP + PER_CYCLE_GRAIN * grains + sums / min(CYCLE, respa.max_steps)
+
+
+def long_range_seconds(simulation: Simulation) -> float:
+    """Rough wall time [s] of one sum of all long-range forces on all grains."""
+    sums = [numbers for _, _, numbers in simulation._engine.long_range]
+    pairs = _pairs_per_grain(simulation) if sums else 0.0
+    waves = [getattr(numbers, "waves", None) for numbers in sums]
+    each = [PER_PAIR * pairs if q is None else PER_EWALD_PAIR * pairs + PER_WAVE * q.weight.size for q in waves]
+    return len(simulation.start) * math.fsum(each)
+
+
+def outputs(simulation: Simulation, span: float, steps: float) -> float:
+    """Number of frames and further rows of a run of a length [s] and of so many steps."""
+    settings = [simulation.frame_every, simulation.row_every]
+    if settings[0] is None and span > 0.0:
+        settings[0] = span / FRAMES
+    return 2.0 + math.fsum(
+        number_in(read_cadence(setting, "frame_every"), span, steps) for setting in settings if setting is not None
+    )
+
+
+def _speeds(kind: str) -> tuple[dict[str, float], str]:
+    """Wall times in units of the rough ones, by kind of step, and from which runs they are known."""
+    table = _read()
+    known = table.get(kind, {})
+    every = [one["ratio"] for runs in table.values() for one in runs.values()]
+    machine = math.exp(math.fsum(map(math.log, every)) / len(every)) if every else 1.0
+    speeds = {mode: known[mode]["ratio"] if mode in known else machine for mode in MODES} | {"output": machine}
     if known:
-        near = min(known, key=lambda grains: abs(math.log(int(grains) / count)))
-        rate, ratio = known[near]["ns_per_grain_step"] * 1e-9, known[near]["step_ratio"]
-        if "all pairs" in kind_of(simulation):  # the work per grain grows with N
-            rate *= max(count / int(near), 1.0)
-        source = f"a run of {near} grains on this machine"
-    steps: float | None = min(end / (ratio * step), last_step)
-    if steps is None or not math.isfinite(steps):
-        steps = None
-    seconds = None if steps is None else steps * count * rate
-    return Cost(ratio * step, steps, seconds, PROCESS_BYTES + _bytes(simulation, pairs), source)
+        return speeds, "as in a run of this kind on this machine"
+    return speeds, "as in other runs on this machine" if every else ""
 
 
 def _pairs_per_grain(simulation: Simulation) -> float:
@@ -140,47 +180,79 @@ def _bytes(simulation: Simulation, pairs: float) -> float:
     return COPIES * float(sum(array.nbytes for group in groups for array in group)) + listed
 
 
-class RunTimer:
-    """Measures the steps of one call of `run`, from its creation to `record`."""
+class StepTimer:
+    """Measures the steps of one call of `run`: not output, compilation or loading of code, nor the first call.
+
+    The first call of the driver fills tables and starts threads.  Steps with and without contacts are told apart, as
+    are those of bodies and of awake clusters: the speed of one kind says nothing about another.
+    """
 
     def __init__(self, simulation: Simulation):
-        self._simulation, self._first = simulation, (simulation.steps, simulation.time)
-        self._began, self._compiled = time.monotonic(), compilation_seconds()
+        self._simulation, self._calls = simulation, 0
+        self._rigid = isinstance(simulation.stepping, RigidClusters)
+        self._long_range = long_range_seconds(simulation)
+        # of each kind: number of steps, their wall time [s], and the rough estimate of that [s]
+        self._sums = {mode: np.zeros(3) for mode in MODES}
+
+    @contextmanager
+    def steps(self) -> Iterator[None]:
+        """Measure a block in which the engine takes steps."""
+        before = self._now()
+        with self._simulation._clock.measure("stepping"):
+            yield
+        if self._calls:
+            self._add(*before, *self._now())
+        self._calls += 1
+
+    def _now(self) -> tuple[Any, int]:
+        """Steps, wall time [s], contact steps of awake clusters and their wall time [s]; number of contacts."""
+        engine = self._simulation._engine
+        counted = (engine.steps, self._simulation._clock.stepping, *engine.awake_work)
+        return np.array(counted), int(engine._state.count[CONTACTS])
+
+    def _add(self, before: Any, contacts: int, after: Any, contacts_after: int) -> None:
+        steps, seconds, awake_steps, awake = after - before
+        if self._rigid:
+            found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
+        elif (contacts > 0) != (contacts_after > 0):
+            return
+        else:
+            found = {"contact" if contacts else "free": (steps, seconds)}
+        for mode, (number, spent) in found.items():
+            rough = step_seconds(self._simulation, mode, contacts, self._long_range)
+            self._sums[mode] += number, spent, number * rough
 
     def record(self) -> None:
-        """Add the measured cost to the table, if the run was long enough and the table can be written."""
-        one = self._simulation
-        seconds = time.monotonic() - self._began - (compilation_seconds() - self._compiled)
-        steps, span, grains = one.steps - self._first[0], one.time - self._first[1], len(one.start)
-        if seconds < SHORTEST or steps <= 0 or span <= 0.0:
+        """Add the measured speeds to the table, if there were enough steps and the table can be written."""
+        found = {
+            mode: {"ratio": spent / rough, "seconds": spent}
+            for mode, (number, spent, rough) in ((mode, sums.tolist()) for mode, sums in self._sums.items())
+            if number >= LEAST_STEPS and spent >= LEAST_SECONDS
+        }
+        if not found:
             return
         table = _read()
-        measured = table.setdefault(kind_of(one), {})
-        if seconds < 0.1 * measured.get(str(grains), {}).get("seconds", 0.0):
-            return
-        measured[str(grains)] = {
-            "ns_per_grain_step": 1e9 * seconds / (steps * grains),
-            "step_ratio": span / steps / shortest_step(one),
-            "seconds": seconds,
+        known = table.setdefault(kind_of(self._simulation), {})
+        known |= {
+            mode: one for mode, one in found.items() if one["seconds"] > REPLACES * known.get(mode, one)["seconds"]
         }
         write_record(_path(), table)
 
 
 def _path() -> Path:
-    return cache_folder().parent / "run-costs.json"
+    return cache_folder().parent / "step-speeds.json"
 
 
 def _read() -> dict[str, dict[str, dict[str, float]]]:
-    """The table; an unreadable or damaged one counts as empty."""
+    """The table, by kind of simulation and kind of step; an unreadable or damaged one counts as empty."""
     try:
-        table = read_record(_path())
-        return {
-            str(kind): {
-                str(int(grains)): {name: float(one[name]) for name in ("ns_per_grain_step", "step_ratio", "seconds")}
-                for grains, one in found.items()
-                if int(grains) > 0 and min(one["ns_per_grain_step"], one["step_ratio"]) > 0.0
-            }
-            for kind, found in table.items()
+        table = {
+            str(kind): {mode: {key: float(one[key]) for key in ("ratio", "seconds")} for mode, one in found.items()}
+            for kind, found in read_record(_path()).items()
         }
     except (ValueError, TypeError, KeyError, AttributeError):
         return {}
+    whole = all(
+        mode in MODES and 0.0 < one["ratio"] < math.inf for runs in table.values() for mode, one in runs.items()
+    )
+    return table if whole else {}

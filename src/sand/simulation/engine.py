@@ -15,6 +15,7 @@ import numpy as np
 from ..compiler.program import Program
 from ..compiler.stage import Stage
 from ..compiler.table import Table
+from ..contact.damping import THERMAL
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
@@ -29,8 +30,9 @@ from ..integrate.driven import HEAVY
 from ..integrate.driver import advance
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
-from ..integrate.program import Components, build_program
+from ..integrate.program import Components, build_program, variant_of
 from ..integrate.respa import clear_long_range_loads
+from ..integrate.stages import NO_STEP, bath_wall_work, bath_work
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
     SHARED,
@@ -85,6 +87,12 @@ ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
 """The arrays of a state that stages take, besides those of the grains."""
 
 
+def _set_arrays(table: Table, present: tuple) -> None:
+    """Give a table the arrays of a state."""
+    for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
+        table.set(name, value)
+
+
 @dataclass
 class Engine:
     """The state of a simulation and the compiled driver that advances it.
@@ -130,6 +138,8 @@ class Engine:
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
     _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
+    _copy_table: Table = field(init=False)  # the table of the copy that is stepped to times of output
+    _copy_present: tuple = field(init=False, default=(None,))  # arrays of the state that it has
     _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
@@ -140,6 +150,7 @@ class Engine:
         for name, value in self.parameters._asdict().items():
             self._table.set(name, value)
         self._table.set("scratch", np.zeros(SCRATCH))
+        self._copy_table = Table(PARTS)
         if uses_task_queue(len(self._state.grains)):
             self._workers = WorkerThreads(take_blocks)
 
@@ -213,7 +224,11 @@ class Engine:
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
+        self._copy_present = (None,)  # frees the arrays of the copy before
+        self._copy_table.follow(self._current_table(regular))
         self._state = regular.copy()
+        self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
+        _set_arrays(self._copy_table, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
         try:
             stop = self._drive(time, regular.steps + most_steps, shorten=True)
@@ -251,6 +266,11 @@ class Engine:
     def clock(self) -> np.ndarray:
         """Times and extremes of the regular state, `State.clock`."""
         return self._state.clock
+
+    @property
+    def awake_work(self) -> tuple[int, float]:
+        """Contact steps within steps of bodies, and the wall time [s] of all work on awake clusters."""
+        return 0, 0.0
 
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
@@ -428,9 +448,10 @@ class Engine:
     def _current_table(self, state: State) -> Table:
         """The table with the present arrays of the state."""
         present = (state.grains.arrays, *ARRAYS(state))
+        if all(map(operator.is_, present, self._copy_present)):
+            return self._copy_table
         if not all(map(operator.is_, present, self._present)):
-            for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
-                self._table.set(name, value)
+            _set_arrays(self._table, present)
             self._present = present
         return self._table
 
@@ -484,7 +505,8 @@ class Engine:
         try:
             if self._program is None:
                 self._program = build_program(self._components, self.parameters, table)
-                table.set("program", self._program)
+                for each in (self._table, table):
+                    each.set("program", self._program)
             if self._workers is not None and benefits_from_workers(
                 len(self._components.pair_forces), int(state.count[CONTACTS])
             ):
@@ -511,10 +533,34 @@ class Engine:
         with self._held():
             return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
 
+    def losses(self) -> np.ndarray:
+        """Losses [J] up to the time of `state`, in the order of `state.state.LOST`.
+
+        With a bath they include the work in the half kick at the end of the last step (`contact.bath_work`).
+        """
+        state = self.state
+        if variant_of(self.parameters.settings) != THERMAL:
+            return state.lost
+        arrays = state.lost, state.contacts.lost, state.wall_contacts.lost
+        kept = [array.copy() for array in arrays]
+        self._record_bath_work(state)
+        found = state.lost.copy()
+        for array, values in zip(arrays, kept, strict=True):
+            array[...] = values
+        return found
+
+    def _record_bath_work(self, state: State) -> None:
+        """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
+        walls = self._components.walls
+        with self._held(state):
+            bath_work.run(self._current_table(state), (), NO_STEP)
+            if walls is not None:
+                bath_wall_work.run(self._current_table(state), walls, NO_STEP)
+
     @contextlib.contextmanager
-    def _held(self) -> Iterator[None]:
+    def _held(self, state: State | None = None) -> Iterator[None]:
         """While constants of contacts are computed, driven grains have a mass that counts as infinite."""
-        driven, arrays = self._components.driven, self._state.grains.arrays
+        driven, arrays = self._components.driven, (state or self._state).grains.arrays
         index: Any = [] if driven is None else driven.grain
         for quantity in (arrays.mass, arrays.inertia):
             quantity[index] *= HEAVY
@@ -546,6 +592,8 @@ class Engine:
         """As `refresh_loads`, in the present order of the arrays."""
         state = self._state
         steps, sums = state.steps, int(state.count[LONG_RANGE_SUMS])
+        if variant_of(self.parameters.settings) == THERMAL:
+            self._record_bath_work(state)  # the loads that follow have no noise
         state.count[STAGE] = 1
         state.clock[STEP] = state.clock[CYCLE] = state.clock[LEFT] = 0.0
         self._drive(-math.inf, steps + 1)

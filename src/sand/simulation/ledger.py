@@ -8,13 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
-from ..analysis.internal_motion import internal_kinetic_energy
+from ..analysis.body_motion import body_temperatures, motion_of
+from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
 from ..errors import BadInput
 from ..grains import Grains
+from ..io.ledger_table import TEMPERATURES
 from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from .walls import wall_row
 
@@ -29,6 +30,8 @@ INTERNAL = "internal"
 """Column of the kinetic energy of clusters beyond their rigid motion; a part of the kinetic energies."""
 CORRECTION = "angular_momentum_corrected"
 """Column of the corrections that keep the angular momentum constant over r-RESPA cycles, their magnitudes summed."""
+OF_MOTION = (*MOMENTA, CORRECTION, INTERNAL, *TEMPERATURES)
+"""Columns of the motion that are not part of the total energy."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 LOST_WALLS = "lost_walls"
 """Column of the energy that moving walls took from grains and contacts; only with walls."""
@@ -39,12 +42,21 @@ WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
 
 
 def log_row(
-    state: State, of_contacts: Sequence[float], forces: dict[str, float], walls: Sequence[str] = ()
+    state: State,
+    lost: Sequence[float],
+    labels: np.ndarray,
+    of_contacts: Sequence[float],
+    forces: dict[str, float],
+    walls: Sequence[str] = (),
 ) -> dict[str, float]:
-    """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
+    """Compute one row of the ledger: energies, losses [J], momenta (SI), temperatures of bodies [K], counts.
 
     Parameters
     ----------
+    lost : Sequence[float]
+        Losses [J] up to this time, see `Engine.losses`.
+    labels : ndarray
+        Cluster of each grain (N,).
     of_contacts : Sequence[float]
         Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
     forces : dict[str, float]
@@ -55,25 +67,29 @@ def log_row(
     contacts = int(state.count[CONTACTS])
     pairs = state.contacts.pair[:, :contacts].T
     energies = [*map(math.fsum, kinetic_energies(state.grains)), *of_contacts]
-    counts = count_row(state)
+    counts = count_row(state, labels)
     row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
-    row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
+    row |= dict(zip(LOSSES, lost, strict=True))
     moved = {LOST_WALLS: -math.fsum(state.walls.work)} if walls else {}
     row |= moved
-    row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist(), *moved.values()])
+    row["total"] = math.fsum([*energies, *forces.values(), *lost, *moved.values()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
-    row |= {
-        CORRECTION: float(state.clock[CORRECTED]),
-        INTERNAL: math.fsum(internal_kinetic_energy(state.grains, pairs, state.box)[0]),
-    }
+    bodies = motion_of(state.grains, pairs, state.box, labels)
+    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal)}
+    row |= dict(zip(TEMPERATURES, body_temperatures(bodies), strict=True))
     return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
-def count_row(state: State) -> dict[str, float]:
-    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters."""
+def labels_in(state: State) -> np.ndarray:
+    """Cluster of each grain (N,)."""
+    return labels_of(len(state.grains), state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64))
+
+
+def count_row(state: State, labels: np.ndarray) -> dict[str, float]:
+    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, given their labels."""
     contacts = int(state.count[CONTACTS])
-    labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
+    sizes = np.bincount(labels)
     at_rest = state.at_rest
     return {
         "step": state.steps,
@@ -82,9 +98,9 @@ def count_row(state: State) -> dict[str, float]:
         "made": int(state.count[MADE]),
         "moved": int(state.count[SLIPPED]),
         "broken": int(state.count[BROKEN]),
-        "clusters": int(labels.max()) + 1,
-        "mean_cluster_size": mean_cluster_size(labels),
-        "largest_cluster": int(cluster_sizes(labels).max()),
+        "clusters": len(sizes),
+        "mean_cluster_size": mean_size(sizes),
+        "largest_cluster": int(sizes.max()),
         **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
     }
 
@@ -99,9 +115,11 @@ def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:
 
 def momenta(grains: Grains) -> list[float]:
     """Momentum [kg m/s] and angular momentum about the origin [J s], spins included: six numbers."""
-    p = grains.mass[:, None] * grains.velocity
-    angular = np.cross(grains.position, p) + grains.inertia[:, None] * grains.spin
-    return [*p.sum(axis=0).tolist(), *angular.sum(axis=0).tolist()]
+    arrays, x = grains.arrays, grains.arrays.position
+    p, spin = arrays.mass * arrays.velocity, arrays.inertia * arrays.spin
+    orbital = np.array([x[1] * p[2] - x[2] * p[1], x[2] * p[0] - x[0] * p[2], x[0] * p[1] - x[1] * p[0]])
+    # pairwise sums of momenta, sums grain by grain of angular momenta: the last digits of earlier ledgers
+    return [*p.sum(axis=1).tolist(), *(orbital + spin).T.copy().sum(axis=0).tolist()]
 
 
 class Ledger(LedgerColumns):
@@ -120,13 +138,13 @@ class Ledger(LedgerColumns):
     def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, rigid: bool = False):
         others = [name for name in forces if name != MAGNETIC]
         self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if rigid else NUMBERS
-        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, AWAKE}
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
         if taken := [name for name in walls if name in {*own, *forces, LOST_WALLS, MAGNETIC}]:
             raise BadInput(f"walls: '{taken[0]}' is a column of the ledger; give this wall another name")
         lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
-        of_state = (*lost, "total", *MOMENTA, CORRECTION, INTERNAL, *numbers, *walls)
+        of_state = (*lost, "total", *OF_MOTION, *numbers, *walls)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
@@ -153,10 +171,10 @@ class Ledger(LedgerColumns):
     def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
         """Restore the rows from the array of `to_array`; raises BadInput if it lacks a column of this ledger.
 
-        Further columns are those of forces that a change left out. Without the column `awake`, as in checkpoints of
-        versions that did not have it, the ledger goes on without it.
+        Further columns are those of forces that a change left out. Without the column `awake` or the temperatures of
+        bodies, as in checkpoints of versions that did not have them, the ledger goes on without them.
         """
-        if not set(columns) >= set(self.columns) - {AWAKE}:
+        if not set(columns) >= set(self.columns) - {AWAKE, *TEMPERATURES}:
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
@@ -173,7 +191,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS, AWAKE}
+        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *OF_MOTION, *NUMBERS, AWAKE}
         others |= set(self.walls)
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])

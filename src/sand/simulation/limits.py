@@ -16,7 +16,8 @@ from ..forces.base import Force
 from ..forces.gas.model import Gas
 from ..forces.pair.dipoles import Dipoles, kinetic_temperature
 from ..grains import Grains
-from ..theory.magnetic_limits import MagneticLimits, contact_field, magnetic_limits
+from ..material import Material
+from ..theory.magnetic_limits import QUOTED_SIZES, MagneticLimits, contact_field, magnetic_limits
 from ..units import MELTED, format_quantity
 
 CREEP = 10.0
@@ -145,13 +146,27 @@ def _moments(grains: Grains, kind: int, kelvin: float) -> str:
     solid = limits.blocking_temperature < MELTED
     stable = f"below {limits.blocking_temperature:.3g} K" if solid else "at any temperature"
     small = f" (above a radius of {format_quantity(limits.blocking_radius, 'm')})" if kelvin > 0.0 else ""
+    material = grains.materials[kind]
     return (
-        f"{grains.materials[kind].name}: one domain up to a radius of "
-        f"{format_quantity(limits.single_domain_radius, 'm')}; fixed for 100 s {stable}{small}; the field of a "
-        f"touching grain, {format_quantity(field, 'T')}, is {'above' if strong else 'below'} the anisotropy field, "
-        f"{format_quantity(limits.anisotropy_field, 'T')}"
+        f"{material.name}: one domain up to a radius of {format_quantity(limits.single_domain_radius, 'm')} "
+        f"({_domain_note(material)}); fixed for 100 s {stable}{small}, with the energy barrier {_barrier(material)}; "
+        f"the field of a touching grain, {format_quantity(field, 'T')}, is {'above' if strong else 'below'} the "
+        f"anisotropy field, {format_quantity(limits.anisotropy_field, 'T')}"
         + (": moments would turn inside the grains" if strong else "")
     )
+
+
+def _domain_note(material: Material) -> str:
+    """How far the single-domain radius is to be trusted, and what the paper quotes."""
+    quoted = QUOTED_SIZES.get(material.name, "")
+    return f"an estimate for spheres, to a factor of about two{f'; {quoted}' if quoted else ''}"
+
+
+def _barrier(material: Material) -> str:
+    """Formula of the energy barrier, with the kind of anisotropy."""
+    if material.anisotropy_kind == "uniaxial":
+        return "K V (uniaxial)"
+    return "K1 V/4 (cubic)" if material.anisotropy > 0.0 else "|K1| V/12 (cubic)"
 
 
 def _moment_warnings(grains: Grains, kind: int, kelvin: float) -> list[str]:
@@ -165,8 +180,8 @@ def _moment_warnings(grains: Grains, kind: int, kelvin: float) -> list[str]:
         warnings.append(
             f"moments of {name} grains of radius {format_quantity(float(radius.min()), 'm')} are fixed in the model, "
             f"but would flip within {format_quantity(limits.relaxation_time, 's')} at {kelvin:.4g} K "
-            f"(superparamagnetic below {format_quantity(limits.blocking_radius, 'm')}); use larger or "
-            "colder grains, or give the material its anisotropy"
+            f"(superparamagnetic below {format_quantity(limits.blocking_radius, 'm')}, with the energy barrier "
+            f"{_barrier(grains.materials[kind])}); use larger or colder grains, or give the material its anisotropy"
         )
     several = radius > limits.single_domain_radius
     share = magnetisation / limits.magnetisation
@@ -174,7 +189,8 @@ def _moment_warnings(grains: Grains, kind: int, kelvin: float) -> list[str]:
         worst = int(np.argmax(np.where(several, share, 0.0)))
         warnings.append(
             f"moments of {name} grains of radius {format_quantity(float(radius[worst]), 'm')} are {share[worst]:.0%} "
-            f"of saturation, but grains above {format_quantity(limits.single_domain_radius, 'm')} have several domains "
-            f"and keep less than {REMANENCE:.0%}; use smaller grains or a smaller moment"
+            f"of saturation, but grains above {format_quantity(limits.single_domain_radius, 'm')} "
+            f"({_domain_note(grains.materials[kind])}) have several domains and keep less than {REMANENCE:.0%}; use "
+            "smaller grains or a smaller moment"
         )
     return warnings

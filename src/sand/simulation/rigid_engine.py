@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..box import Box
+from ..compiler.progress import compilation_seconds
 from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
@@ -94,6 +98,20 @@ SPANS = (
 Kind = TypeVar("Kind", bound=Engine)
 
 
+def timed(method: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Count the wall time of a method, compilation excepted, as work on awake clusters."""
+
+    @wraps(method)
+    def call(self: Any) -> Any:
+        began = time.perf_counter() - compilation_seconds()
+        try:
+            return method(self)
+        finally:
+            self._awake_seconds += time.perf_counter() - compilation_seconds() - began
+
+    return call
+
+
 @dataclass
 class RigidEngine(Engine):
     """An engine whose clusters at rest move as rigid bodies.
@@ -117,11 +135,17 @@ class RigidEngine(Engine):
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+    _awake_seconds: float = field(init=False, default=0.0)  # wall time of the work on awake clusters [s]
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.inner is not None:
             self._inner_workers = self.inner._workers
+
+    @property
+    def awake_work(self) -> tuple[int, float]:
+        """As `Engine.awake_work`."""
+        return int(self._state.count[CONTACT_STEPS]), self._awake_seconds
 
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
@@ -271,6 +295,7 @@ class RigidEngine(Engine):
         inner._workers = self._inner_workers if uses_task_queue(len(index)) else None
         return keep(self._inners, len(index), inner)
 
+    @timed
     def _take_contact_steps(self) -> Stop:
         """Contact steps of the awake grains for one step of the bodies."""
         state, present = self._state, self._inner_state()
@@ -407,6 +432,7 @@ class RigidEngine(Engine):
             if before.get(frozenset(self._awake[pair].tolist())) != now.tobytes():
                 self._slipped[pair] = True
 
+    @timed
     def _finish_step(self) -> None:
         """The second half kick of awake clusters; clusters that are at rest become bodies."""
         assert self.inner is not None

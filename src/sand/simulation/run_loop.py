@@ -11,7 +11,8 @@ from ..integrate.parts import Stop
 from ..integrate.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
-from .ledger import COUNTED, count_row
+from .cost import StepTimer
+from .ledger import COUNTED
 from .observers import call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome
 from .pace import RunTimeEstimate
@@ -27,7 +28,7 @@ ENERGY_CHECK_EVERY = 10_000
 """Steps between two checks of the energy error."""
 
 
-def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -> Outcome:
+def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, timer: StepTimer) -> Outcome:
     """Take steps, write output and check the condition, call updaters, until a criterion is met or a signal arrives."""
     end, last, condition = criteria
     simulation._stopped_by = ""
@@ -50,7 +51,8 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         )
         shown = rows.next(frames.next(end))
         goal, most_steps = updates.limit(saves.next(shown), most_steps)
-        stop = simulation._engine.advance(goal, most_steps)
+        with timer.steps():
+            stop = simulation._engine.advance(goal, most_steps)
         while stop is Stop.NONE and simulation.time < max(logged, default=0.0):  # an event ended the step before it
             stop = simulation._engine.advance(goal, 1)
         simulation._warn_of_engine()
@@ -60,7 +62,8 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         reached = simulation.time
         if stop is Stop.TIME_REACHED and simulation.steps < step:  # before the first step that would pass this time
             if goal == shown:
-                stop = simulation._engine.go_to(goal, min(step, simulation.steps + 1) if updates.is_near else step)
+                with simulation._clock.measure("output"):
+                    stop = simulation._engine.go_to(goal, min(step, simulation.steps + 1) if updates.is_near else step)
             else:
                 stop = Stop.NONE
                 updates.approach(goal)
@@ -93,9 +96,10 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
         due = saves.is_due(reached, simulation.steps)
         if due:
             saves.advance(reached, simulation.steps)
-        if simulation.writer:
-            simulation.writer.tick(simulation, output, due)
-        call_ticks(simulation.observers, simulation)
+        with simulation._clock.measure("output"):
+            if simulation.writer:
+                simulation.writer.tick(simulation, output, due)
+            call_ticks(simulation.observers, simulation)
         if signals.received:
             return Outcome.INTERRUPTED
         if condition is not None and _is_late(simulation, condition, wall.monotonic() - started):
@@ -105,15 +109,16 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals) -
 
 def _schedules(simulation: Simulation) -> list[Schedule]:
     """Schedules of frames, rows of the ledger and checkpoints, which continue those of earlier runs."""
+    chosen = None if simulation._chosen is None else Cadence("time", simulation._chosen.every)
     last = {"frame_every": simulation._frame_times, "row_every": [row["time"] for row in simulation.ledger.rows[-1:]]}
     return [
         Schedule(
-            None if setting is None else read_cadence(setting, name, wall=True),
+            read_cadence(setting, name, wall=True) if setting is not None else cadence,
             simulation.time,
             simulation.steps,
             max(last.get(name, [])[-1:], default=-math.inf),
         )
-        for name in ("frame_every", "row_every", "checkpoint_every")
+        for name, cadence in (("frame_every", chosen), ("row_every", None), ("checkpoint_every", None))
         for setting in [getattr(simulation, name)]
     ]
 
@@ -135,7 +140,7 @@ def _holds(simulation: Simulation, condition: Condition, seconds: float) -> bool
     """Whether a condition holds after a wall time of `seconds` [s]."""
     row: Mapping[str, float] = {}
     if names := set(condition.names) - {WALL}:
-        row = count_row(simulation.state) if COUNTED.issuperset(names) else simulation._log_row()
+        row = simulation._count_row() if COUNTED.issuperset(names) else simulation._log_row()
     return condition.holds({**row, WALL: seconds})
 
 

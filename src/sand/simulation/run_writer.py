@@ -15,9 +15,10 @@ import numpy as np
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
-from ..io.checkpoint import checkpoint_files, write_checkpoint
+from ..io.checkpoint import write_checkpoint
+from ..io.checkpoint_files import checkpoint_files
 from ..io.damage import sealed
-from ..io.ledger_table import LedgerFile, keep_if_damaged
+from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
@@ -228,12 +229,15 @@ class RunWriter:
             "stop": self._ends[2],
             "condition_met": simulation.met_condition,
             "wall_seconds": simulation.wall_seconds,
+            "wall_times": simulation.wall_times,
             "temperature": simulation.temperature,
             "choices": simulation.choices,
             "warnings": simulation.warnings,
             "case": plain(self._case),
             **({} if self._written is None else {"case_written": self._written}),
             "next_id": simulation._next_id,
+            "own": regular.grains.own_units,
+            "chosen_cadence": None if simulation.frame_every is not None else simulation._chosen,
             "updaters": described(simulation.updaters),
             "ledger": simulation.ledger.columns,
             "clock": CLOCK,
@@ -297,6 +301,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         **{f"contacts_{name}": last[name] for name in ("made", "moved", "broken")},
         **{name: last[name] for name in ("clusters", "mean_cluster_size", "largest_cluster")},
         "largest_overlap": float(simulation.regular_state.clock[LARGEST_OVERLAP]),
+        **{name: last.get(name) for name in TEMPERATURES},
         **rigid_clusters(simulation, ledger),
         "dissipated": ledger.dissipated,
         "drift": result.drift,
@@ -307,7 +312,8 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "seed": simulation.seed,
         "choices": simulation.choices,
         "wall_seconds": simulation.wall_seconds,
-        "ns_per_grain_step": 1e9 * simulation.wall_seconds / grain_steps if grain_steps else None,
+        **{f"wall_{part}": seconds for part, seconds in simulation.wall_times.items()},
+        "ns_per_grain_step": 1e9 * simulation.wall_times["stepping"] / grain_steps if grain_steps else None,
         "versions": versions(),
         "source_digest": cache_folder().name,
         "sand": __version__,

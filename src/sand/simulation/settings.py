@@ -16,7 +16,19 @@ from .updater import read_updaters
 
 ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
 """Arguments of a simulation that are fixed once it is built."""
-RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound", "wall_seconds")
+RESULTS = (
+    "time",
+    "steps",
+    "state",
+    "start",
+    "temperature",
+    "ledger",
+    "writer",
+    "choices",
+    "is_sound",
+    "wall_seconds",
+    "wall_times",
+)
 """Attributes of a simulation that follow from the run."""
 QUANTITIES = tuple(field.name for field in FIELDS)
 """Quantities of grains."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import copy
 import math
-import time as wall
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,17 +23,17 @@ from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import CONTACTS, LATE, OUTSIDE, State
+from ..state.state import BROKEN, CONTACTS, LATE, MADE, OUTSIDE, State
 from ..units import format_quantity, seed_given
-from .assemble import build_engine
-from .cadence import SHORTEST_DURATION
+from .assemble import build_engine, fitting_forces
+from .cadence import Chosen, chosen_cadence
 from .change import Change, as_chosen, changed_engine
 from .condition import GIVEN, OwnCondition
 from .contact_table import ContactTable
-from .cost import RunTimer
+from .cost import StepTimer
 from .displays import DISPLAYS
 from .driven import read_driven
-from .ledger import Ledger, kinetic_energies, log_row
+from .ledger import Ledger, count_row, kinetic_energies, labels_in, log_row
 from .observers import Observer
 from .outcome import Outcome, Result
 from .run_loop import run_loop
@@ -45,6 +44,7 @@ from .solid_limits import extreme_warnings, grain_warnings
 from .stop import StopCriteria, stop_criteria
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
+from .wall_clock import WallClock
 from .walls import Wall, WallState, read_walls, wall_columns, wall_states
 
 ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting")
@@ -81,7 +81,7 @@ class Simulation(ReadOnlySettings):
         Objects that change the simulation or end its run at regular moments (see `sand.Updater`).
     frame_every : float or str, optional
         When frames are written: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default
-        1/200 of the first `run`.
+        1/200 of each `run` that ends at a time.
     row_every : float or str or None, optional
         When rows are added to the ledger, in the same forms; every frame has a row in any case.
     checkpoint_every : float or str or None, optional
@@ -137,6 +137,7 @@ class Simulation(ReadOnlySettings):
         self.planned: tuple[float, float, str | None] = (math.inf, math.inf, None)  # end of a resumed run
         self.start = grains.copy()
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
+        self.forces = fitting_forces(self.forces, integrator)
         parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
         saved = None if restart is None else restart[0].get("cutoff")
         moved = (self.driven, self._walls)
@@ -150,10 +151,11 @@ class Simulation(ReadOnlySettings):
         )
         written = None if restart is None else restart[1].get("case_in_file")
         self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
-        self._wall_seconds: float = 0.0  # of earlier calls of `run`
-        self._began_at: float | None = None  # start of the present call of `run` (monotonic clock)
+        self._clock = WallClock()
         self._has_begun = restart is not None
+        self._clusters: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))  # engine, counts, and labels for these
         self._frame_times: list[float] = []  # [s], of all frames so far
+        self._chosen: Chosen | None = None  # cadence of frames of the present or last run, if the user gives none
         self._met: tuple[Any, int] | None = None  # the condition that was met, and the step
         self._notes_shown: set[str] = set()  # kinds of notes that were shown as warnings
         self._warned: list[str] = []
@@ -165,9 +167,10 @@ class Simulation(ReadOnlySettings):
         if restart is not None:
             arrays, meta = restart
             self._engine.load_state(arrays, meta.get("output_time"))
-            self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
+            self.temperature, self._clock = meta["temperature"], WallClock(meta["wall_seconds"], meta.get("wall_times"))
             self._choices_at_start, self._warned = meta.get("choices", {}), list(meta.get("warnings", []))
             self._next_id = int(meta.get("next_id", len(grains)))
+            self._chosen = Chosen(*meta["chosen_cadence"]) if meta.get("chosen_cadence") else None
             check_updaters(updaters, self.updaters, meta.get("updaters", []))
             if "ledger" in arrays:  # a state without a ledger starts a new one
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
@@ -204,8 +207,12 @@ class Simulation(ReadOnlySettings):
     @property
     def wall_seconds(self) -> float:
         """Wall time spent in all calls of `run` so far, earlier processes included [s]."""
-        running = 0.0 if self._began_at is None else wall.monotonic() - self._began_at
-        return self._wall_seconds + running
+        return self._clock.total
+
+    @property
+    def wall_times(self) -> dict[str, float]:
+        """Parts of `wall_seconds` [s]: start, stepping, output, compilation (also loading compiled code) and other."""
+        return self._clock.parts
 
     @property
     def is_sound(self) -> bool:
@@ -228,7 +235,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.law, self._engine.parameters.settings.follow)
+        return ContactTable(self.state, self._engine.law, self._engine._current_table(self.state))
 
     @property
     def walls(self) -> tuple[WallState, ...]:
@@ -334,27 +341,26 @@ class Simulation(ReadOnlySettings):
         """
         if self._failure:
             raise BadInput(f"this simulation cannot continue: {self._failure}")
-        if self._began_at is not None:
+        if self._clock.runs:
             raise BadInput("this simulation runs already; an updater or observer cannot call run")
         criteria = stop_criteria(until, steps, stop, self.time, self.steps, self.planned)
         end, _, condition = criteria
         if condition is not None and not isinstance(condition, OwnCondition):
             condition.check(self.ledger.columns)
-        if self.frame_every is None and 0.0 < end - self.time < math.inf:
-            self.frame_every = max((end - self.time) / 200.0, SHORTEST_DURATION)
+        self._chosen = chosen_cadence(self.time, end, self._chosen)
         try:
-            self._begin()
-            if self.writer:
-                self.writer.open(self, criteria)
-            self._began_at = wall.monotonic()
-            with Signals() as signals:
-                try:
-                    timer = RunTimer(self)
-                    outcome = run_loop(self, criteria, signals)
-                    timer.record()
-                finally:
-                    self._wall_seconds, self._began_at = self.wall_seconds, None
-                    self._engine.restore_user_order()
+            with self._clock.run():
+                with self._clock.measure("start"):
+                    self._begin()
+                    if self.writer:
+                        self.writer.open(self, criteria)
+                with Signals() as signals:
+                    try:
+                        timer = StepTimer(self)
+                        outcome = run_loop(self, criteria, signals, timer)
+                        timer.record()
+                    finally:
+                        self._engine.restore_user_order()
             return self._close(outcome, criteria)
         except FilesFailed as error:
             if self.writer:
@@ -392,7 +398,8 @@ class Simulation(ReadOnlySettings):
         Yields
         ------
         Change
-            Arrays `velocity`, `spin`, `moment`, `charge`, the `box`, and `remove`, `add`, `scale_box`, `replace`.
+            Arrays `velocity`, `spin`, `moment`, `charge` and own quantities (`change.own`), the `box`, and `remove`,
+            `add`, `scale_box`, `replace`. A change of own quantities alone leaves the motion as it is, bit by bit.
 
         Raises
         ------
@@ -402,13 +409,20 @@ class Simulation(ReadOnlySettings):
         """
         if self._failure:
             raise BadInput(f"this simulation cannot be changed: {self._failure}")
-        if self._began_at is not None and not self._updating:
+        if self._clock.runs and not self._updating:
             raise BadInput("a simulation that runs can be changed by an updater only: Simulation(updaters=[…])")
         self._begin()
         present = tuple(as_chosen(force, self.start, self.box) for force in self.forces)
         pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
         change = Change(self.grains, present, self.box, pair, self._next_id)
         yield change
+        if change.is_of_own:
+            own = change.checked_grains().arrays.own
+            for grains in (self._engine.state.grains, self._engine.regular_state.grains, self.start):
+                grains.arrays.own[...] = own
+            if self.writer:
+                self.writer.changed(self)
+            return
         seed, fixed = int(self.seed or 0), (self.driven, self._walls)
         engine, forces, driven = changed_engine(change, present, self._engine, self.ledger.columns, seed, *fixed)
         before = self._log_row()["total"]
@@ -468,9 +482,8 @@ class Simulation(ReadOnlySettings):
             f"largest {row['largest_cluster']}",
             f"energy error {self.ledger.with_row(row).drift:.2g}",
         ]
-        seconds = self.wall_seconds
-        if seconds > 0.0 and self.steps:
-            parts.append(f"{self.steps / seconds:.2g} steps/s")
+        if self._clock.stepping > 0.0 and self.steps:
+            parts.append(f"{self.steps / self._clock.stepping:.2g} steps/s")
         return ", ".join(parts)
 
     def __repr__(self) -> str:
@@ -520,12 +533,29 @@ class Simulation(ReadOnlySettings):
             self._record_output()
 
     def _log_row(self) -> dict[str, float]:
-        energies = self._engine.contact_energies(), self._engine.force_energies()
+        engine = self._engine
+        energies = engine.losses().tolist(), self._labels(), engine.contact_energies(), engine.force_energies()
         row = log_row(self.state, *energies, wall_columns(self._walls))
         return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
 
+    def _labels(self) -> np.ndarray:
+        """Cluster of each grain (N,), found anew after contacts have formed or broken."""
+        state, engine = self.state, self._engine
+        key = (len(state.grains), *(int(state.count[k]) for k in (CONTACTS, MADE, BROKEN)))
+        if self._clusters[:2] != (engine, key):
+            self._clusters = engine, key, labels_in(state)
+        return self._clusters[2]
+
+    def _count_row(self) -> dict[str, float]:
+        """The part of a row of the ledger that needs no energies."""
+        return count_row(self.state, self._labels())
+
     def _record_output(self, with_frame: bool = True) -> None:
         """Add a row to the ledger, write it, with a frame or without, and call the observers."""
+        with self._clock.measure("output"):
+            self._write_output(with_frame)
+
+    def _write_output(self, with_frame: bool) -> None:
         row = self._log_row()
         if not self.ledger.add(row):
             return

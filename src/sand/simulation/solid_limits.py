@@ -139,12 +139,12 @@ def torn_clusters(grains: Grains, contact: Contact, pairs: np.ndarray, box: Box)
     if not len(pairs):
         return []
     motion, mass = rigid_motion(grains, pairs, box), grains.mass
-    spin = np.linalg.norm(motion.spin, axis=1)
+    spin, offset = np.linalg.norm(motion.spin, axis=0), motion.offset.T
     sizes = np.bincount(motion.label)
     for k in np.flatnonzero((sizes > 1) & (spin > 0.0)).tolist():
-        own, axis = np.flatnonzero(motion.label == k), motion.spin[k] / spin[k]
-        s = motion.offset[own] - np.outer(motion.offset[own] @ axis, axis)
-        x = motion.offset @ np.linalg.eigh((mass[own, None] * s).T @ s)[1][:, -1]
+        own, axis = np.flatnonzero(motion.label == k), motion.spin[:, k] / spin[k]
+        s = offset[own] - np.outer(offset[own] @ axis, axis)
+        x = offset @ np.linalg.eigh((mass[own, None] * s).T @ s)[1][:, -1]
         force = float(spin[k] ** 2 * (mass[own] * np.maximum(x[own], 0.0)).sum())
         across = [pair for pair in pairs[motion.label[pairs[:, 0]] == k] if (x[pair[0]] > 0.0) != (x[pair[1]] > 0.0)]
         held = sum(_pull(grains, contact, *pair.tolist()) for pair in across)

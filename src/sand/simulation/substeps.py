@@ -40,7 +40,7 @@ from ..state.state import (
 from .changed_state import subset
 from .new_state import new_state
 from .part import copy_contacts, copy_grains, store_contacts, store_grains
-from .rigid_engine import RigidEngine, external_energy, keep
+from .rigid_engine import RigidEngine, external_energy, keep, timed
 
 COPIED_BODIES = (*SAVED_BODIES, "decay", "mode")
 LOADS = ("force", "torque", "field")
@@ -95,6 +95,7 @@ class SubstepEngine(RigidEngine):
         slow = grains.force - bodies.excluded_force, grains.torque - bodies.excluded_torque
         return self.kick_awake(*slow, float(self._state.clock[STEP]))
 
+    @timed
     def _take_substeps(self) -> Stop:
         """The first half of a step of all bodies, and the substeps of the quick ones to its end.
 

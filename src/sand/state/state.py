@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from ..box import Box
 from ..errors import BadInput
 from ..grains import GrainArrays, Grains
 from ..material import Material
-from ..numerics.simd import all_aligned
-from ..schema import OWN
+from ..numerics.simd import aligned_copies, all_aligned
+from ..own_quantities import OwnQuantities
 from .arrays import (
     GROWTH,
     NOT_SAVED,
@@ -182,9 +183,18 @@ class State:
 
     def copy(self) -> State:
         """Independent copy (snapshot)."""
-        copied = {name: type(group)(*(a.copy() for a in group)) for name in GROUPS for group in [getattr(self, name)]}
-        single = {name: getattr(self, name).copy() for name in ("clock", "count", "lost", "cutoff", "order")}
-        return replace(self, grains=self.grains.copy(), **copied, **single)  # __post_init__ aligns the arrays
+        groups = {name: getattr(self, name) for name in GROUPS}
+        single = ("clock", "count", "lost", "cutoff", "order")
+        arrays = [*self.grains.arrays, *(array for group in groups.values() for array in group)]
+        copies = iter(aligned_copies([*arrays, *(getattr(self, name) for name in single)]))
+        other = object.__new__(type(self))  # `replace` would look at the alignment of each array again
+        vars(other).update(vars(self))
+        other.grains = self.grains.with_arrays(type(self.grains.arrays)(*islice(copies, len(self.grains.arrays))))
+        for name, group in groups.items():
+            setattr(other, name, type(group)(*islice(copies, len(group))))
+        for name in single:
+            setattr(other, name, next(copies))
+        return other
 
     def _uniform_arrays(self) -> tuple[str, ...]:
         """Names of arrays with identical columns."""
@@ -275,8 +285,10 @@ class State:
             _copy_into(getattr(self.wall_contacts, name)[..., :used], saved, f"wall_contacts/{name}")
 
 
-def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Material]) -> Grains:
-    """Grains with the radii, masses, velocities, spins, moments and charges of saved arrays.
+def grains_from_arrays(
+    saved: Mapping[str, np.ndarray], materials: Sequence[Material], units: Mapping[str, str]
+) -> Grains:
+    """Grains with the radii, masses, velocities, spins, moments, charges and own quantities of saved arrays.
 
     Their moments are those in the body frames; `State.from_arrays` restores the orientations.
 
@@ -286,6 +298,8 @@ def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Mate
         Arrays of `State.to_arrays`.
     materials : Sequence[Material]
         Material of each grain.
+    units : Mapping[str, str]
+        Units of the own quantities by name, in the order of their rows.
 
     Raises
     ------
@@ -304,7 +318,7 @@ def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Mate
         moment=part["body_moment"].T,
         charge=part["charge"],
         mass=part["mass"],
-        own={name: part[name] for name in OWN},
+        own=OwnQuantities(dict(zip(units, part["own"], strict=True)), units),
     )
 
 

@@ -76,6 +76,21 @@ class SizeDistribution:
         """Logarithmic slope d ln S/d ln t (T,), the local z of Eq. 18; converges slowly, as z t/(t + τ)."""
         return self.times * self.rate / self.mean_size
 
+    @property
+    def local_degree(self) -> np.ndarray:
+        """Local degree λ(S) = d ln(dS/dt)/d ln S (T,), from differences between outputs; at least three with S rising.
+
+        It tends to the degree of a homogeneous kernel, independent of the origin of time.
+
+        Raises
+        ------
+        BadInput
+            If there are fewer than three outputs, or S does not rise between them.
+        """
+        if len(self.times) < 3 or not (np.diff(self.mean_size) > 0.0).all() or not (self.rate > 0.0).all():
+            raise BadInput("a local degree needs at least three outputs between which S rises")
+        return np.gradient(np.log(self.rate), np.log(self.mean_size))
+
     def exponent(self, decades: float = 1.0) -> float:
         """Dynamic exponent z of S ∝ (t − t0)^z over the last decades of S, from dS/dt ∝ S^(1 − 1/z) (Eq. 20).
 

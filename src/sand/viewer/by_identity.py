@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInput
-from ..schema import OWN
+from ..own_quantities import OwnQuantities
 
-CONSTANT = ("radius", "mass", "charge", *OWN)
-"""Quantities of a grain that do not change."""
-VECTORS = ("velocity", "spin", "moment")
+CONSTANT = ("radius", "mass")
+"""Quantities of a grain that the page takes as constant."""
+MOVING = ("velocity", "spin", "moment", "charge")
 """Quantities that are 0 for absent grains."""
 
 
@@ -98,10 +98,14 @@ class ByIdentity:
         rows, count, whole = np.searchsorted(self.identity, frame.id), len(self.identity), copy.copy(frame)
         columns = {name: array.copy() for name, array in self._constant.items()}
         columns["material"] = columns["material"].astype(np.uint32)
-        for name, absent in {"position": np.nan, **dict.fromkeys((*VECTORS, "orientation"), 0.0)}.items():
+        for name, absent in {"position": np.nan, **dict.fromkeys((*MOVING, "orientation"), 0.0)}.items():
             stored = np.asarray(getattr(frame, name))
-            columns[name] = np.full((count, stored.shape[1]), absent, stored.dtype)
+            columns[name] = np.full((count, *stored.shape[1:]), absent, stored.dtype)
             columns[name][rows] = stored
+        own = {name: np.full(count, np.nan) for name in frame.own}
+        for name, values in own.items():
+            values[rows] = frame.own[name]
+        whole.own = OwnQuantities(own, frame.own.units)
         if frame.at_rest is not None:
             columns["at_rest"] = np.ones(count, bool)
             columns["at_rest"][rows] = frame.at_rest

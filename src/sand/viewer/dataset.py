@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.ledger_columns import LedgerColumns
+from ..analysis.quantities import own_label
 from ..analysis.tracking import SINGLE, Lineage
 from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
-from ..schema import BY_NAME, own_values
 from ..version import __version__
 from .by_identity import ByIdentity
 from .dimensions import fit_dimension
@@ -88,7 +88,7 @@ class RunDataset:
         self.unit = float(first.radius.mean())
         self.periodic = [length is not None for length in first.box.lengths]
         self.says_rest = first.at_rest is not None
-        self._grains, self.own = grains_packet(first, self.unit), list(own_values(first))
+        self._grains, self.own = grains_packet(first, self.unit), first.own.units
         self._lineage = Lineage(self.grains_count, self.frames.pairs)
         self._largest: dict[str, int] | None = None
         self._ranges: tuple[int, dict[str, list[float]]] | None = None
@@ -162,7 +162,10 @@ class RunDataset:
                 "note": "; ".join(self._all_notes()) or None,
                 "unit": self.unit,
                 "materials": self.materials,
-                "own": [{"id": name, "label": name.replace("_", " "), "unit": BY_NAME[name].unit} for name in self.own],
+                "own": [
+                    {"id": name, "label": own_label(name), "unit": "" if unit == "1" else unit}
+                    for name, unit in self.own.items()
+                ],
                 "at_rest": self.says_rest,
                 "periodic": self.periodic,
                 "field": self._field_entry(numbers),
@@ -199,7 +202,9 @@ class RunDataset:
         """Approximate size of all selected frames as sent [bytes]."""
         contacts = self.frames.contacts[np.array(self.frame_numbers, dtype=int)]
         per_contact = frame_bytes(0, 1, self.compact) - frame_bytes(0, 0, self.compact)
-        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact) + int(contacts.sum() * per_contact)
+        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact, len(self.own)) + int(
+            contacts.sum() * per_contact
+        )
 
     def answer(self, kind: str, *numbers: int) -> bytes | dict[str, Any]:
         """Answer a request of the page: a packet, or the content of JSON.

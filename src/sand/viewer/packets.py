@@ -11,7 +11,6 @@ import numpy as np
 from ..errors import BadInput
 from ..io.frame import REST
 from ..io.run_folder import plain
-from ..schema import OWN, own_values
 
 MAGIC = b"SANDPKT1"
 TYPES: dict[str, np.dtype[Any]] = {
@@ -22,8 +21,10 @@ TYPES: dict[str, np.dtype[Any]] = {
 }
 HALF_MAX = 65504.0
 """Largest number in half precision; arrays scaled to it keep 11 bits over the nine decades below their maximum."""
-SINGLE_PRECISION = ("position", "radius", "mass", "charge", *OWN)
+SINGLE_PRECISION = ("position", "radius", "mass", "charge")
 """Arrays that are never stored in half precision: 2⁻¹¹ of a box is more than a grain."""
+OWN = "own/"
+"""Beginning of the names of own quantities, also in single precision: 2⁻¹¹ of 300 K may be all that varies."""
 
 
 def compact_json(content: Mapping[str, Any]) -> str:
@@ -67,7 +68,7 @@ def _converted(name: str, array: np.ndarray, compact: bool) -> tuple[str, float,
     if array.dtype.kind != "f":
         kind = "u1" if array.dtype.itemsize == 1 else "u4"
         return kind, 1.0, np.ascontiguousarray(array, TYPES[kind])
-    if not compact or name in SINGLE_PRECISION:
+    if not compact or name in SINGLE_PRECISION or name.startswith(OWN):
         with np.errstate(over="ignore"):  # values beyond single precision become infinite
             return "f4", 1.0, np.ascontiguousarray(array, TYPES["f4"])
     values = np.asarray(array, np.float64)
@@ -77,7 +78,7 @@ def _converted(name: str, array: np.ndarray, compact: bool) -> tuple[str, float,
 
 
 def grains_packet(frame: Any, unit: float) -> bytes:
-    """Packet of the grain properties that do not change: radius, mass, material, charge and own quantities.
+    """Packet of the grain properties that do not change: radius, mass and material.
 
     Parameters
     ----------
@@ -97,8 +98,6 @@ def grains_packet(frame: Any, unit: float) -> bytes:
         "radius": frame.radius / unit,
         "mass": frame.mass,
         "material": frame.material.astype(np.uint8),
-        "charge": frame.charge,
-        **own_values(frame),
     }
     return encode({}, arrays)
 
@@ -129,6 +128,8 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
         "position": frame.position / unit,
         **{name: getattr(frame, name) for name in ("velocity", "spin", "moment")},
         "cluster": names.astype(np.uint32),
+        **({"charge": frame.charge} if np.any(frame.charge) else {}),
+        **{f"{OWN}{name}": values for name, values in frame.own.items()},
         **({} if getattr(frame, REST, None) is None else {REST: np.asarray(frame.at_rest, np.uint8)}),
         "pair": frame.pair.astype(np.uint32),
         **{name: getattr(frame, name) for name in ("force", "share", "overlap", "formed")},
@@ -136,7 +137,7 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
     return encode(header, arrays, compact)
 
 
-def frame_bytes(grains: int, contacts: int, compact: bool = False) -> int:
-    """Approximate size of a frame packet [bytes], with a header of 1 kB."""
+def frame_bytes(grains: int, contacts: int, compact: bool = False, own: int = 0) -> int:
+    """Approximate size of a frame packet [bytes] with a number of own quantities, and a header of 1 kB."""
     width = 2 if compact else 4
-    return 1000 + grains * (3 * 4 + 9 * width + 4) + contacts * (8 + 9 * width)
+    return 1000 + grains * (3 * 4 + 9 * width + 4 + 4 * own) + contacts * (8 + 9 * width)

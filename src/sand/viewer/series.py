@@ -10,10 +10,19 @@ from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import AWAKE, LedgerColumns
 from ..analysis.quantities import measured
 from ..errors import BadInput
+from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import plain
-from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
+from ..plotting.panels import (
+    CHANNEL_LABELS,
+    COUNTS,
+    TEMPERATURE_LINES,
+    column,
+    energies_drawn,
+    has_temperatures,
+    losses_drawn,
+    peak,
+)
 from ..plotting.style import BLUE, MUTED, ON_DARK, RED, SKY, TEXT_COLOUR
-from ..schema import OWN
 
 MAX_POINTS = 2000
 """Maximum number of points of a line."""
@@ -23,7 +32,7 @@ SAMPLED_FRAMES = 12
 """Number of frames, spread evenly over the run, from which ranges are computed."""
 PERCENTILES = ("speed", "spin", "kinetic_energy")
 """Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
-EXTREMES = ("size", "radius", "coordination", "moment", "load", *OWN)
+EXTREMES = ("size", "radius", "coordination", "moment", "load")
 """Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""
 PERCENTILE_LIMITS = (1.0, 99.9)
 
@@ -39,7 +48,7 @@ def series_from_ledger(ledger: LedgerColumns) -> dict[str, Any]:
     """Plots and contact events from a ledger; a plot whose columns are missing is left out."""
     thinned = ledger.select(evenly_spaced(len(ledger)))
     plots = []
-    for plot in (_clusters, _energies, _losses, _contacts, _balance, _awake):
+    for plot in (_clusters, _energies, _losses, _contacts, _balance, _temperatures, _awake):
         try:
             plots.append(plot(thinned))
         except (KeyError, ValueError):  # a ledger of another version
@@ -85,6 +94,12 @@ def _clusters(ledger: Any) -> dict[str, Any]:
 
 def _awake(ledger: LedgerColumns) -> dict[str, Any]:
     return _plot("awake", "Awake grains", [_line("grains of awake clusters", RED, column(ledger, AWAKE))])
+
+
+def _temperatures(ledger: LedgerColumns) -> dict[str, Any]:
+    drawn = zip(TEMPERATURES, TEMPERATURE_LINES, strict=True) if has_temperatures(ledger) else ()
+    lines = [_line(label, colour, column(ledger, name)) for name, (label, colour) in drawn]
+    return _plot("temperatures", "Temperatures of bodies", lines, "K", log=True)
 
 
 def _energies(ledger: LedgerColumns) -> dict[str, Any]:
@@ -139,7 +154,7 @@ def _json_numbers(values: np.ndarray, digits: int = 7) -> list[float | None]:
 
 
 def quantity_ranges(frames: Any) -> dict[str, list[float]]:
-    """Ranges [low, high] of the magnitudes of all quantities in PERCENTILES and EXTREMES, by name, SI.
+    """Ranges [low, high] of the magnitudes of all quantities in PERCENTILES and EXTREMES, and of own quantities, SI.
 
     Parameters
     ----------
@@ -152,8 +167,8 @@ def quantity_ranges(frames: Any) -> dict[str, list[float]]:
             frame = frames[int(number)]
         except BadInput:
             continue
-        for name, parts in samples.items():
-            parts.append(_magnitudes(frame, name))
+        for name in (*PERCENTILES, *EXTREMES, *frame.own):
+            samples.setdefault(name, []).append(_magnitudes(frame, name))
     return {name: _range(np.concatenate([*parts, np.zeros(0)]), name) for name, parts in samples.items()}
 
 
@@ -164,7 +179,7 @@ def _magnitudes(frame: Any, name: str) -> np.ndarray:
     except BadInput:
         return np.zeros(0)
     found = np.asarray(values[np.isfinite(values)], dtype=np.float64)
-    return found if name in OWN else np.abs(found)
+    return found if name in frame.own else np.abs(found)
 
 
 def _range(values: np.ndarray, name: str) -> list[float]:

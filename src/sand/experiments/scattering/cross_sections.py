@@ -23,7 +23,7 @@ from ...units import si
 from ..executors import results_of
 from .encounters import Flight
 from .flight_driver import BOUND, FAILED, HIT
-from .flights import COLUMNS, Trajectory, fly, replay, trajectory
+from .flights import COLUMNS, Trajectory, count_inaccurate, fly, inaccurate_text, replay, trajectory
 from .problem import flight
 from .sampling import CERTAIN, Strata, Task, cut
 
@@ -64,6 +64,8 @@ class CrossSection:
         Largest energy error of a flight over the largest kinetic energy of its relative motion.
     seconds : float
         Wall time of the computation.
+    inaccurate : int
+        Number of flights with a drift above 1e-6; they count as the others do, with a warning.
     """
 
     sigma: float
@@ -81,6 +83,7 @@ class CrossSection:
     profile: np.ndarray
     drift: float
     seconds: float
+    inaccurate: int = 0
 
     @property
     def enhancement(self) -> float:
@@ -197,6 +200,8 @@ def _warn(strata: Strata, rows: np.ndarray) -> None:
     failed = int((rows[:, END] == FAILED).sum())
     if failed > 0.01 * len(rows):
         raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin is extreme")
+    if text := inaccurate_text(count_inaccurate(rows), len(rows), float(rows[:, DRIFT].max())):
+        warn(text)
     if failed:
         warn(f"{failed} of {len(rows)} flights could not be computed and count as misses")
     hits, _ = strata.counts()
@@ -308,6 +313,7 @@ def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds:
         profile=np.column_stack([low, high, tries, hits]),
         drift=float(rows[:, DRIFT].max()),
         seconds=seconds,
+        inaccurate=count_inaccurate(rows),
     )
 
 

@@ -31,6 +31,8 @@ OFFSETS = {
 }
 COLUMNS = ("stratum", "number", *RESULTS)
 """Columns of the rows of `fly` and of flights.csv."""
+LARGEST_DRIFT = 1e-6
+"""Energy error of a flight, over the largest kinetic energy of its relative motion, above which it is counted."""
 
 
 def fly(setup: Flight, tasks: Sequence[Task], width: float, seed: int = 0) -> np.ndarray:
@@ -58,6 +60,21 @@ def fly(setup: Flight, tasks: Sequence[Task], width: float, seed: int = 0) -> np
             if not sticks(setup, ends[k]):
                 results[k, 0] = BOUNCE
     return np.column_stack([strata, numbers, results])
+
+
+def count_inaccurate(rows: np.ndarray) -> int:
+    """Number of flights, of rows as those of `fly`, whose energy error exceeds `LARGEST_DRIFT`."""
+    return int(np.count_nonzero(rows[:, COLUMNS.index("drift")] > LARGEST_DRIFT))
+
+
+def inaccurate_text(count: int, flights: int, drift: float) -> str:
+    """What is said of such flights; "" if there are none."""
+    if not count:
+        return ""
+    return (
+        f"{count} of {flights} flights have an energy error above {LARGEST_DRIFT:g} of the largest kinetic energy of "
+        f"their relative motion, up to {drift:.1e}; a smaller tolerance lowers it (1e-8 by default, at least 1e-13)"
+    )
 
 
 def _run(

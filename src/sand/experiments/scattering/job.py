@@ -19,7 +19,7 @@ from ...simulation.run_writer import versions
 from .case import ScatterCase
 from .cross_sections import measure, seed_of
 from .encounters import Flight
-from .flights import COLUMNS, Trajectory, trajectory
+from .flights import COLUMNS, LARGEST_DRIFT, Trajectory, trajectory
 from .maps import probability_map
 
 POINTS = 1001
@@ -131,7 +131,12 @@ class Job:
         rows = found.to_rows()
         write_table(self.folder / RESULTS, rows)
         save(map_figure(found, _title(self.flights)), self.folder / FIGURE)
-        return {"cells": rows, "r1_plus_r2": found.geometric}
+        return {
+            "cells": rows,
+            "r1_plus_r2": found.geometric,
+            "drift": found.drift,
+            "inaccurate": found.inaccurate,
+        }
 
     def _trajectories(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
         from ...plotting.scattering import trajectories_figure
@@ -151,7 +156,13 @@ class Job:
             for k, group in enumerate(groups)
             for one in group
         ]
-        return {"trajectories": results, "b_max": self.flights[0].scales.capture}
+        drifts = [one["drift"] for one in results]
+        return {
+            "trajectories": results,
+            "b_max": self.flights[0].scales.capture,
+            "drift": max(drifts),
+            "inaccurate": sum(drift > LARGEST_DRIFT for drift in drifts),
+        }
 
 
 def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:

@@ -10,14 +10,14 @@ from functools import partial
 import numpy as np
 
 from ...arguments import checked
-from ...errors import BadInput
+from ...errors import BadInput, warn
 from .cross_sections import rows_by_flight, run_flights, seed_of
 from .encounters import Flight
 from .flight_driver import HIT
-from .flights import COLUMNS
+from .flights import COLUMNS, count_inaccurate, inaccurate_text
 from .sampling import HEADROOM, Task, wilson
 
-END, STRATUM = COLUMNS.index("end"), COLUMNS.index("stratum")
+END, STRATUM, DRIFT = (COLUMNS.index(name) for name in ("end", "stratum", "drift"))
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,10 @@ class ProbabilityMap:
         b_max of each speed (V,) [m] (Eqs. 12, 13).
     geometric : float
         r1 + r2 [m].
+    drift : float
+        Largest energy error of a flight over the largest kinetic energy of its relative motion.
+    inaccurate : int
+        Number of flights with a drift above 1e-6; they count as the others do, with a warning.
     """
 
     speeds: np.ndarray
@@ -44,6 +48,8 @@ class ProbabilityMap:
     flights: np.ndarray
     capture: np.ndarray
     geometric: float
+    drift: float = 0.0
+    inaccurate: int = 0
 
     @property
     def probability(self) -> np.ndarray:
@@ -115,6 +121,7 @@ def probability_map(
     most = [min(HEADROOM * one.scales.widest, one.distance if one.sphere else np.inf) for one in flights]
     hits, done = np.zeros((len(flights), cells)), np.zeros((len(flights), cells))
     tasks = [Task(k, 0, per_cell) for k in range(cells)]
+    drift, inaccurate = 0.0, 0
     for v, one in enumerate(flights):
         before = rows_by_flight((known or {}).get(v, ()))
         keep_rows = None if keep is None else partial(keep, v)
@@ -122,8 +129,11 @@ def probability_map(
             cell = rows[:, STRATUM].astype(int)
             np.add.at(hits[v], cell, rows[:, END] == HIT)
             np.add.at(done[v], cell, 1)
+            drift, inaccurate = max(drift, float(rows[:, DRIFT].max())), inaccurate + count_inaccurate(rows)
             if progress is not None:
                 progress(int(done.sum()), done.size * per_cell)
+    if text := inaccurate_text(inaccurate, int(done.sum()), drift):
+        warn(text)
     return ProbabilityMap(
         np.array([one.speed for one in flights]),
         np.linspace(0.0, np.array(most), cells + 1, axis=1),
@@ -131,4 +141,6 @@ def probability_map(
         done,
         np.array([one.scales.capture for one in flights]),
         flights[0].scales.touch,
+        drift,
+        inaccurate,
     )

@@ -108,6 +108,10 @@ class CutoffForce:
         """Whether any grain is subject to the force."""
         raise NotImplementedError
 
+    def largest_energy(self, grains: Grains, distance: float) -> float:
+        """Largest |U| [J] of two grains at a distance [m], without the cut-off."""
+        raise NotImplementedError
+
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings: no grain is subject to the force, or nearest images are summed without a cut-off.
 

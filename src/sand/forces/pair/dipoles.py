@@ -71,8 +71,11 @@ class Dipoles(EwaldForce):
         multipole expansions of the cells of a tree, in a time proportional to the number of grains. "auto": a tree from
         5000 grains on.
     accuracy : float, optional
-        Of the Ewald sum, 1e-8 … 0.1, or of the tree, 1e-6 … 0.1: largest rms error of force and torque, relative to
-        their typical size in a gas of these grains. The parameters of the sum are the cheapest with this accuracy.
+        Of the Ewald sum, 1e-8 … 0.1, or of the tree, 1e-6 … 0.1, a number without unit: largest rms error of the forces
+        (in N) as a fraction of √6 k μ²/a⁴, and of the torques (in N m) as a fraction of √2 k μ²/a³; k = μ₀/4π, μ the
+        rms moment, and a = (3V/4πn)^(1/3) for n moments in the volume V, at most 0.4 of the shortest side. These are
+        the rms force and torque in a gas of such moments. The parameters of the sum are the cheapest with this
+        accuracy.
     boundary : str, optional
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a medium of infinite permeability: no
         demagnetising field) or "vacuum" (a sphere of images in vacuum: demagnetising field −μ₀M/3 of the total
@@ -196,6 +199,14 @@ class Dipoles(EwaldForce):
     def acts_on(self, grains: Grains) -> bool:
         """Whether any grain has a moment."""
         return bool(grains.body_moment.any())
+
+    def largest_energy(self, grains: Grains, distance: float) -> float:
+        """|U| [J] of the two largest moments, parallel and in line, at a distance [m]."""
+        if len(grains) < 2:
+            return 0.0
+        size = np.linalg.norm(grains.body_moment, axis=1)
+        a, b = np.argpartition(-size, 1)[:2]
+        return float(contact_energy(size[a], size[b], distance, MAGNETIC))
 
     def energy_scale(self, grains: Grains) -> float:
         """|U_min| [J] of two grains in contact with the largest moment (Eq. 7)."""

@@ -15,6 +15,8 @@ from .ewald_fit import Sources
 from .tree import ACCURACIES as TREE_ACCURACIES
 
 PERIODIC = ("nearest image", "ewald")
+AUTO = "auto", *PERIODIC
+"""With a choice by box and cut-off."""
 BOUNDARIES = ("tin-foil", "vacuum")
 RECIPROCALS = ("auto", "direct", "mesh")
 OPEN = ("auto", "pairs", "tree")
@@ -28,8 +30,12 @@ SMALLEST_RADIUS = 6.0
 class EwaldForce(CutoffForce):
     """A long-range force with the fields `periodic`, `accuracy` and `boundary` beside those of `CutoffForce`.
 
-    Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, `accuracy: Any = DEFAULT_ACCURACY` and
-    `boundary: str = "tin-foil"` and `reciprocal: str = "auto"`; with `open: str = "auto"` if there is a tree.
+    Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, or "auto", `accuracy: Any =
+    DEFAULT_ACCURACY`, `boundary: str = "tin-foil"` and `reciprocal: str = "auto"`; with `open: str = "auto"` if there
+    is a tree.
+
+    periodic = "auto" is the Ewald sum in a box that is periodic along all axes if neither `cutoff` nor `cut` is given
+    and the sum is possible, else nearest images, or all pairs in an open box.
     """
 
     periodic: str
@@ -42,7 +48,12 @@ class EwaldForce(CutoffForce):
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        words = ("periodic", PERIODIC), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS), ("open", OPEN)
+        words = (
+            ("periodic", self._periodic_words()),
+            ("boundary", BOUNDARIES),
+            ("reciprocal", RECIPROCALS),
+            ("open", OPEN),
+        )
         for name, allowed in words:
             value = getattr(self, name)
             if value not in allowed:
@@ -75,12 +86,15 @@ class EwaldForce(CutoffForce):
                     f"{self.name}: open = {shown(self.open)} is for open boxes and {ewald} for periodic ones; "
                     "leave one of them out"
                 )
-        elif self.periodic in PERIODIC:
+        elif self.periodic in self._periodic_words():
             uses = {"boundary": ewald, "reciprocal": ewald}
             if self.open != "tree":
                 uses["accuracy"] = f"{ewald} or open = 'tree'" if type(self).open == "auto" else ewald
-            for name in self._given(*uses):
+            for name in self._given(*uses) if self.periodic != "auto" else ():
                 problems.append(f"{self.name}: {name} is used only with {uses[name]}; add that, or leave it out")
+            for name in self._given(*uses) if self.periodic == "auto" and self._given("cutoff", "cut") else ():
+                given = " and ".join(self._given("cutoff", "cut"))
+                problems.append(f"{self.name}: {name} is used only by an Ewald sum, which has no {given}; leave it out")
             for name in self._given("cutoff", "cut") if self._given("open") and self.open in OPEN else ():
                 if getattr(self, name) is not None:
                     problems.append(
@@ -88,6 +102,10 @@ class EwaldForce(CutoffForce):
                         f"{shown(self.open)}, which sums all pairs; leave one of them out"
                     )
         return problems
+
+    def _periodic_words(self) -> tuple[str, ...]:
+        """Values of `periodic`."""
+        return AUTO if type(self).periodic == "auto" else PERIODIC
 
     def _given(self, *names: str) -> list[str]:
         """Of these fields the ones that differ from their defaults."""
@@ -105,9 +123,33 @@ class EwaldForce(CutoffForce):
         """Number of grains with a charge or moment."""
         raise NotImplementedError
 
+    def without_ewald(self, grains: Grains | None, box: Box) -> str:
+        """Why there is no Ewald sum in this box; "" if there is one. Without grains it is taken as possible."""
+        if self.periodic != "auto":
+            return "" if self.periodic == "ewald" else "it is not asked for"
+        if given := self._given("cutoff", "cut"):
+            return f"{' and '.join(given)} {'are' if len(given) > 1 else 'is'} given"
+        if any(side is None for side in box.lengths):
+            return f"the box is {box.describe()}"
+        try:
+            if grains is not None:
+                self.ewald(grains, box)
+        except BadInput as error:
+            return error.problems[0].removeprefix(f"{self.name}: ")
+        return ""
+
+    def uses_ewald(self, grains: Grains | None, box: Box) -> bool:
+        """Whether all images are summed in this box."""
+        return not self.without_ewald(grains, box)
+
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warnings, as for all cut-offs; raises BadInput also if `open` has no effect in this box."""
+        """Warnings, as for all cut-offs; raises BadInput also if `open` or `accuracy` has no effect in this box."""
         errors = ErrorCollector()
+        if self.periodic == "auto" and (why := self.without_ewald(grains, box)):
+            for name in self._given("accuracy", "reciprocal"):
+                errors.problems.append(
+                    f"{self.name}: {name} is used only by an Ewald sum, and there is none: {why}; leave it out"
+                )
         if self._given("open") and not box.is_open:
             errors.problems.append(
                 f"{self.name}: open = {shown(self.open)} is for open boxes, and the box is {box.describe()}; "
@@ -119,12 +161,16 @@ class EwaldForce(CutoffForce):
 
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """The cut-off radius, or that of the real part of the Ewald sum, with the reason."""
-        if self.periodic != "ewald":
-            return super().choose(grains, box)
+        if why := self.without_ewald(grains, box):
+            choice = super().choose(grains, box)
+            stated = self.periodic != "auto" or box.is_open or self._given("cutoff", "cut")
+            return choice if stated else choice._replace(reason=f"{choice.reason}; no Ewald sum: {why}")
         chosen = self.ewald(grains, box)
+        auto = "all images, as the box is periodic along x, y and z and no cut-off is given: "
         return CutoffChoice(
             chosen.radius,
-            f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
+            (auto if self.periodic == "auto" else "")
+            + f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
             f"alpha = {chosen.product:g}/radius, {chosen.reciprocal}; predicted errors "
             f"of force {chosen.force_error:.1e}, of {self.sources.field} {chosen.field_error:.1e}",
         )
@@ -147,5 +193,9 @@ class EwaldForce(CutoffForce):
         return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources, self.reciprocal)
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
-        """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box."""
-        return self.parameters() if self.periodic == "ewald" else super().resolved(grains, box)
+        """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box.
+
+        "auto" stays in an open box, too, so that a change to a periodic one sums all images.
+        """
+        as_given = self.uses_ewald(grains, box) or (self.periodic == "auto" and box.is_open)
+        return self.parameters() if as_given else super().resolved(grains, box)

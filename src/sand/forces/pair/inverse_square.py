@@ -100,8 +100,8 @@ class Charges(EwaldForce, InverseSquare):
     ----------
     cutoff : float, str or None, optional
         "auto", None (no cut-off: all pairs in an open box, nearest images in a periodic one), or a length [m]. "auto"
-        is None in an open box and (L/2)/1.35 in a periodic one; there the cut-off models screening, not an infinite
-        plasma.
+        is None in an open box and with an Ewald sum, else (L/2)/1.35. A cut-off ends an interaction that has no
+        range: at a start a warning says so if |U(r_c)| of the two largest charges exceeds 0.1 k_BT.
     cut : str, optional
         "smooth": the interaction is switched off over the outer fifth of the cut-off radius, which conserves energy;
         or "sharp".
@@ -109,10 +109,14 @@ class Charges(EwaldForce, InverseSquare):
         What acts in a periodic box. "nearest image": the nearest image of each grain within the cut-off. "ewald": all
         images of all grains, by an Ewald sum, in a box that is periodic along all axes; without `cutoff` and `cut`. A
         net charge Q of the box is neutralised by a uniform background, which exerts no force, with a warning; its
-        constant energy, −πkQ²/(2Vα²), is included.
+        constant energy, −πkQ²/(2Vα²), is included. "auto": "ewald" if the box is periodic along all axes, neither
+        `cutoff` nor `cut` is given and the sum needs no more than a million wave vectors or 32 million nodes; else
+        "nearest image".
     accuracy : float, optional
-        Of the Ewald sum, 1e-8 … 0.1: largest rms error of force and potential, relative to their typical size in a gas
-        of these grains. The parameters of the sum are the cheapest with this accuracy.
+        Of the Ewald sum, 1e-8 … 0.1, a number without unit: largest rms error of the forces (in N) as a fraction of
+        √3 k q²/a², and of the potentials (in V) as a fraction of k q/a; k = 1/4πε₀, q the rms charge, and a =
+        (3V/4πn)^(1/3) for n charges in the volume V, at most 0.4 of the shortest side. These are the rms force and the
+        potential in a gas of such charges. The parameters of the sum are the cheapest with this accuracy.
     boundary : str, optional
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a conductor: no field of the polarisation).
         "vacuum" is refused: its energy depends on the total dipole moment of the charges in the box, which jumps when a
@@ -130,7 +134,7 @@ class Charges(EwaldForce, InverseSquare):
 
     cutoff: Any = "auto"
     cut: str = "smooth"
-    periodic: str = "nearest image"
+    periodic: str = "auto"
     accuracy: Any = DEFAULT_ACCURACY
     boundary: str = "tin-foil"
     reciprocal: str = "auto"
@@ -150,12 +154,18 @@ class Charges(EwaldForce, InverseSquare):
     def __post_init__(self) -> None:
         errors = ErrorCollector()
         errors.take(super().__post_init__)
-        if self.periodic == "ewald" and self.boundary == "vacuum":
+        if self.periodic != "nearest image" and self.boundary == "vacuum":
             errors.problems.append(
                 f"{self.name}: boundary = 'vacuum' is for dipoles only: its energy depends on the total dipole moment "
                 "of the charges in the box, which jumps when a charge crosses a wall; use 'tin-foil'"
             )
         errors.done()
+
+    def without_ewald(self, grains: Grains | None, box: Box) -> str:
+        """Why there is no Ewald sum in this box; "" if there is one."""
+        if self.periodic == "auto" and type(self).formula is not coulomb:
+            return "the formula is not that of charges"
+        return super().without_ewald(grains, box)
 
     def carriers(self, grains: Grains) -> int:
         """Number of charged grains."""
@@ -163,26 +173,27 @@ class Charges(EwaldForce, InverseSquare):
 
     def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
-        if self.periodic == "ewald":
+        if self.uses_ewald(grains, box):
             order = 0 if grains is None or box.is_open else self.ewald(grains, box).order
             return ewald_charge_sums(degree_for(self.accuracy), listed, type(self).formula, order)
         return super().sums(box, listed)
 
     def numbers(self, grains: Grains, box: Box) -> Any:
         """Parameters of the loops."""
-        if self.periodic == "ewald":
+        if self.uses_ewald(grains, box):
             return ewald_parameters(self.ewald(grains, box), box, len(grains), False, CHARGES)
         return super().numbers(grains, box)
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings: as for all cut-offs; a net charge in an Ewald sum."""
         warnings, net = super().check(grains, box), math.fsum(grains.charge)
-        if self.periodic == "ewald" and abs(net) > NEUTRAL * np.abs(grains.charge).sum():
+        if abs(net) > NEUTRAL * np.abs(grains.charge).sum() and self.uses_ewald(grains, box):
             energy = 0.5 * mean_field(self.ewald(grains, box).alpha, box.volume, False, CHARGES) * net**2
             warnings.append(
-                f"{self.name}: the net charge of the box is {format_quantity(net, 'C')}; periodic = 'ewald' balances "
-                f"it by a uniform background of {format_quantity(-net, 'C')}, which exerts no force on grains and adds "
-                f"the constant energy -pi k Q^2/(2 V alpha^2) = {format_quantity(energy, 'J')} to column {self.column}"
+                f"{self.name}: the net charge of the box is {format_quantity(net, 'C')}; periodic = '{self.periodic}' "
+                f"balances it by a uniform background of {format_quantity(-net, 'C')}, which exerts no force on grains "
+                f"and adds the constant energy -pi k Q^2/(2 V alpha^2) = {format_quantity(energy, 'J')} to column "
+                f"{self.column}"
             )
         return warnings
 

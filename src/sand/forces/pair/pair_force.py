@@ -9,6 +9,7 @@ import numpy as np
 
 from ...box import Box
 from ...grains import Grains
+from ...ramps import forces_at_points
 from .cutoff import CutoffForce, cutoff_for
 from .generic_loops import PairGrain, PairParameters, pair_sums
 from .loops import LongRangeSums
@@ -50,6 +51,10 @@ class PairForce(CutoffForce):
         """Whether any grain is subject to the force."""
         return bool(getattr(grains, self.source).any())
 
+    def largest_energy(self, grains: Grains, distance: float) -> float:
+        """Largest |U| [J] of two grains at a distance [m], without the cut-off."""
+        return max(energy_at(type(f).formula, f.constants(), grains, distance) for f in forces_at_points(self))
+
     def energy_scale(self, grains: Grains) -> float:
         """Largest |U| [J] of a grain in contact with an equal one, among those with extreme quantities."""
         return contact_energy(type(self).formula, self.constants(), grains)
@@ -62,12 +67,31 @@ def contact_energy(pair_formula: Callable, constants: Any, grains: Grains) -> fl
     """
     moment = np.linalg.norm(grains.body_moment, axis=1)
     extreme = {int(np.argmax(q)) for q in (moment, np.abs(grains.charge), grains.mass, -grains.radius)}
+    ones = [_extended(grains, i, moment[i]) for i in sorted(extreme)]
+    return max(_size_of_energy(pair_formula, constants, one, one, 2.0 * one.radius) for one in ones)
+
+
+def energy_at(pair_formula: Callable, constants: Any, grains: Grains, distance: float) -> float:
+    """Largest |U| [J] of two grains at a distance [m]: of those with the largest moments, charges, or masses.
+
+    Two directions, along the moments, which are parallel, and across them; 0 for a single grain.
+    """
+    if len(grains) < 2:
+        return 0.0
+    moment = np.linalg.norm(grains.body_moment, axis=1)
     found = 0.0
-    for i in sorted(extreme):
-        own = PairGrain(
-            (0.0, 0.0, float(moment[i])), *(float(q[i]) for q in (grains.charge, grains.mass, grains.radius))
-        )
-        for direction in (0, 2):
-            apart = tuple(2.0 * own.radius if axis == direction else 0.0 for axis in range(3))
-            found = max(found, abs(pair_formula(apart, own, own, constants)[-1]))
+    for quantity in (moment, np.abs(grains.charge), grains.mass):
+        a, b = (_extended(grains, int(i), moment[i]) for i in np.argpartition(-quantity, 1)[:2])
+        found = max(found, _size_of_energy(pair_formula, constants, a, b, distance))
     return found
+
+
+def _extended(grains: Grains, i: int, moment: float) -> PairGrain:
+    """Grain i, with its moment along z."""
+    return PairGrain((0.0, 0.0, float(moment)), *(float(q[i]) for q in (grains.charge, grains.mass, grains.radius)))
+
+
+def _size_of_energy(pair_formula: Callable, constants: Any, a: PairGrain, b: PairGrain, distance: float) -> float:
+    """|U| [J] along the moments or across them, the larger one."""
+    directions = (distance, 0.0, 0.0), (0.0, 0.0, distance)
+    return max(abs(float(pair_formula(apart, a, b, constants)[-1])) for apart in directions)

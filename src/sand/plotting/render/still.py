@@ -92,7 +92,7 @@ def still_picture(
     frame : Frame
         Frame of a trajectory, or any object with its attributes.
     colour : str, optional
-        Quantity shown as the colour of grains: a name in `analysis.quantities.GRAINS`.
+        Quantity shown as the colour of grains: a name in `analysis.quantities.GRAINS`, or of an own quantity.
     bonds : str, optional
         Mark contacts with colours by "load" or "mode" (`analysis.quantities.CONTACTS`); None: do not mark them.
     arrows : bool, optional
@@ -127,7 +127,7 @@ def still_picture(
         With one line for each error.
     """
     refuse_other(frame, "radius", "pair", "box")
-    towards_eye = check_picture_options(colour, bonds, view, size, dpi)
+    towards_eye = check_picture_options(colour, bonds, view, size, dpi, frame)
     flux_density = None if field is None else np.asarray(field, dtype=np.float64)
     scene = make_scene(frame, frame.pair, frame.box, whole)
     scene, key = _coloured_scene(scene, frame, colour, flux_density, arrows)
@@ -150,9 +150,14 @@ def still_picture(
 
 
 def check_picture_options(
-    colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int], dpi: int = DPI
+    colour: str,
+    bonds: str | None,
+    view: str | Sequence[float],
+    size: tuple[int, int],
+    dpi: int = DPI,
+    frame: Any = None,
 ) -> np.ndarray | None:
-    """Check the options of `still_picture`.
+    """Check the options of `still_picture`; `frame` has the names of own quantities.
 
     Returns
     -------
@@ -165,10 +170,10 @@ def check_picture_options(
         With one line for each error.
     """
     problems: list[str] = []
-    for name, allowed in ((colour, GRAIN_NAMES), (bonds, CONTACT_NAMES)):
+    for name, allowed, of in ((colour, GRAIN_NAMES, frame), (bonds, CONTACT_NAMES, None)):
         if name is not None:
             try:
-                quantity(name, allowed)
+                quantity(name, allowed, of)
             except BadInput as error:
                 problems += error.problems
     if not all(MIN_SIZE <= length <= MAX_SIZE for length in size):
@@ -197,7 +202,7 @@ def _coloured_scene(
 ) -> tuple[Scene, ColourKey | None]:
     """Scene with grains coloured by a quantity, and the colour key."""
     values = measured(frame, name, field)[scene.number]
-    colours, key = coloured(values, quantity(name), frame, scene.label)
+    colours, key = coloured(values, quantity(name, frame=frame), frame, scene.label)
     shown = scene.arrow if arrows else np.zeros_like(scene.arrow)
     return dataclasses.replace(scene, colour=colours, arrow=shown), key
 
@@ -227,12 +232,26 @@ def _contact_rods(scene: Scene, frame: Any, name: str | None) -> tuple[Rods, Col
     distance = np.linalg.norm(offset, axis=1, keepdims=True)
     radius = CONTACT_RADIUS * np.minimum(scene.radius[i], scene.radius[j])
     half = 0.4 * radius[:, None] * offset / np.maximum(distance, 1e-300)
-    share = (scene.radius[i] / (scene.radius[i] + scene.radius[j]))[:, None]
+    share = contact_share(distance[:, 0], scene.radius[i], scene.radius[j])[:, None]
     first, second = scene.position[i] + share * offset, scene.position[j] - (1.0 - share) * offset
     separated = np.linalg.norm(first - second, axis=1) > 1e-6 * distance[:, 0]
     centre = np.concatenate([first, second[separated]])
     half, radius, colours = (np.concatenate([each, each[separated]]) for each in (half, radius, colours))
     return _cylinders(centre - half, centre + half, radius, colours), key
+
+
+def contact_share(distance: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Share of the way between two centres at which their spheres intersect, (d² + r² − s²) / (2 d²), from 0 to 1.
+
+    Parameters
+    ----------
+    distance : ndarray
+        Distances d (C,) [m].
+    first, second : ndarray
+        Radii r and s (C,) [m]; the share is measured from the centre of the first grain.
+    """
+    squared = np.maximum(distance, 1e-300) ** 2
+    return np.clip(0.5 + 0.5 * (first**2 - second**2) / np.maximum(squared, 1e-300), 0.0, 1.0)
 
 
 def _cylinders(
