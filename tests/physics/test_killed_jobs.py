@@ -141,6 +141,12 @@ def results(command, folder):
     ]
 
 
+def rows_after_checkpoint(box):
+    """Whether the ledger of a run has rows that a resumed run computes again."""
+    steps = np.loadtxt(box / "ledger.csv", delimiter=",", skiprows=1, ndmin=2)[:, 0]
+    return steps[-1] > newest_checkpoint(box)[1]["steps"]
+
+
 @pytest.fixture(scope="module")
 def whole(request, tmp_path_factory):
     """Command and case, results of an undisturbed job, and its duration [s] after its first results."""
@@ -183,10 +189,8 @@ def stopped_and_resumed(whole, folder, way, moment):
         assert way == "parent killed" or job.returncode == DONE or f"sand resume {folder}" in said
         assert "Traceback" not in said
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    for box in folder.glob("seed-*"):
-        if (box / "ledger.csv").exists() and list(box.glob("checkpoint-*")) and way != "parent killed":
-            steps = np.loadtxt(box / "ledger.csv", delimiter=",", skiprows=1, ndmin=2)[:, 0]
-            assert newest_checkpoint(box)[1]["steps"] >= steps[-1]  # no row is computed again
+    unsaved = [box for box in folder.glob("seed-*") if list(box.glob("checkpoint-*")) and rows_after_checkpoint(box)]
+    assert len(unsaved) <= (way == "worker killed")  # the box of the worker that was killed
     again = start("resume", folder, folder)
     said = again.communicate(timeout=300)[0]
     assert again.returncode == DONE, said

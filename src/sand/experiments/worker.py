@@ -25,6 +25,8 @@ SHIELDED = frozenset(STOPS) - STOPPERS
 """Signals that workers ignore: they are sent to the parent, too, which then stops its workers."""
 LONGEST_STOP = 60.0
 """Wall time [s] after which a worker without a parent ends without a checkpoint."""
+SHORT = 0.02
+"""Wall time [s] between two looks whether the checkpoint is written."""
 STOPPED = 1
 """Exit code of a worker that was stopped."""
 
@@ -66,11 +68,11 @@ def _end_with_parent(reader: int | None) -> None:
         if has_signal or ready != [reader]:
             break
     _stopping.set()
-    if not Signals.ends_with_checkpoint():
-        os._exit(STOPPED)
-    if not has_signal:  # nothing has told the run
+    if Signals.saving and not has_signal:  # nothing has told the run
         signal.raise_signal(signal.SIGTERM)
-    time.sleep(LONGEST_STOP)
+    end = time.monotonic() + LONGEST_STOP
+    while Signals.saving and time.monotonic() < end:
+        time.sleep(SHORT)
     os._exit(STOPPED)
 
 

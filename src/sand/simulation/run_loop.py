@@ -104,7 +104,8 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
             return Outcome.INTERRUPTED
         if condition is not None and _is_late(simulation, condition, wall.monotonic() - started):
             return Outcome.WALL_TIME
-        signals.has_to_save = simulation.writer is not None
+        if simulation.writer:
+            signals.saving.add(simulation.writer)
 
 
 def _schedules(simulation: Simulation) -> list[Schedule]:

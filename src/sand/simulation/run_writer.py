@@ -45,6 +45,7 @@ from .displays import DISPLAYS
 from .ledger import Ledger
 from .outcome import UNFINISHED, Result
 from .serialise import case_of
+from .signals import Signals
 from .stop import StopCriteria
 from .updater import described
 
@@ -147,6 +148,7 @@ class RunWriter:
 
     def release(self) -> None:
         """Release the lock of the folder; `open` takes it again."""
+        Signals.saving.discard(self)
         if self._lock is not None:
             self._lock.release()
             self._lock = None
@@ -270,6 +272,7 @@ class RunWriter:
             self._trajectory.close()
         summary = summary_of(simulation, result, ledger) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
+        Signals.saving.discard(self)
         # no figure after an interruption: the user is waiting for the prompt, or the wall time ends
         if self.draws and result.outcome not in UNFINISHED:
             self.draw(simulation)

@@ -27,27 +27,21 @@ class Signals:
     ----------
     received : int or None
         The signal.
-    has_to_save : bool
-        Whether the run has taken steps since its last start, and writes checkpoints. Before, an interruption loses
-        nothing.
     """
 
+    saving: ClassVar[set[Any]] = set()
+    """Writers of runs that have taken steps and have not yet written their last checkpoint and summary; of all other
+    runs nothing is lost if this process ends at once."""
     _present: ClassVar[list[Signals]] = []
 
     def __init__(self) -> None:
         self.received: int | None = None
-        self.has_to_save = False
         self._before: dict[int, Any] = {}
-
-    @classmethod
-    def ends_with_checkpoint(cls) -> bool:
-        """Whether a run of this process writes a checkpoint when a signal arrives."""
-        return any(each.has_to_save for each in cls._present)
 
     @classmethod
     def check(cls) -> None:
         """Raise KeyboardInterrupt if a signal has arrived and nothing is lost by it; the run cannot continue then."""
-        if any(each.received is not None and not each.has_to_save for each in cls._present):
+        if not cls.saving and any(each.received is not None for each in cls._present):
             raise KeyboardInterrupt
 
     def __enter__(self) -> Signals:
