@@ -118,7 +118,7 @@ def end_of_run(text: str) -> Any:
     return click.option("--until", metavar="TIME", callback=_seconds, help=text)
 
 
-def _seconds(context: click.Context, _option: click.Parameter, text: str | None) -> float | None:
+def _seconds(context: click.Context, option: click.Parameter, text: str | None) -> float | None:
     """Convert a time to seconds, checked as in a case file; a bare number is SI.  Raises BadInput."""
     if text is None or context.resilient_parsing:
         return None
@@ -128,7 +128,15 @@ def _seconds(context: click.Context, _option: click.Parameter, text: str | None)
         value: float | str = float(text)
     except ValueError:
         value = text
-    return duration(value, "--until")
+    return duration(value, option.opts[0])
+
+
+wall_time = click.option(
+    "--wall-time",
+    metavar="TIME",
+    callback=_seconds,
+    help="Stop after this wall time, such as 23h, with a checkpoint and exit code 4; continue with `sand resume`.",
+)
 
 
 def seeds(text: str) -> Any:

@@ -14,6 +14,7 @@ from ..errors import BadInput
 from ..forces.own import import_modules
 from ..grains import Grains
 from ..io.checkpoint import newest_checkpoint
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..setup.from_file import from_trajectory, is_own_trajectory, start_from_file
@@ -200,7 +201,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
     import_modules(imports)
-    if not any(place.glob("checkpoint-*.npz")):
+    if not checkpoint_files(place):
         advice = ""
         if (place / TRAJECTORY).exists():
             advice = f"; to start a new run from its last frame: sand run --from {shlex.quote(str(place))}"

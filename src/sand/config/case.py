@@ -56,7 +56,7 @@ class RunSection(Section):
     stop: str | None = None
     """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
     ledger compared (< <= > >= == !=) with numbers with units; checked every 100 steps, with rigid clusters in every
-    step, see `Simulation.run`."""
+    step. "wall > 23 h" stops the run after this wall time, to be continued. See `Simulation.run`."""
     frame_every: Cadence | None = None
     """Frames: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default 1/200
     of the run."""

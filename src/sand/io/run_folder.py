@@ -8,7 +8,11 @@ import errno
 import io
 import json
 import os
+import re
+import secrets
+import shutil
 import stat
+import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,6 +41,8 @@ OWN_FILES = (
     "view.html",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
+CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
+"""Names of checkpoints, with the number of steps; other names are those of copies that the user keeps."""
 _NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
 """Errors by which systems report that they cannot sync a folder."""
 
@@ -77,7 +83,8 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     Raises
     ------
     BadInput
-        If the folder is not empty, or another process writes to it.
+        If the folder is not empty, or another process writes to it; with `overwrite` if it holds files, but none shows
+        that a run or job of SAND wrote them.
     FilesFailed
         If it cannot be created or written to.
     """
@@ -93,21 +100,46 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     f"folder {folder} exists and is not empty; give another one, remove it, "
                     "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
+            found = files_of_runs(folder)
+            if found and not shows_a_run(folder):
+                names = ", ".join(path.name for path in found)
+                raise BadInput(
+                    f"{folder} holds {names}, but nothing shows that SAND wrote them, so they are not replaced: give "
+                    "another folder, or remove them"
+                )
             with writing(folder):
-                names = (*OWN_FILES, "checkpoint-*.npz")
-                own = [path for name in names for end in ("", f"{DAMAGED}*") for path in folder.glob(name + end)]
+                own = [*found, *(old for path in found for old in folder.glob(f"{path.name}{DAMAGED}*"))]
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
                 for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".probe"
-        probe.write_bytes(b"")
-        probe.unlink()
+        with tempfile.NamedTemporaryFile(dir=folder):
+            pass
     except FilesFailed:
         raise
     except OSError as error:
         raise FilesFailed(f"cannot write to folder {folder}: {error.strerror}") from error
     return folder
+
+
+def files_of_runs(folder: Path) -> list[Path]:
+    """Files of a folder that have names which SAND gives."""
+    return sorted(one for one in folder.iterdir() if one.name in OWN_FILES or CHECKPOINT.fullmatch(one.name))
+
+
+def shows_a_run(folder: Path) -> bool:
+    """Whether the content of a file in a folder, not only its name, shows that SAND wrote it."""
+    for name in (CASE, ONE_COLLISION):
+        if was_written_by_sand(folder / name):
+            return True
+    for path in files_of_runs(folder):
+        with contextlib.suppress(OSError), open(path, "rb") as file:
+            begin = file.read(4096)
+            if path.name == TRAJECTORY and b"SAND" in begin:  # the application in the header of GSD
+                return True
+            if CHECKPOINT.fullmatch(path.name) and begin.startswith(b"PK") and b"meta.json" in begin:
+                return True
+    return False
 
 
 def is_used(folder: Path) -> bool:
@@ -130,9 +162,10 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     FilesFailed
         If the file cannot be written; the old one is untouched then.
     """
-    temporary = path.with_name(f".{path.name}.new")
+    # a new file of a random name: one of a fixed name may be a link to a file elsewhere
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.new")
     try:
-        with open(temporary, "wb") as file:
+        with open(temporary, "xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -144,6 +177,26 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def give_own_content(path: Path) -> None:
+    """Replace a file that has several names, by a link or by hard links, with a copy of its own.
+
+    Raises
+    ------
+    FilesFailed
+        If it cannot be copied.
+    """
+    try:
+        shared = path.is_symlink() or path.stat().st_nlink > 1
+    except FileNotFoundError:
+        path.unlink(missing_ok=True)  # a link to nothing, through which a file elsewhere would be created
+        return
+    except OSError as error:
+        raise FilesFailed(f"cannot read {path}: {error.strerror}") from error
+    if shared:
+        with open(path, "rb") as old, replacing(path) as new:
+            shutil.copyfileobj(old, new)
 
 
 def append_text(path: Path, text: str) -> None:
@@ -206,7 +259,9 @@ def read_json(path: Path) -> dict[str, Any]:
         raise BadInput(f"{path} is not JSON") from None
     if not isinstance(content, dict):
         raise BadInput(f"{path} is not a summary of SAND")
-    if content.get(DIGEST, digest_of(content)) != digest_of(content):
+    # every summary has a digest: one without it was changed, too
+    without = None if path.name == SUMMARY else digest_of(content)
+    if content.get(DIGEST, without) != digest_of(content):
         raise BadInput(f"{path} is damaged: its content does not match its digest")
     return content
 
@@ -221,13 +276,15 @@ def refuse_devices(path: str | Path) -> None:
         raise BadInput(f"{path} is a device or a pipe; give an ordinary file")
 
 
-def read_text(path: str | Path, most: int | None = None) -> str:
+def read_text(path: str | Path, most: int | None = None, errors: str = "strict") -> str:
     """Read the text of a UTF-8 file, with or without a byte-order mark; lines end with "\\n".
 
     Parameters
     ----------
     most : int or None, optional
         Largest accepted size in bytes, for files of any type; by default all of an ordinary file is read.
+    errors : str, optional
+        What is done with bytes that are not text, as for `bytes.decode`.
 
     Raises
     ------
@@ -250,7 +307,7 @@ def read_text(path: str | Path, most: int | None = None) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise BadInput(f"{path} is not a text file in UTF-8, but one in UTF-16; save it as UTF-8")
     try:
-        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig").read()
+        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig", errors=errors).read()
     except UnicodeDecodeError:
         raise BadInput(f"{path} is not a text file") from None
 
@@ -317,7 +374,7 @@ def is_job(folder: Path, case: Path) -> bool:
     return (
         was_written_by_sand(case)
         or bool(results & names)
-        or any(name.startswith(("checkpoint-", "seed-")) for name in names)
+        or any(CHECKPOINT.fullmatch(name) or name.startswith("seed-") for name in names)
     )
 
 

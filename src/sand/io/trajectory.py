@@ -20,6 +20,7 @@ from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
 from .frame import Frame, FrameSequence, append_frame, code_of, read_identities, read_stored, stored_frame
+from .run_folder import give_own_content
 
 FLUSH_EVERY = 1.0
 """Wall time [s] between flushes; GSD buffers, and unflushed frames are lost if the process is killed."""
@@ -70,6 +71,8 @@ class TrajectoryWriter:
         self._entries = 0  # upper bound of the index entries
         self._flushed = wall.monotonic()
         try:
+            if resume_at is not None:
+                give_own_content(path)
             if resume_at is not None and path.exists():
                 try:
                     self._later, lost = gsd_index.repair_or_keep(path, resume_at, written)

@@ -323,7 +323,8 @@ class Simulation(ReadOnlySettings):
             `or` and parentheses, such as "mean_cluster_size >= 20 and time > 1 us"; or a function of the simulation
             that returns True or False and changes nothing. It is checked at the regular steps 0, 100, 200, …, or the
             ends of the r-RESPA cycles in which these lie, and so at moments that depend neither on output nor on
-            interruptions.
+            interruptions. `wall` is the wall time of this call: where a condition holds only because of it, as "wall >
+            23 h" does, the outcome is `WALL_TIME`, and the run can be resumed with the bits of an uninterrupted one.
 
         Returns
         -------
@@ -337,7 +338,7 @@ class Simulation(ReadOnlySettings):
         FilesFailed
             If a file cannot be written, for example because the disk is full; files written before stay intact.
         Interrupted
-            After Ctrl-C or SIGTERM, when the checkpoint is written.
+            After Ctrl-C, SIGTERM, SIGUSR1, SIGUSR2, SIGHUP or SIGXCPU, when the checkpoint is written.
         """
         if self._failure:
             raise BadInput(f"this simulation cannot continue: {self._failure}")
