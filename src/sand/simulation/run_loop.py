@@ -41,6 +41,9 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
     updates = UpdateSchedule(simulation)
     if condition is not None and simulation.steps == 0.0 == simulation.time and _is_met(simulation, condition):
         return Outcome.CONDITION_MET
+    simulation._stopped_by = updates.act_again()
+    if simulation._stopped_by:
+        return Outcome.CONDITION_MET
     steps_per_call, checked_at, estimate = 64, simulation.steps, RunTimeEstimate(end, last, simulation._warn)
     while True:
         logged = [row["time"] for row in simulation.ledger.rows[-1:]]
