@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import pickle
 import re
 import stat
 import sys
@@ -21,7 +20,7 @@ from numba import types
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
-from numba.core.serialize import dumps
+from numba.core.serialize import dumps, loads
 
 from ..errors import warn
 from .cache import WRITABLE_BY_OTHERS, remade
@@ -181,7 +180,7 @@ class CodeCache(NullCache):
         if content is None:
             return None
         try:
-            return CompileResult._rebuild(target, *pickle.loads(content))
+            return CompileResult._rebuild(target, *loads(content))
         except MemoryError:
             raise
         except Exception as error:  # written by a numba that differs in spite of its version
