@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import click
 
+from ..descriptions import docstring
 from ..errors import SandError
 from ..version import __version__
 from . import (
@@ -49,6 +50,7 @@ def sand(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
+sand.help = docstring(sand.callback)
 for _module in COMMANDS:
     sand.add_command(_module.command)
 

@@ -7,6 +7,7 @@ import ctypes
 import math
 import os
 import time as wall
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -157,6 +158,7 @@ class TrajectoryWriter:
         if self._file is not None:
             # when GSD's object is destroyed it would write once more and damage the file (see `reserve_space`): leak it
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
+            self._file.closes_at_exit.detach()
         self._abandoned = True
         with contextlib.suppress(OSError, RuntimeError, BadInput):
             gsd_index.repair(self.path, self._whole_until)
@@ -177,11 +179,24 @@ class TrajectoryWriter:
 
 def _open_file(path: Path, append: bool) -> Any:
     """Open a GSD file for appending, or create it."""
-    import gsd.hoomd
-
     if not append:
         path.touch()  # GSD creates files that other users cannot read, but keeps the mode of an existing one
-    return gsd.hoomd.open(str(path), "r+" if append else "w")
+    return _open_gsd(path, "r+" if append else "w")
+
+
+def _open_gsd(path: Path, mode: str) -> Any:
+    """Open a GSD file that is closed before the program ends, because GSD's objects cannot close it afterwards."""
+    import gsd.hoomd
+
+    file = gsd.hoomd.open(str(path), mode)
+    file.closes_at_exit = weakref.finalize(file, _close_gsd, file.file)
+    return file
+
+
+def _close_gsd(file: Any) -> None:
+    """Close a GSD file that is in use no more; on a full disk, frames that were not flushed are lost."""
+    with contextlib.suppress(OSError, RuntimeError):
+        file.close()
 
 
 class Frames(FrameSequence):
@@ -199,14 +214,12 @@ class Frames(FrameSequence):
     """
 
     def __init__(self, path: str | Path):
-        import gsd.hoomd
-
         self.path = Path(path)
         if not self.path.exists():
             raise BadInput(f"there is no file {path}")
         try:
             gsd_index.refuse_impossible_sizes(self.path)
-            self._file = gsd.hoomd.open(str(path), "r")
+            self._file = _open_gsd(self.path, "r")
         except BadInput:
             raise
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
