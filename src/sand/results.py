@@ -184,7 +184,7 @@ class Run:
             If the format is unknown, there is no frame, or the folder does not exist.
         """
         place = self.folder / "trajectory" if stem is None else Path(stem)
-        return export_frames(self.frames[frames], place, form, cluster_labels)
+        return export_frames(self.frames, place, form, cluster_labels, frames)
 
     def to_xarray(self) -> Any:
         """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray.

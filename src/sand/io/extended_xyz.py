@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
+from urllib.parse import quote, unquote
 
 import numpy as np
 
@@ -38,14 +39,28 @@ def own_columns(own: OwnQuantities) -> tuple[str, str]:
     return "".join(f":{name}:R:1" for name in own), f' own="{units}"' if own else ""
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names of materials for `materials="…"`, separated by semicolons.
+
+    Characters that would end a name, the list or the line are written as in a URL: "%3B" for a semicolon.
+    """
+    return ";".join(re.sub(r"[^\S ]|[;\"'%\\\x00-\x1f\x7f]", lambda found: quote(found[0]), name) for name in names)
+
+
+def row_form(columns: Sequence[np.ndarray]) -> str:
+    """Format of a row of the columns (N,) or (N, k), with the digits that restore their numbers exactly."""
+    forms = ("%d" if c.dtype.kind in "iu" else "%.9g" if c.dtype == np.float32 else "%.17g" for c in columns)
+    return " ".join(" ".join([form] * (c.size // max(len(c), 1))) for form, c in zip(forms, columns, strict=True))
+
+
 def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
     """Format the rows of the columns (N,) or (N, k)."""
     return [form % tuple(row) for row in np.column_stack(columns).tolist()]
 
 
-def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Sequence[np.ndarray], form: str) -> str:
+def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Sequence[np.ndarray]) -> str:
     """Format a frame: number of grains, `head`, and per grain the chemical symbol of its material and the columns."""
-    symbols = [SYMBOLS.get(names[k], "X") for k in material]
+    symbols, form = [SYMBOLS.get(names[k], "X") for k in material], row_form(columns)
     rows = [f"{symbol} {row}" for symbol, row in zip(symbols, format_rows(columns, form), strict=True)]
     return "\n".join([str(len(rows)), head, *rows]) + "\n"
 
@@ -59,11 +74,10 @@ def xyz_text(grains: Grains) -> str:
     names, (own, units) = [m.name for m in grains.materials], own_columns(grains.own)
     head = (
         f"Properties=species:S:1:pos:R:3:radius:R:1:moment:R:3:charge:R:1{own}:material:I:1 "
-        f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI{units}'
+        f'materials="{listed(names)}" pbc="F F F" length_unit=angstrom other_units=SI{units}'
     )
     columns = [grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment, grains.charge, *grains.own.values()]
-    form = "%.17g " * (8 + len(grains.own)) + "%d"
-    return xyz_frame(names, grains.material, head, [*columns, grains.material], form)
+    return xyz_frame(names, grains.material, head, [*columns, grains.material])
 
 
 def is_xyz(lines: list[str]) -> bool:
@@ -173,7 +187,7 @@ def _names(
     if "material" not in layout:
         return None
     words = [row[layout["material"][0]] for row in rows]
-    known = head.get("materials", "").split(";")
+    known = [unquote(name) for name in head.get("materials", "").split(";")]
     try:
         return [known[int(word)] for word in words] if "materials" in head else words
     except (ValueError, IndexError):

@@ -208,10 +208,11 @@ class Frame:
     """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
     `material` (N,) holds indices into the names `materials`; `id` (N,) is the identity of each grain, which stays when
-    others are removed; `image` (N, 3) counts how often it has crossed the periodic box since the start. `own` are the own quantities (N,) by name, also attributes: `frame.temperature`. `at_rest` (N,),
-    True for grains of clusters at rest, single grains included, is None without `sand.RigidClusters`. Arrays of
-    contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3),
-    and `share` (C, 4) with columns `MODES`.
+    others are removed; `image` (N, 3) counts how often it has crossed the periodic box since the start of the run, and
+    `unwrapped` (N, 3) are the positions without these jumps. `own` are the own quantities (N,) by name, also
+    attributes: `frame.temperature`. `at_rest` (N,), True for grains of clusters at rest, single grains included, is
+    None without `sand.RigidClusters`. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad]
+    (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
     """
 
     def __init__(self, stored: Any):

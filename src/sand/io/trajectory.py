@@ -19,7 +19,16 @@ from ..grains import Grains
 from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
-from .frame import Frame, FrameSequence, append_frame, code_of, read_identities, read_materials, read_stored, stored_frame
+from .frame import (
+    Frame,
+    FrameSequence,
+    append_frame,
+    code_of,
+    read_identities,
+    read_materials,
+    read_stored,
+    stored_frame,
+)
 
 FLUSH_EVERY = 1.0
 """Wall time [s] between flushes; GSD buffers, and unflushed frames are lost if the process is killed."""
