@@ -61,7 +61,7 @@ def assert_same(own, index=slice(None)):
 
 
 def test_grain_arrays_are_those_of_the_schema():
-    """`GrainArrays` names the quantities of the schema in the same order, then own quantities, material, id and image."""
+    """`GrainArrays` names the quantities of the schema in the same order, then others."""
     assert GrainArrays._fields == (*(field.name for field in FIELDS), "own", "material", "id", "image")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..errors import BadInput
+from ..errors import BadInput, warn
 from . import options, parsing, report
 
 SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
@@ -26,6 +26,7 @@ def command(folder: str, form: str, out: str | None, frames: slice, overwrite: b
     vtk: a .vtp for each frame and a .pvd with their times, for ParaView; xyz: extended XYZ in ångström, for OVITO and
     ASE; lammps-dump and lammps-data: `units si`.
     """
+    from ..io.export import stale_files
     from ..io.run_folder import TRAJECTORY
     from ..results import Run
 
@@ -37,6 +38,10 @@ def command(folder: str, form: str, out: str | None, frames: slice, overwrite: b
     if not output["quiet"]:
         report.reading(folder)
     written = run.export(form, stem, frames)
+    if left := stale_files(stem, form, written):
+        warn(
+            f"{len(left)} files of an earlier export stay: {left[0]}{' …' * (len(left) > 1)}; they are not listed below"
+        )
     more = f" and {len(written) - 1} more" if len(written) > 1 else ""
     content = {"files": [str(path) for path in written]}
     report.answer(content, f"export {folder}", [("files", f"{written[0]}{more}")], **output)

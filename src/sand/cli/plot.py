@@ -13,7 +13,7 @@ from . import options, parsing, report
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
-FOLDER = "plots"
+FOLDER = "plots"  # as `io.run_folder.PLOTS`, whose import is slow
 
 
 class PrintSize(NamedTuple):

@@ -59,18 +59,23 @@ def to_xyz(one: Exported) -> str:
     return xyz_frame(one.materials, one.material, head, columns)
 
 
-def _table(identity: np.ndarray, columns: Sequence[np.ndarray]) -> str:
-    """Format one line per grain, which begins with its identity, counted from 1."""
+def _rows(identity: np.ndarray, columns: Sequence[np.ndarray]) -> list[str]:
+    """Format a row per grain, which begins with its identity, counted from 1."""
     columns = [identity.astype(np.int64) + 1, *columns]
-    return "".join(f"{row}\n" for row in format_rows(columns, row_form(columns)))
+    return format_rows(columns, row_form(columns))
+
+
+def _table(identity: np.ndarray, columns: Sequence[np.ndarray]) -> str:
+    """Format these rows as lines."""
+    return "".join(f"{row}\n" for row in _rows(identity, columns))
 
 
 def to_lammps_dump(one: Exported) -> str:
     """Format a frame as a snapshot of a custom dump.
 
     Columns: id, type, position, radius, velocity, spin, moment, mass, charge, crossings of the box, time [s], own
-    quantities in SI with the prefix d_ that LAMMPS gives such numbers, and cluster. The time is a column, because some
-    readers do not accept `ITEM: TIME`.
+    quantities in SI with the prefix d_ that LAMMPS gives such numbers, name of the material, and cluster. The time is a
+    column, because some readers do not accept `ITEM: TIME`.
     """
     frame = one.frame
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
@@ -80,11 +85,13 @@ def to_lammps_dump(one: Exported) -> str:
         f"ITEM: NUMBER OF ATOMS\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {walls}\n{box}"
         "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz mass q ix iy iz v_time"
-        f"{''.join(f' d_{name}' for name in frame.own)} c_cluster\n"
+        f"{''.join(f' d_{name}' for name in frame.own)} typelabel c_cluster\n"
     )
     columns = [one.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, frame.mass]
-    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values(), one.cluster + 1]
-    return head + _table(frame.id, columns)
+    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values()]
+    labels = [listed([name]).replace(" ", "%20") for name in one.materials]
+    ends = [f"{labels[kind]} {cluster}\n" for kind, cluster in zip(one.material, one.cluster + 1, strict=True)]
+    return head + "".join(f"{row} {end}" for row, end in zip(_rows(frame.id, columns), ends, strict=True))
 
 
 def to_lammps_data(one: Exported) -> str:

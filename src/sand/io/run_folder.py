@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import BadInput, FilesFailed
+from ..errors import BadInput, FilesFailed, warn
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
@@ -37,6 +37,12 @@ OWN_FILES = (
     "view.html",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
+PLOTS = "plots"
+"""Subfolder of figures."""
+DERIVED = (".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json")
+"""Ends of the names of exports, figures and tables that are made from a run."""
+NAMED = 5
+"""Files that are named one by one in a message."""
 _NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
 """Errors by which systems report that they cannot sync a folder."""
 
@@ -70,7 +76,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     Parameters
     ----------
     overwrite : bool, optional
-        Whether the files of an earlier run may be removed; other files stay.
+        Whether the files of an earlier run may be removed; other files stay, and a warning names exports and figures.
     shared : bool, optional
         Whether the folder may hold other files.
 
@@ -99,6 +105,13 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
                 for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
+            if left := _of_earlier_results(folder):
+                names = [str(path.relative_to(folder)) for path in left]
+                more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+                warn(
+                    f"{folder} keeps {', '.join(names[:NAMED])}{more}, which the earlier run may have left; remove "
+                    "them, or make them again from the new results"
+                )
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".probe"
         probe.write_bytes(b"")
@@ -108,6 +121,12 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     except OSError as error:
         raise FilesFailed(f"cannot write to folder {folder}: {error.strerror}") from error
     return folder
+
+
+def _of_earlier_results(folder: Path) -> list[Path]:
+    """Exports and pictures in a folder and in its subfolder `plots`: what was made of a run, not by the run."""
+    found = [path for place in (folder, folder / PLOTS) if place.is_dir() for path in place.iterdir()]
+    return sorted(path for path in found if path.suffix in DERIVED and path.is_file())
 
 
 def is_used(folder: Path) -> bool:
