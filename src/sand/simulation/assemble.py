@@ -131,7 +131,8 @@ def build_engine(
         neighbours = dataclasses.replace(neighbours, order="as given")
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     if by_type.contact is not None and fresh:
-        touching = start.pair if contacts is None else np.unique(np.sort([*start.pair, *contacts.pair], axis=1), axis=0)
+        pairs = start.pair if contacts is None else np.vstack([start.pair, contacts.pair])
+        touching = np.unique(np.sort(pairs, axis=1), axis=0)
         warnings += torn_clusters(wrapped, by_type.contact, touching, box)
     follower = follow_clusters(by_type.long_range, grains, box, start.pair, contacts, cutoff)
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
