@@ -156,7 +156,7 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
 
 def _closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     """Contacts (C,) whose grains, in clusters that are in one piece, touch across a periodic boundary all the same."""
-    return box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1)
+    return np.asarray(box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1))
 
 
 def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndarray | None = None) -> np.ndarray:

@@ -221,7 +221,7 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
         return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
 
     def dimension() -> Dimension:
-        sized = rows["percolating"] == 0.0
+        sized = ~np.isnan(rows["gyration_radius"])  # percolating ones have none
         return ensemble_dimension(rows["grains"][sized], rows["gyration_radius"][sized], boxes[0].radius, of_box[sized])
 
     # moments that vanish within rounding have no logarithm

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
-from urllib.parse import quote, unquote
 
 import numpy as np
 
@@ -44,7 +43,20 @@ def listed(names: Sequence[str]) -> str:
 
     Characters that would end a name, the list or the line are written as in a URL: "%3B" for a semicolon.
     """
-    return ";".join(re.sub(r"[^\S ]|[;\"'%\\\x00-\x1f\x7f]", lambda found: quote(found[0]), name) for name in names)
+
+    def escaped(found: re.Match[str]) -> str:
+        return "".join(f"%{byte:02X}" for byte in found[0].encode())
+
+    return ";".join(re.sub(r"[^\S ]|[;\"'%\\\x00-\x1f\x7f]", escaped, name) for name in names)
+
+
+def unlisted(text: str) -> list[str]:
+    """Names of `listed`."""
+
+    def unescaped(found: re.Match[str]) -> str:
+        return bytes.fromhex(found[0].replace("%", "")).decode(errors="replace")
+
+    return [re.sub("(%[0-9A-Fa-f]{2})+", unescaped, name) for name in text.split(";")]
 
 
 def row_form(columns: Sequence[np.ndarray]) -> str:
@@ -187,7 +199,7 @@ def _names(
     if "material" not in layout:
         return None
     words = [row[layout["material"][0]] for row in rows]
-    known = [unquote(name) for name in head.get("materials", "").split(";")]
+    known = unlisted(head.get("materials", ""))
     try:
         return [known[int(word)] for word in words] if "materials" in head else words
     except (ValueError, IndexError):

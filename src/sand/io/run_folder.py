@@ -106,10 +106,10 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                 for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
             if left := _of_earlier_results(folder):
-                names = [str(path.relative_to(folder)) for path in left]
-                more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+                called = [str(path.relative_to(folder)) for path in left]
+                more = f" and {len(called) - NAMED} more" if len(called) > NAMED else ""
                 warn(
-                    f"{folder} keeps {', '.join(names[:NAMED])}{more}, which the earlier run may have left; remove "
+                    f"{folder} keeps {', '.join(called[:NAMED])}{more}, which the earlier run may have left; remove "
                     "them, or make them again from the new results"
                 )
         folder.mkdir(parents=True, exist_ok=True)
