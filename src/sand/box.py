@@ -138,6 +138,10 @@ class Box:
         """Positions (…, 3) [m] wrapped into −L/2 … L/2 on periodic axes."""
         return self.nearest(position)
 
+    def image(self, position: np.ndarray) -> np.ndarray:
+        """Periodic image of each position (…, 3), int32: 1 where it is one length beyond the box, 0 on open axes."""
+        return np.rint(np.asarray(position) * np.array(self.span[3:])).astype(np.int32)
+
     def close_pairs(self, position: np.ndarray, reach: float) -> np.ndarray:
         """All pairs of points that are at most `reach` apart, by nearest images on periodic axes.
 

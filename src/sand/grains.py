@@ -46,6 +46,7 @@ class GrainArrays(NamedTuple):
     own: np.ndarray  # own quantities, (K, N); their names and units are those of Grains.own
     material: np.ndarray  # index into Grains.materials, uint32
     id: np.ndarray  # the user's index of the grain, uint32
+    image: np.ndarray  # (3, N) how often it has crossed the periodic box along each axis, int32
 
 
 NAMES = tuple(name for name in GrainArrays._fields if name != "own")
@@ -175,7 +176,8 @@ class Grains:
         arrays["moment"] = arrays["body_moment"].copy()
         self.own_units = carried.units
         rows = np.array(list(carried.values())).reshape(len(carried), count)
-        self.arrays = GrainArrays(**arrays, own=rows, material=index, id=np.arange(count, dtype=np.uint32))
+        image = np.zeros((3, count), np.int32)
+        self.arrays = GrainArrays(**arrays, own=rows, material=index, id=np.arange(count, dtype=np.uint32), image=image)
 
     def __len__(self) -> int:
         return self.arrays.radius.size

@@ -48,6 +48,7 @@ RESERVED = frozenset(
             "refuse_overlaps",
         ),
         *("step", "time", "pair", "overlap", "formed", "slide", "roll", "twist", "share", "drawn", "at_rest"),
+        *("image", "images", "unwrapped", "ix", "iy", "iz", "v_time", "material_names"),
         *(
             "path",
             "close",

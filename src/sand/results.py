@@ -184,7 +184,7 @@ class Run:
             If the format is unknown, there is no frame, or the folder does not exist.
         """
         place = self.folder / "trajectory" if stem is None else Path(stem)
-        return export_frames(self.frames[frames], place, form, cluster_labels)
+        return export_frames(self.frames, place, form, cluster_labels, frames)
 
     def to_xarray(self) -> Any:
         """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray.
@@ -198,10 +198,10 @@ class Run:
         whole: list[Frame] = list(self.frames)
         if any(not np.array_equal(one.id, whole[0].id) for one in whole):
             raise BadInput(f"to_xarray: the grains of {self.folder} change; use its frames one by one, and their id")
-        vectors = ("position", "velocity", "moment", "spin")
+        vectors = ("position", "velocity", "moment", "spin", "image")
         data = {
             name: (("frame", "grain", "axis"), np.array([getattr(one, name) for one in whole]), {"units": unit})
-            for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s"), strict=True)
+            for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s", "1"), strict=True)
         }
         labels = np.array([cluster_labels(len(one), one.pair) for one in whole])
         rest = [one.at_rest for one in whole if one.at_rest is not None]
@@ -210,10 +210,13 @@ class Run:
             "time": ("frame", np.array([one.time for one in whole]), {"units": "s"}),
             "step": ("frame", np.array([one.step for one in whole])),
             "radius": ("grain", whole[0].radius, {"units": "m"}),
+            "mass": ("grain", whole[0].mass, {"units": "kg"}),
             "material": ("grain", np.array(whole[0].materials)[whole[0].material]),
             "axis": ("axis", list("xyz")),
         }
-        columns: dict[str, Any] = {name: (("frame", "grain"), values) for name, values in of_grains.items()}
+        charge = np.array([one.charge for one in whole])
+        columns: dict[str, Any] = {"charge": (("frame", "grain"), charge, {"units": "C"})}
+        columns |= {name: (("frame", "grain"), values) for name, values in of_grains.items()}
         columns |= {
             name: (("frame", "grain"), np.array([one.own[name] for one in whole]), {"units": unit})
             for name, unit in whole[0].own.units.items()

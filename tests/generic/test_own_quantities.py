@@ -61,8 +61,8 @@ def assert_same(own, index=slice(None)):
 
 
 def test_grain_arrays_are_those_of_the_schema():
-    """`GrainArrays` names the quantities of the schema in the same order, then own quantities, material and id."""
-    assert GrainArrays._fields == (*(field.name for field in FIELDS), "own", "material", "id")
+    """`GrainArrays` names the quantities of the schema in the same order, then others."""
+    assert GrainArrays._fields == (*(field.name for field in FIELDS), "own", "material", "id", "image")
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_every_quantity_of_the_table_is_there():
         assert np.shares_memory(view, getattr(grains.arrays, field.name))
         with pytest.raises(ValueError):
             view[...] = 0.0
-    assert {f.name for f in FIELDS} | {"own", "material", "id"} == set(GrainArrays._fields)
+    assert {f.name for f in FIELDS} | {"own", "material", "id", "image"} == set(GrainArrays._fields)
 
 
 def test_a_copy_is_independent():

@@ -94,7 +94,7 @@ def mean_size(sizes: np.ndarray) -> float:
 
 
 @checked
-def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box, refuse_percolating: bool = False) -> np.ndarray:
     """Positions (N, 3) [m] with every cluster in one piece across periodic boundaries.
 
     Parameters
@@ -105,14 +105,58 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
         Contacts (C, 2).
     box : Box
         Boundary conditions.
+    refuse_percolating : bool, optional
+        Refuse percolating clusters: these have no extent, and `gyration_radius` of their positions means nothing.
 
     Returns
     -------
     ndarray
         Positions; the lowest grain of each cluster keeps its image.
+
+    Raises
+    ------
+    BadInput
+        If a cluster percolates and `refuse_percolating` is given.
     """
     ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    return in_one_piece(np.array(position, dtype=np.float64), ends, box)
+    whole = in_one_piece(np.array(position, dtype=np.float64), ends, box)
+    if refuse_percolating and (found := _closes_through_boundary(whole, ends, box)).any():
+        grain = ends[found][0, 0]
+        raise BadInput(
+            f"the cluster of grain {grain} touches its own periodic image: it has no size, radius of gyration or "
+            "fractal dimension"
+        )
+    return whole
+
+
+@checked
+def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Which clusters (K,) percolate: a path along contacts leads from a grain to its own periodic image.
+
+    Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration. On a path that
+    closes within the box the separations of neighbours (nearest images) add up to 0, on one that percolates to a
+    multiple of the side of the box.
+
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m].
+    pairs : ndarray
+        Contacts (C, 2).
+    box : Box
+        Boundary conditions.
+    """
+    ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    labels = cluster_labels(len(position), ends)
+    whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
+    found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
+    found[labels[ends[_closes_through_boundary(whole, ends, box), 0]]] = True
+    return found
+
+
+def _closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Contacts (C,) whose grains, in clusters that are in one piece, touch across a periodic boundary all the same."""
+    return np.asarray(box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1))
 
 
 def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndarray | None = None) -> np.ndarray:

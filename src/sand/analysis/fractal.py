@@ -57,7 +57,7 @@ def ensemble_dimension(
     sizes : ndarray
         Numbers of grains N (K,) of the aggregates.
     gyration : ndarray
-        Radii of gyration r_g (K,) [m].
+        Radii of gyration r_g (K,) [m]; percolating aggregates have none and must be left out.
     grain_radius : float
         Radius of a grain a [m].
     groups : ndarray or None, optional
@@ -68,10 +68,12 @@ def ensemble_dimension(
     Raises
     ------
     BadInput
-        If the aggregates used do not span a factor of 3 in N, or r_g does not grow with N.
+        If the aggregates used do not span a factor of 3 in N, r_g does not grow with N, or is not a number.
     """
     n, r = np.asarray(sizes, float), np.asarray(gyration, float)
     used = n >= least
+    if (unknown := np.isnan(r[used]).sum()) > 0:
+        raise BadInput(f"{unknown} of the aggregates percolate and have no radius of gyration; leave them out")
     if not used.any() or n[used].max() < RANGE * n[used].min():
         raise BadInput(
             f"a fractal dimension needs aggregates from {least} grains on, "

@@ -33,7 +33,7 @@ def gyration_radius(
     Parameters
     ----------
     position : ndarray
-        (N, 3) [m], unwrapped (see `clusters.unwrapped`).
+        (N, 3) [m], unwrapped (see `clusters.unwrapped`); a cluster that touches its own periodic image has no size.
     mass : ndarray or None, optional
         (N,) [kg]; equal by default.
     radius : ndarray or float or None, optional

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
+from ..errors import BadInput, warn
 from . import options, parsing, report
 
 SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
@@ -41,7 +41,7 @@ def command(
     ASE; lammps-dump and lammps-data: `units si`.
     """
     from ..analysis.clusters import cluster_labels
-    from ..io.export import export_frames
+    from ..io.export import export_frames, stale_files
     from ..io.file_frames import open_frames
     from ..io.run_folder import TRAJECTORY
     from ..results import Run
@@ -61,7 +61,11 @@ def command(
         raise BadInput(f"--out {stem}: this is the file that is exported; give another name")
     if not output["quiet"]:
         report.reading(folder)
-    written = export_frames(opened[frames], stem, form, cluster_labels)
+    written = export_frames(opened, stem, form, cluster_labels, frames)
+    if left := stale_files(stem, form, written):
+        warn(
+            f"{len(left)} files of an earlier export stay: {left[0]}{' …' * (len(left) > 1)}; they are not listed below"
+        )
     more = f" and {len(written) - 1} more" if len(written) > 1 else ""
     content = {"files": [str(path) for path in written]}
     report.answer(content, f"export {folder}", [("files", f"{written[0]}{more}")], **output)

@@ -14,7 +14,7 @@ from . import options, parsing, report
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
-FOLDER = "plots"
+FOLDER = "plots"  # as `io.run_folder.PLOTS`, whose import is slow
 READING = ("radius", "length", "material")
 """Options of `options.reading`."""
 

@@ -220,6 +220,10 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
             raise BadInput("the grains have no moments")
         return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
 
+    def dimension() -> Dimension:
+        sized = ~np.isnan(rows["gyration_radius"])  # percolating ones have none
+        return ensemble_dimension(rows["grains"][sized], rows["gyration_radius"][sized], boxes[0].radius, of_box[sized])
+
     # moments that vanish within rounding have no logarithm
     heavy = (rows["grains"] >= LEAST) & (rows["moment"] > 1e-9 * boxes[0].moment)
     return GrowthResult(
@@ -231,7 +235,7 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
         law("slope", lambda: _slope(*_within(time, sizes, chosen))),
         law("moment", lambda: moment_law(heavy)),
         law("moment_without_rings", lambda: moment_law(heavy & (rows["rings"] == 0))),
-        law("dimension", lambda: ensemble_dimension(rows["grains"], rows["gyration_radius"], boxes[0].radius, of_box)),
+        law("dimension", dimension),
         missing,
         _temperatures(boxes),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,14 +21,41 @@ def own_columns(own: OwnQuantities) -> tuple[str, str]:
     return "".join(f":{name}:R:1" for name in own), f' own="{units}"' if own else ""
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names of materials for `materials="…"`, separated by semicolons.
+
+    Characters that would end a name, the list or the line are written as in a URL: "%3B" for a semicolon.
+    """
+
+    def escaped(found: re.Match[str]) -> str:
+        return "".join(f"%{byte:02X}" for byte in found[0].encode())
+
+    return ";".join(re.sub(r"[^\S ]|[;\"'%\\\x00-\x1f\x7f]", escaped, name) for name in names)
+
+
+def unlisted(text: str) -> list[str]:
+    """Names of `listed`."""
+
+    def unescaped(found: re.Match[str]) -> str:
+        return bytes.fromhex(found[0].replace("%", "")).decode(errors="replace")
+
+    return [re.sub("(%[0-9A-Fa-f]{2})+", unescaped, name) for name in text.split(";")]
+
+
+def row_form(columns: Sequence[np.ndarray]) -> str:
+    """Format of a row of the columns (N,) or (N, k), with the digits that restore their numbers exactly."""
+    forms = ("%d" if c.dtype.kind in "iu" else "%.9g" if c.dtype == np.float32 else "%.17g" for c in columns)
+    return " ".join(" ".join([form] * (c.size // max(len(c), 1))) for form, c in zip(forms, columns, strict=True))
+
+
 def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
     """Format the rows of the columns (N,) or (N, k)."""
     return [form % tuple(row) for row in np.column_stack(columns).tolist()]
 
 
-def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Sequence[np.ndarray], form: str) -> str:
+def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Sequence[np.ndarray]) -> str:
     """Format a frame: number of grains, `head`, and per grain the chemical symbol of its material and the columns."""
-    symbols = [SYMBOLS.get(names[k], "X") for k in material]
+    symbols, form = [SYMBOLS.get(names[k], "X") for k in material], row_form(columns)
     rows = [f"{symbol} {row}" for symbol, row in zip(symbols, format_rows(columns, form), strict=True)]
     return "\n".join([str(len(rows)), head, *rows]) + "\n"
 
@@ -45,8 +73,8 @@ def xyz_text(grains: Grains) -> str:
     head = (
         "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:spin:R:3:moment:R:3:charge:R:1"
         f"{':mass:R:1' * len(masses)}{own}:material:I:1 "
-        f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI{units}'
+        f'materials="{listed(names)}" pbc="F F F" length_unit=angstrom other_units=SI{units}'
     )
     columns = [grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.velocity, grains.spin, grains.moment]
     columns += [grains.charge, *masses, *grains.own.values(), grains.material]
-    return xyz_frame(names, grains.material, head, columns, "%.17g " * (14 + len(masses) + len(grains.own)) + "%d")
+    return xyz_frame(names, grains.material, head, columns)

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import BadInput, FilesFailed
+from ..errors import BadInput, FilesFailed, warn
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
@@ -43,6 +43,12 @@ OWN_FILES = (
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
 CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
 """Names of checkpoints, with the number of steps; other names are those of copies that the user keeps."""
+PLOTS = "plots"
+"""Subfolder of figures."""
+DERIVED = (".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json")
+"""Ends of the names of exports, figures and tables that are made from a run."""
+NAMED = 5
+"""Files that are named one by one in a message."""
 _NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
 """Errors by which systems report that they cannot sync a folder."""
 
@@ -76,7 +82,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     Parameters
     ----------
     overwrite : bool, optional
-        Whether the files of an earlier run may be removed; other files stay.
+        Whether the files of an earlier run may be removed; other files stay, and a warning names exports and figures.
     shared : bool, optional
         Whether the folder may hold other files.
 
@@ -112,6 +118,13 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
                 for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
+            if left := _of_earlier_results(folder):
+                called = [str(path.relative_to(folder)) for path in left]
+                more = f" and {len(called) - NAMED} more" if len(called) > NAMED else ""
+                warn(
+                    f"{folder} keeps {', '.join(called[:NAMED])}{more}, which the earlier run may have left; remove "
+                    "them, or make them again from the new results"
+                )
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
@@ -140,6 +153,12 @@ def shows_a_run(folder: Path) -> bool:
             if CHECKPOINT.fullmatch(path.name) and begin.startswith(b"PK") and b"meta.json" in begin:
                 return True
     return False
+
+
+def _of_earlier_results(folder: Path) -> list[Path]:
+    """Exports and pictures in a folder and in its subfolder `plots`: what was made of a run, not by the run."""
+    found = [path for place in (folder, folder / PLOTS) if place.is_dir() for path in place.iterdir()]
+    return sorted(path for path in found if path.suffix in DERIVED and path.is_file())
 
 
 def is_used(folder: Path) -> bool:

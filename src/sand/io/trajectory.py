@@ -20,7 +20,16 @@ from ..grains import Grains
 from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
-from .frame import Frame, FrameSequence, append_frame, code_of, read_identities, read_stored, stored_frame
+from .frame import (
+    Frame,
+    FrameSequence,
+    append_frame,
+    code_of,
+    read_identities,
+    read_materials,
+    read_stored,
+    stored_frame,
+)
 from .run_folder import give_own_content
 
 FLUSH_EVERY = 1.0
@@ -71,6 +80,8 @@ class TrajectoryWriter:
         self._waiting = self._pending = 0  # frames that wait for the next flush, and their approximate bytes
         self._entries = 0  # upper bound of the index entries
         self._flushed = wall.monotonic()
+        self._scale: float | None = None  # reference radius of the file [m]
+        self._materials: list[str] = []  # names of the materials of its frames
         try:
             if resume_at is not None:
                 give_own_content(path)
@@ -83,6 +94,9 @@ class TrajectoryWriter:
                     report(lost)
             self._file = _open_file(path, resume_at is not None and path.exists())
             self._entries = len(gsd_index.read_index(path)[1])
+            if kept := len(self._file) - len(self._later):
+                self._scale = float(self._file.file.read_chunk(0, "log/scale/length")[0])
+                self._materials = read_materials(self._file, kept)
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -106,7 +120,10 @@ class TrajectoryWriter:
         FilesFailed
             If the frame cannot be written; earlier ones stay.
         """
-        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest)
+        fixed: Any = {"scale": self._scale, "materials": self._materials}
+        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest, **fixed)
+        self._scale = float(frame.log["scale/length"][0])
+        self._materials += [m.name for m in grains.materials if m.name not in self._materials]
         if self._is_stored(time, code_of(frame)):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS + len(grains.own_units)
@@ -245,6 +262,11 @@ class Frames(FrameSequence):
     def _frame(self, number: int) -> Frame:
         with self._reading(number):
             return Frame(read_stored(self._file, number))
+
+    def material_names(self) -> list[str]:
+        """Names of the materials of all frames, in the order in which they first appear; reads little else."""
+        with self._reading(0):
+            return read_materials(self._file, len(self))
 
     @property
     def written_by_sand(self) -> bool:

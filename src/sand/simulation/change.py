@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.clusters import unwrapped
 from ..box import Box, as_box
 from ..contact.model import Contact
 from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
@@ -235,6 +236,9 @@ class Change:
         moved, box = self.grains.copy(), Box(lengths)  # type: ignore[arg-type]
         position = scaled_positions(self.grains, self._pairs(), self.box, factors)
         moved.arrays.position[...] = box.wrap(position).T
+        # grains of clusters that lie across a boundary may come to lie on its other side
+        whole = unwrapped(self.grains.position, self._pairs(), self.box)
+        moved.arrays.image[...] += (box.image(position) - self.box.image(whole)).T
         object.__setattr__(self, "grains", moved)
         object.__setattr__(self, "_is_scaled", True)
         self.box = box

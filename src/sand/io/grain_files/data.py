@@ -53,7 +53,19 @@ UNITS = {
 DERIVED = frozenset(
     (
         *("id", "type", "types", "species", "symbol", "symbols", "element", "elements", "numbers", "index", "particle"),
-        *("mol", "cluster", "c_cluster", "cluster_id", "tags", "orientation", "orientations", "quaternion", "images"),
+        *(
+            "mol",
+            "cluster",
+            "c_cluster",
+            "cluster_id",
+            "tags",
+            "orientation",
+            "orientations",
+            "quaternion",
+            "images",
+            "image",
+            "v_time",
+        ),
         *("force", "forces", "torque", "torques", "field", "fields", "energy", "stress"),
         *("fx", "fy", "fz", "tqx", "tqy", "tqz", "ix", "iy", "iz"),
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import BadInput
 from ...units import in_unit
+from ..extended_xyz import unlisted
 from .data import NAMED, FileBox, GrainData, GrainFile, data_of, known_as, numbers
 
 ANGSTROM = 1e-10
@@ -140,7 +141,7 @@ def _columns(path: Any, rows: list[list[str]], layout: list[tuple[str, str, int]
 
 def _named(path: Any, words: list[str], listed: str) -> list[str]:
     """Names of materials for their indices.  Raises BadInput."""
-    known = listed.split(";")
+    known = unlisted(listed)
     try:
         numbers_of = [int(word) for word in words]
         if min(numbers_of) < 0:
