@@ -19,7 +19,7 @@ def _check(values: parsing.OptionValues) -> Iterator[str]:
     """Errors of options that need others."""
     if "source" not in values.given and values["frame"] is not None:
         yield "--frame selects the frame of --from FILE to start with; give --from, too"
-    if not {"source", "case"} & values.given:
+    elif not {"source", "case"} & values.given:
         yield "give a case file: sand run CASE.toml; or an earlier run: sand run --from DIR"
 
 
