@@ -58,7 +58,7 @@ class Entries:
 
     def __init__(self, own: Path, read_only: Path | None = None):
         self.own, self._folders = own, [own, *([] if read_only is None else [read_only])]
-        self._told = set[str]()
+        self._warned = set[str]()
 
     def read(self, name: str, key: str) -> bytes | None:
         """Content of a file that was written with this key; None if there is none, with a warning if it is damaged."""
@@ -95,8 +95,8 @@ class Entries:
         self._warn_once("read", f"compiled code in the cache is compiled anew, because {path} cannot be used: {reason}")
 
     def _warn_once(self, kind: str, text: str) -> None:
-        if kind not in self._told:
-            self._told.add(kind)
+        if kind not in self._warned:
+            self._warned.add(kind)
             warn(text)
 
 
