@@ -1,12 +1,7 @@
-"""Conversion of the user's quantities to SI floats, with checks of unit and range.
-
-Plain numbers are in SI. Text is a number with a unit ("10 nm", "200 A m^2/kg", "1 us"). Quantities of pint and astropy
-are recognised by their attributes, so that neither package is imported for plain numbers.
-"""
+"""The user's quantities as SI floats, with checks of unit and range, and numbers as text with a unit."""
 
 from __future__ import annotations
 
-import functools
 import math
 import re
 from decimal import Decimal
@@ -15,145 +10,11 @@ from typing import Any
 import numpy as np
 
 from .constants import LIGHT
+from .conversion import EXAMPLES, in_unit, not_a_quantity, si_array
 from .errors import BadInput, shown
+from .unit_factors import LONGEST_TEXT
 
-EXAMPLES = {
-    "m": "10 nm",
-    "s": "5 us",
-    "kg": "3e-20 kg",
-    "kg/s": "1e-9 kg/s",
-    "K": "100 K",
-    "m/s": "10 m/s",
-    "m/s^2": "9.81 m/s^2",
-    "rad/s": "1e7 rad/s",
-    "kg/m^3": "2650 kg/m^3",
-    "J/m^2": "25 mJ/m^2",
-    "J/m^3": "48 kJ/m^3",
-    "J/m": "2e-11 J/m",
-    "Pa": "54 GPa",
-    "T": "1 mT",
-    "A m^2": "6.6e-18 A m^2",
-    "A m^2/kg": "200 A m^2/kg",
-    "C": "1.6e-19 C",
-}
-"""One quantity per unit, for error messages."""
-
-# A number, then a unit of names, integer powers of one digit, products and quotients; no arithmetic.
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|[+-]?(?:inf|nan)"
-_UNIT = r"[A-Za-zµμΩÅ°%][A-Za-zµμΩÅ°]*(?:(?:\^|\*\*)?-?\d|[²³])?"
-# The pattern is unambiguous: with several ways to match, text that does not match would take exponential time.
-_TEXT = re.compile(rf"\s*({_NUMBER})\s*({_UNIT}(?:(?:\s*[*/·]\s*|\s+){_UNIT})*)?\s*", re.IGNORECASE)
-LONGEST_TEXT = 100
-"""Characters of a number with its unit; longer text is refused before it is parsed."""
-
-# Exponents of 10, m, kg, s, A, K. Units made of these are converted without pint, whose import takes 0.3 s.
-_BASIC = {
-    "m": (0, 1, 0, 0, 0, 0),
-    "g": (-3, 0, 1, 0, 0, 0),
-    "s": (0, 0, 0, 1, 0, 0),
-    "A": (0, 0, 0, 0, 1, 0),
-    "K": (0, 0, 0, 0, 0, 1),
-    "C": (0, 0, 0, 1, 1, 0),
-    "J": (0, 2, 1, -2, 0, 0),
-    "N": (0, 1, 1, -2, 0, 0),
-    "Pa": (0, -1, 1, -2, 0, 0),
-    "T": (0, 0, 1, -2, -1, 0),
-}
-_PREFIXES = {"": 0, "f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}
-_NAMED = {"rad": (0, 0, 0, 0, 0, 0), "angstrom": (-10, 1, 0, 0, 0, 0), "Å": (-10, 1, 0, 0, 0, 0)}
-_COMMON = {p + u: (t + powers[0], *powers[1:]) for u, powers in _BASIC.items() for p, t in _PREFIXES.items()} | _NAMED
-_FACTOR = re.compile(r"\s*([*/·]?)\s*([^\W\d²³]+)(?:(?:\^|\*\*)?(-?\d)|([²³]))?")
-
-
-def _powers(text: str) -> tuple[int, ...] | None:
-    """Exponents of ten, m, kg, s, A and K of a unit, or None if it contains a unit that is not in `_COMMON`."""
-    total: tuple[int, ...] = (0,) * 6
-    position = 0
-    while position < len(text):
-        found = _FACTOR.match(text, position)
-        if found is None or found[2] not in _COMMON:
-            return None
-        power = int(found[3] or {"²": 2, "³": 3}.get(found[4], 1)) * (-1 if found[1] == "/" else 1)
-        total = tuple(a + power * b for a, b in zip(total, _COMMON[found[2]], strict=True))
-        position = found.end()
-    return total
-
-
-@functools.cache
-def _registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry(cache_folder=None)
-
-
-@functools.lru_cache(maxsize=512)
-def _factor(text: str, unit: str) -> float | None:
-    """Factor from the unit `text` to `unit`, or None if they are not multiples of each other."""
-    given, wanted = _powers(text), _powers(unit)
-    if given and wanted:
-        factor = float(f"1e{given[0] - wanted[0]}")
-        return factor if given[1:] == wanted[1:] and 0.0 < factor < math.inf else None
-    import pint
-
-    spelled = text.replace("·", "*").replace("²", "**2").replace("³", "**3")
-    spelled = re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", spelled)
-    try:
-        none, one = (_registry().Quantity(n, spelled).to(unit.replace("^", "**")).magnitude for n in (0.0, 1.0))
-        # units with an offset (0 degC is not 0 K) and logarithmic units (0 dB is 1) have no factor
-        return float(one) if none == 0.0 and 0.0 < one < math.inf else None
-    except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError, ValueError, AssertionError):
-        return None
-
-
-def _times(number: str, factor: float) -> float:
-    """Product number × factor, in exact decimal arithmetic if the factor is a power of ten: '5 us' is 5e-06."""
-    power = round(math.log10(factor)) if factor > 0.0 else 0
-    if factor == float(f"1e{power}") and "n" not in number.lower():
-        return float(Decimal(number).scaleb(power))
-    return float(number) * factor
-
-
-def _wrong_unit(value: Any, unit: str, name: str) -> BadInput:
-    example = EXAMPLES.get(unit, f"1 {unit}")
-    return BadInput(
-        f"{name} = {shown(value)} is not a quantity in {unit}; give a number in SI or text such as '{example}'"
-    )
-
-
-def in_unit(value: Any, unit: str) -> Any:
-    """Convert a quantity to SI.
-
-    Text without a unit is accepted if `unit` is "1" or if the number is 0.
-
-    Returns
-    -------
-    float or ndarray or None
-        The value in `unit`; None if it is not a quantity of that dimension.
-    """
-    if isinstance(value, str):
-        match = _TEXT.fullmatch(value) if len(value) <= LONGEST_TEXT else None
-        if not match:
-            return None
-        number, given = match.groups()
-        bare = 1.0 if unit == "1" or float(number) == 0.0 else None
-        factor = _factor(given.strip(), unit) if given else bare
-        return None if factor is None else _times(number, factor)
-    if value is None or isinstance(value, bool):
-        return None
-    if hasattr(value, "to_value"):  # astropy
-        try:
-            return np.asarray(value.to_value(unit.replace("^", "**").replace(" ", "*")), dtype=np.float64)[()]
-        except Exception:  # astropy's error classes are not imported here
-            return None
-    if hasattr(value, "magnitude"):  # pint, of any registry
-        factor = _factor(str(value.units), unit)
-        return None if factor is None else np.asarray(value.magnitude, dtype=np.float64)[()] * factor
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        return None
-    return float(array) if array.ndim == 0 else array
-
+__all__ = ["EXAMPLES", "LONGEST_TEXT", "in_unit", "not_a_quantity", "si_array"]
 
 LEAST, MOST = 1e-60, 1e60
 """Range of the magnitudes of SI numbers; their products and powers stay within double precision."""
@@ -199,7 +60,7 @@ def si(
     """
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:
-        raise _wrong_unit(value, unit, name)
+        raise not_a_quantity(value, unit, name)
     label = f"{name} = {shown(value)}"
     in_units = "" if unit == "1" else f" {unit}"
     if not math.isfinite(number):

@@ -16,6 +16,8 @@ MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 
 LAYERS = (
     ("errors", "constants", "version"),
+    ("unit_factors",),
+    ("conversion",),
     ("units",),
     ("descriptions",),
     ("arguments",),
