@@ -150,6 +150,26 @@ def has_unit(value: Any) -> bool:
     return any(hasattr(value, name) for name in ("to_value", "units", "unit", "magnitude"))
 
 
+def has_unit_within(value: Any) -> bool:
+    """Whether a value, or an entry of a list or an array, is text, has a unit or is masked."""
+    if isinstance(value, (list, tuple)):
+        return not set(map(type, value)) <= {float, int} and any(map(has_unit_within, value))
+    if type(value) is np.ndarray:
+        return value.dtype.kind in "UTmM" or (value.dtype.kind == "O" and any(map(has_unit_within, value.flat)))
+    return isinstance(value, (str, np.timedelta64, datetime.timedelta)) or has_unit(value) or is_masked(value)
+
+
+def dimensions(value: Any) -> int:
+    """Number of axes of an array, or of lists within lists; 0 for a number, text or a quantity.
+
+    `numpy.ndim` drops units in lists, and raises errors for some.
+    """
+    if isinstance(value, (list, tuple)):
+        return 1 + (dimensions(value[0]) if value else 0)
+    found = getattr(value, "ndim", 0)
+    return found if isinstance(found, int) else 0
+
+
 def is_masked(value: Any) -> bool:
     """Whether entries of an array are masked, that is, missing."""
     mask = getattr(value, "mask", None)
@@ -181,12 +201,13 @@ def not_a_quantity(value: Any, unit: str, name: str) -> BadInput:
         if bad is None or bad[1] is value:
             break
         name, value = f"{name}[{bad[0]}]", bad[1]
-    example = EXAMPLES.get(unit, f"1 {unit}")
     label, hints = f"{name} = {shown(value)}", [text for to, of, text in HINTS if to == unit and _is_of(value, of)]
     if any(True for _ in _entries(value)) and not has_unit(value) and not isinstance(value, Mapping):
         label += " has entries that differ in length or are not numbers, and"
-    advice = hints[0] if hints else f"give a number in SI or text such as '{example}'"
-    return BadInput(f"{label} is not a quantity in {unit}; {advice}")
+    if unit == "1":
+        return BadInput(f"{label} is not a number; give one without a unit")
+    example = f"give a number in SI or text such as '{EXAMPLES.get(unit, f'1 {unit}')}'"
+    return BadInput(f"{label} is not a quantity in {unit}; {hints[0] if hints else example}")
 
 
 def _is_of(value: Any, unit: str) -> bool:

@@ -14,7 +14,7 @@ from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
 from .schema import BY_NAME, FIELDS, OWN, public, stored
-from .units import format_quantity, in_unit
+from .units import format_quantity, has_unit_within, in_unit, not_a_quantity, too_large
 
 ROUNDING = 1e-7
 """Largest gap of a contact without adhesion, relative to the sum of radii; allows for coordinates of seven digits."""
@@ -91,7 +91,7 @@ class Grains:
 
     `grains[3]`, `grains[2:5]` and `grains[mask]` are new grains, copies of these; a loop gives one after the other.
 
-    All numbers may be SI floats, text with a unit, or pint/astropy quantities.
+    All numbers may be SI floats, text with a unit, or quantities of pint, astropy or unyt, also within lists.
 
     Parameters
     ----------
@@ -252,6 +252,8 @@ class Grains:
 
 def _count(position: Any) -> int:
     array = in_unit(position, "m")
+    if array is None and has_unit_within(position):
+        raise not_a_quantity(position, "m", "position")
     if array is None or np.ndim(array) != 2 or np.shape(array)[1] != 3 or np.shape(array)[0] == 0:
         shape = "" if array is None else f", not {np.shape(array)}"
         raise BadInput(f"position must be an array of shape (N, 3) in m with N ≥ 1{shape}")
@@ -321,6 +323,8 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
     size = in_unit(moment, "A m^2")
     if size is None:
         per_mass = in_unit(moment, "A m^2/kg")
+        if per_mass is not None and (reason := too_large(float(np.max(per_mass)), "A m^2/kg")):
+            raise BadInput(f"moment = {shown(moment)} is {reason}")
         size = None if per_mass is None else per_mass * mass
     fits = size is not None and np.shape(size) in ((), mass.shape)
     if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):

@@ -10,18 +10,27 @@ from typing import Any
 import numpy as np
 
 from .constants import LIGHT
-from .conversion import EXAMPLES, in_unit, not_a_quantity, si_array
+from .conversion import EXAMPLES, dimensions, has_unit_within, in_unit, not_a_quantity, si_array
 from .errors import BadInput, shown
 from .unit_factors import LONGEST_TEXT
 
-__all__ = ["EXAMPLES", "LONGEST_TEXT", "in_unit", "not_a_quantity", "si_array"]
+__all__ = ["EXAMPLES", "LONGEST_TEXT", "dimensions", "has_unit_within", "in_unit", "not_a_quantity", "si_array"]
 
 LEAST, MOST = 1e-60, 1e60
 """Range of the magnitudes of SI numbers; their products and powers stay within double precision."""
 MELTED = 5000.0
 """Temperature [K] above which no material is solid."""
-HOTTEST = 1e12
-"""Highest temperature [K] accepted; above it there are neither atoms nor nuclei."""
+LARGEST = {
+    "K": (1e12, "where matter has no atoms"),
+    "m": (1e27, "the size of the observable universe"),
+    "s": (1e18, "more than the age of the universe"),
+    "kg": (1e31, "more than the mass of the Sun"),
+    "kg/m^3": (1e18, "more than the density of nuclei"),
+    "m/s^2": (1e13, "more than the gravity of neutron stars"),
+    "T": (1e12, "more than the fields of neutron stars"),
+    "A m^2/kg": (1e4, "more than the moments of all electrons of matter"),
+}
+"""Largest magnitude accepted in each unit, and what it exceeds: larger numbers are mistakes of unit or exponent."""
 
 
 def si(
@@ -33,6 +42,7 @@ def si(
     least: float | None = None,
     below: float | None = None,
     most: float | None = None,
+    any_size: bool = False,
 ) -> float:
     """Convert a quantity to one finite SI number.
 
@@ -46,6 +56,8 @@ def si(
         Name of the argument, for the message.
     above, least, below, most : float or None, optional
         Allowed range: number > above, number ≥ least, number < below, number ≤ most.
+    any_size : bool, optional
+        Whether a speed may exceed that of light, and other numbers the limits of `LARGEST`.
 
     Returns
     -------
@@ -55,8 +67,8 @@ def si(
     Raises
     ------
     BadInput
-        If the unit is wrong, the value is not a number, not finite or out of range, a temperature exceeds `HOTTEST`, or
-        a speed reaches that of light and `below` is not given.
+        If the unit is wrong, the value is not a number, not finite or out of range, exceeds a limit of `LARGEST`, or is
+        a speed that reaches that of light and `below` is not given.
     """
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:
@@ -75,11 +87,17 @@ def si(
         raise BadInput(f"{label} must be below {below:g}{in_units}")
     if most is not None and not number <= most:
         raise BadInput(f"{label} must be at most {most:g}{in_units}")
-    if unit == "m/s" and below is None and not abs(number) < LIGHT:
+    if unit == "m/s" and below is None and not any_size and not abs(number) < LIGHT:
         raise BadInput(f"{label} is not below the speed of light, {LIGHT:.4g} m/s")
-    if unit == "K" and number > HOTTEST:
-        raise BadInput(f"{label} is above {HOTTEST:g} K, where matter has no atoms")
+    if not any_size and (reason := too_large(abs(number), unit)):
+        raise BadInput(f"{label} is {reason}")
     return float(number)
+
+
+def too_large(number: float, unit: str) -> str:
+    """Which limit of `LARGEST` a magnitude exceeds, in words; empty if none."""
+    largest, reason = LARGEST.get(unit, (math.inf, ""))
+    return f"above {largest:g} {unit}, {reason}" if number > largest else ""
 
 
 def is_word(value: Any, word: str) -> bool:

@@ -21,7 +21,7 @@ LAYERS = (
     ("units",),
     ("descriptions",),
     ("arguments",),
-    ("material", "ramps", "schema", "threads"),
+    ("material", "quantity_array", "ramps", "schema", "threads"),
     ("compiler",),
     ("numerics",),
     ("box",),

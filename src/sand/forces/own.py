@@ -150,7 +150,7 @@ class OwnForce:
     def __repr__(self) -> str:
         return f"<{self.where}, {self.path}>"
 
-    def __call__(self, **values: Any) -> OwnExternal | OwnPair:
+    def __call__(self, /, **values: Any) -> OwnExternal | OwnPair:
         """Make the force from values of its parameters: SI numbers, text with a unit, or three of these."""
         options = {key: values.pop(key) for key in ("cutoff", "cut") if self.pair and key in values}
         allowed = [*self.units, *(("cutoff", "cut") if self.pair else ())]
@@ -166,7 +166,7 @@ class OwnForce:
                 continue
             read_one = si if components(values[key]) is None else three
             try:
-                read[key] = read_one(values[key], unit, f"{self.name}: {key}")
+                read[key] = read_one(values[key], unit, f"{self.name}: {key}", any_size=True)
             except BadInput as error:
                 problems += error.problems
         if problems:

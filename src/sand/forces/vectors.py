@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from ..errors import BadInput
@@ -10,7 +11,7 @@ from ..units import si
 
 def components(value: Any) -> list[Any] | None:
     """The entries of a sequence; None for a single quantity (a number, text, a quantity with a unit)."""
-    if isinstance(value, str):
+    if isinstance(value, (str, bytes, Mapping)):
         return None
     try:
         return list(value)
@@ -18,7 +19,7 @@ def components(value: Any) -> list[Any] | None:
         return None
 
 
-def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
+def three(value: Any, unit: str, name: str, *, any_size: bool = False) -> tuple[float, float, float]:
     """Convert three components to SI.
 
     Parameters
@@ -29,6 +30,8 @@ def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
         The SI unit, "1" for dimensionless numbers.
     name : str
         Name of the parameter in error messages.
+    any_size : bool, optional
+        As for `units.si`.
 
     Returns
     -------
@@ -47,7 +50,7 @@ def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
     numbers, problems = [], []
     for entry, axis in zip(entries, "xyz", strict=True):
         try:
-            numbers.append(si(entry, unit, f"{name} {axis}"))
+            numbers.append(si(entry, unit, f"{name} {axis}", any_size=any_size))
         except BadInput as error:
             problems += error.problems
     if problems:

@@ -14,7 +14,7 @@ from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
 from ..grains import Grains, moment_size, vector_for_all
 from ..io.run_folder import checked_name
 from ..material import PRESETS, Material, as_material
-from ..units import si, whole_number
+from ..units import dimensions, si, whole_number
 from .aggregates import KINDS, build
 from .encounters import combined, turned
 from .from_file import TEXT_SUFFIXES, body_from_file, from_trajectory, largest_body
@@ -125,7 +125,7 @@ class GrainClass:
             "radius": radius_as_given,
             "material": material_as_given,
             "moment": moment_as_given,
-            "charge": lambda v: si(v, "C", "charge") if np.ndim(v) == 0 else v,  # an array is checked by Grains
+            "charge": lambda v: si(v, "C", "charge") if dimensions(v) == 0 else v,  # an array is checked by Grains
         }
         for name, read in readers.items():
             if (value := getattr(self, name)) is not None and name not in foreign:
@@ -143,7 +143,7 @@ def radius_as_given(value: Any) -> Any:
 
 def moment_as_given(value: Any) -> Any:
     """Check a moment as `moment_size` does; it stays as it is. Raises BadInput."""
-    if np.ndim(value) == 0:  # an array is checked against the number of grains
+    if dimensions(value) == 0:  # an array is checked against the number of grains
         moment_size(value, np.ones(1))
     return value
 

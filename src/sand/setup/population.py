@@ -16,7 +16,7 @@ from ..contact.mixing import pairing_between
 from ..errors import BadInput, shown
 from ..grains import Grains, materials_of
 from ..material import Material, as_material
-from ..units import format_quantity, in_unit, seed_given, si, whole_number
+from ..units import dimensions, format_quantity, in_unit, not_a_quantity, seed_given, si, whole_number
 from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0
@@ -171,6 +171,8 @@ def radii_of(given: Any) -> Any:
     texts = isinstance(given, (list, tuple)) and any(isinstance(one, str) for one in given)
     values = [si(one, "m", f"radius of grain {k}") for k, one in enumerate(given)] if texts else in_unit(given, "m")
     if values is None:
+        if dimensions(given):
+            raise not_a_quantity(given, "m", "radius")
         raise BadInput(f"radius = {shown(given)} is not a radius or a distribution; give {FORMS}")
     if np.ndim(values) == 0:
         return si(given, "m", "radius", above=0.0)

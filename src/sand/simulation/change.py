@@ -16,6 +16,7 @@ from ..forces.gas.model import Gas
 from ..grains import Grains
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
+from ..quantity_array import QuantityArray
 from ..schema import BY_NAME, stored
 from ..state.arrays import SAVED_LONG_RANGE
 from ..state.state import (
@@ -64,7 +65,8 @@ class Change:
     Attributes
     ----------
     velocity, spin, moment : ndarray
-        (N, 3) [m/s, rad/s, A m²] in the laboratory frame, to be changed in place or assigned.
+        (N, 3) [m/s, rad/s, A m²] in the laboratory frame, to be changed in place or assigned; text and quantities with
+        a unit are converted.
     charge : ndarray
         (N,) [C].
     forces : tuple[Force, ...]
@@ -102,14 +104,18 @@ class Change:
         for name, value in own.items():
             object.__setattr__(self, name, value)
         for name in QUANTITIES:
-            setattr(self, name, getattr(grains, name).copy())
+            setattr(self, name, getattr(grains, name))
         self.forces, self.box = tuple(forces), box
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Assign a quantity, the forces or the box.  Raises BadInput for another name or an invalid box."""
         if name not in ASSIGNED:
             raise BadInput(f"a change has no '{name}' to assign; {did_you_mean(name, ASSIGNED)}")
-        object.__setattr__(self, name, as_box(value) if name == "box" else value)
+        if name == "box":
+            value = as_box(value)
+        elif name in QUANTITIES:
+            value = QuantityArray(value, BY_NAME[name].unit, name)
+        object.__setattr__(self, name, value)
 
     @property
     def id(self) -> np.ndarray:
