@@ -2,8 +2,8 @@
 
 `checked` compares names and types with the signature: unknown or missing arguments, a number in place of text, a class
 in place of an object. Arguments annotated as float, as array or as list of floats may be quantities with a unit, which
-are converted to the SI unit that the docstring gives. Other numbers, and ranges, are checked by the functions themselves
-(`units`).
+are converted to the SI unit that the docstring gives; `~` in a path is the home folder. Other numbers, and ranges, are
+checked by the functions themselves (`units`).
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import os
 import types
 import typing
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from .descriptions import described, documented_units
 from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
+from .paths import checked_name
 
 MOST_GRAINS = 100_000_000
 """Largest number of grains of one simulation. The state takes about a kilobyte per grain, 100 GB in all."""
@@ -41,9 +43,9 @@ def checked(thing: T) -> T:
     """Decorator of a public function, method or class (then of its `__init__`) that checks the arguments.
 
     Types are taken from the annotations int, bool, str, paths, arrays (lists of numbers are converted), functions,
-    lists, tuples of fixed length and classes; Any is not checked, and float only for quantities. Assignment to an attribute of a decorated
-    frozen dataclass raises a one-line NoSuchAttribute; its representation is that of `descriptions.described`,
-    unless the dataclass has one of its own (`repr=False`).
+    lists, tuples of fixed length and classes; Any is not checked, and float only for quantities. Assignment to an
+    attribute of a decorated frozen dataclass raises a one-line NoSuchAttribute; its representation is that of
+    `descriptions.described`, unless the dataclass has one of its own (`repr=False`).
     """
     if not isinstance(thing, type):
         return typing.cast(T, _wrapped(typing.cast(Callable, thing)))
@@ -219,6 +221,8 @@ def _read(allowed: list[_TypeCheck], unit: str | None, value: Any, name: str) ->
             if converted is None:
                 raise not_a_quantity(value, unit, name)
             value = tuple(converted) if isinstance(value, tuple) else converted
+    if any(check.words == "a path" for check in allowed) and isinstance(value, (str, Path)):
+        value = type(value)(checked_name(str(value), name))
     if not allowed or any(check.fits(value) for check in allowed):
         return value
     if any(check.array for check in allowed) and not isinstance(value, str):

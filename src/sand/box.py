@@ -191,8 +191,6 @@ def as_box(value: Any) -> Box:
         return Box.open()
     if isinstance(value, (list, tuple)) or dimensions(value) == 1:
         if len(value) != 3:
-            raise BadInput(
-                f'box = {shown(value)} must be one length or three; for an open axis give None or "open"'
-            )
+            raise BadInput(f'box = {shown(value)} must be one length or three; for an open axis give None or "open"')
         return Box.periodic(*value)
     return Box.periodic(value)

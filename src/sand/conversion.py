@@ -181,7 +181,9 @@ def _is_plain(values: Any, depth: int = 0) -> bool:
     if type(values) is np.ndarray:
         return values.dtype.kind in "iuf"
     if isinstance(values, (list, tuple)):
-        return set(map(type, values)) <= {float, int} or (depth < 8 and all(_is_plain(one, depth + 1) for one in values))
+        return set(map(type, values)) <= {float, int} or (
+            depth < 8 and all(_is_plain(one, depth + 1) for one in values)
+        )
     return isinstance(values, (float, int, np.integer, np.floating, range)) and not isinstance(values, bool)
 
 

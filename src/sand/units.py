@@ -42,22 +42,15 @@ def si(
     least: float | None = None,
     below: float | None = None,
     most: float | None = None,
-    any_size: bool = False,
 ) -> float:
-    """Convert a quantity to one finite SI number.
+    """Convert a quantity to one finite SI number within a range.
 
     Parameters
     ----------
-    value : float or str or quantity
-        Float in SI, text with a unit, or a pint or astropy quantity.
-    unit : str
-        SI unit, for example "m" or "A m^2/kg"; "1" for a pure number.
-    name : str
-        Name of the argument, for the message.
+    value, unit, name
+        As for `finite_number`.
     above, least, below, most : float or None, optional
         Allowed range: number > above, number ≥ least, number < below, number ≤ most.
-    any_size : bool, optional
-        Whether a speed may exceed that of light, and other numbers the limits of `LARGEST`.
 
     Returns
     -------
@@ -67,18 +60,12 @@ def si(
     Raises
     ------
     BadInput
-        If the unit is wrong, the value is not a number, not finite or out of range, exceeds a limit of `LARGEST`, or is
-        a speed that reaches that of light and `below` is not given.
+        As `finite_number`, or if the number is out of range, exceeds a limit of `LARGEST`, or is a speed that reaches
+        that of light and `below` is not given.
     """
-    number = in_unit(value, unit)
-    if number is None or np.ndim(number) != 0:
-        raise not_a_quantity(value, unit, name)
+    number = finite_number(value, unit, name)
     label = f"{name} = {shown(value)}"
     in_units = "" if unit == "1" else f" {unit}"
-    if not math.isfinite(number):
-        raise BadInput(f"{label} is not finite; give a number{in_units and f' in{in_units}'}")
-    if number != 0.0 and not LEAST < abs(number) < MOST:
-        raise BadInput(f"{label} is not between {LEAST:g} and {MOST:g}{in_units}, the range of the computation")
     if above is not None and not number > above:
         raise BadInput(f"{label} must be above {above:g}{in_units}")
     if least is not None and not number >= least:
@@ -87,10 +74,40 @@ def si(
         raise BadInput(f"{label} must be below {below:g}{in_units}")
     if most is not None and not number <= most:
         raise BadInput(f"{label} must be at most {most:g}{in_units}")
-    if unit == "m/s" and below is None and not any_size and not abs(number) < LIGHT:
+    if unit == "m/s" and below is None and not abs(number) < LIGHT:
         raise BadInput(f"{label} is not below the speed of light, {LIGHT:.4g} m/s")
-    if not any_size and (reason := too_large(abs(number), unit)):
+    if reason := too_large(abs(number), unit):
         raise BadInput(f"{label} is {reason}")
+    return number
+
+
+def finite_number(value: Any, unit: str, name: str) -> float:
+    """Convert a quantity to one finite SI number, of any sign and size.
+
+    Parameters
+    ----------
+    value : float or str or quantity
+        Float in SI, text with a unit, or a quantity of pint, astropy or unyt.
+    unit : str
+        SI unit, for example "m" or "A m^2/kg"; "1" for a pure number.
+    name : str
+        Name of the argument, for the message.
+
+    Raises
+    ------
+    BadInput
+        If the unit is wrong, the value is not a number, not finite, or beyond the range of the computation.
+    """
+    number = in_unit(value, unit)
+    if number is None or np.ndim(number) != 0:
+        raise not_a_quantity(value, unit, name)
+    in_units = "" if unit == "1" else f" {unit}"
+    if not math.isfinite(number):
+        raise BadInput(f"{name} = {shown(value)} is not finite; give a number{in_units and f' in{in_units}'}")
+    if number != 0.0 and not LEAST < abs(number) < MOST:
+        raise BadInput(
+            f"{name} = {shown(value)} is not between {LEAST:g} and {MOST:g}{in_units}, the range of the computation"
+        )
     return float(number)
 
 

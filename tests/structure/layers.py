@@ -16,7 +16,7 @@ MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 
 LAYERS = (
     ("errors", "constants", "version"),
-    ("unit_factors",),
+    ("paths", "unit_factors"),
     ("conversion",),
     ("units",),
     ("descriptions",),

@@ -46,7 +46,7 @@ def private_folder(name: str) -> Path:
     """
     requested = os.environ.get("SAND_CACHE")
     reasons, warn_user = [], False
-    for base in [Path(requested).absolute() if requested else _default(), *_fallback()]:
+    for base in [Path(os.path.expanduser(requested)).absolute() if requested else _default(), *_fallback()]:
         try:
             folder = _create(_create(base) / name)
         except (OSError, _UnsafeFolder) as error:

@@ -14,6 +14,7 @@ from ..config.case import check_case
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.lock import writing
+from ..paths import user_path
 from ..simulation.serialise import case_of
 
 
@@ -56,7 +57,7 @@ def grow(
     Interrupted
         By Ctrl-C; the same call resumes.
     """
-    place = Path(folder)
+    place = user_path(folder)
     check_case(content, "case")
     places = [place / f"seed-{seed}" for seed in seeds]
     _refuse_other_boxes(place, places, content)
@@ -139,7 +140,7 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     BadInput
         If the folder contains a run of another case.
     """
-    place, case, own = Path(folder), check_case(content, "case"), list(observers)
+    place, case, own = user_path(folder), check_case(content, "case"), list(observers)
     case.run.seed = seed
     until = case.run.until
     if any(place.glob("checkpoint-*.npz")):

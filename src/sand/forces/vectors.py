@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..errors import BadInput
@@ -19,7 +19,7 @@ def components(value: Any) -> list[Any] | None:
         return None
 
 
-def three(value: Any, unit: str, name: str, *, any_size: bool = False) -> tuple[float, float, float]:
+def three(value: Any, unit: str, name: str, *, read: Callable[..., float] = si) -> tuple[float, float, float]:
     """Convert three components to SI.
 
     Parameters
@@ -30,8 +30,8 @@ def three(value: Any, unit: str, name: str, *, any_size: bool = False) -> tuple[
         The SI unit, "1" for dimensionless numbers.
     name : str
         Name of the parameter in error messages.
-    any_size : bool, optional
-        As for `units.si`.
+    read : callable, optional
+        Converts one component, as `units.si` does.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def three(value: Any, unit: str, name: str, *, any_size: bool = False) -> tuple[
     numbers, problems = [], []
     for entry, axis in zip(entries, "xyz", strict=True):
         try:
-            numbers.append(si(entry, unit, f"{name} {axis}", any_size=any_size))
+            numbers.append(read(entry, unit, f"{name} {axis}"))
         except BadInput as error:
             problems += error.problems
     if problems:

@@ -14,6 +14,7 @@ from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
+from ..paths import user_path
 from ..schema import own_values
 from ..units import si
 from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
@@ -64,7 +65,7 @@ def read_body(
         If the file is missing or foreign, has lines that are not numbers (the first ten are named), grains with
         impossible numbers, no radii, or unknown materials.
     """
-    file = Path(path)
+    file = user_path(path)
     found = _read_gsd(file) if file.suffix == ".gsd" else _read_lines(path)
     unit = found.unit if length is None else si(length, "m", "length", above=0.0)
     if found.radius is None and radius is None:
@@ -158,7 +159,7 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     FilesFailed
         If the file cannot be written.
     """
-    target = Path(path)
+    target = user_path(path)
     refuse_target(target, overwrite=overwrite)
     if target.suffix != ".gsd":
         replace_file(target, xyz_text(grains).encode())

@@ -16,6 +16,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..errors import BadInput
+from ..paths import user_path
 from .extended_xyz import ANGSTROM, format_rows, xyz_frame
 from .run_folder import replace_file
 from .trajectory import Frame
@@ -171,7 +172,7 @@ def export_frames(
         raise BadInput(f"format = {form!r}; allowed: {', '.join(FORMATS)}")
     if not len(frames):
         raise BadInput("there is no frame to export")
-    place = Path(stem)
+    place = user_path(stem)
     if not place.parent.is_dir():
         raise BadInput(f"there is no folder {place.parent}; make it first")
     text_of, ending = FORMATS[form]

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
+from ..paths import user_path
 from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
 from .style import MUTED, RED, format_number, format_si, panel_letter, plot_style
@@ -193,7 +194,7 @@ def save(figure: Figure, path: str | Path) -> None:
     FilesFailed
         If the file cannot be written.
     """
-    replace_file(Path(path), figure_bytes(figure))
+    replace_file(user_path(path), figure_bytes(figure))
 
 
 def show(figure: Figure) -> Figure:

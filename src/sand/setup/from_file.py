@@ -11,6 +11,7 @@ import numpy as np
 from ..grains import Grains
 from ..io.run_folder import TRAJECTORY
 from ..material import Material
+from ..paths import user_path
 from ..schema import own_values
 from .checks import check_body, largest_cluster
 from .from_frame import Start, StrainedContacts, from_frame
@@ -45,7 +46,8 @@ def from_trajectory(path: str | Path, frame: int, materials: Mapping[str, Materi
     """
     from ..io.trajectory import Frames
 
-    place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
+    place = user_path(path)
+    place = place / TRAJECTORY if place.is_dir() else place
     frames = Frames(place)
     try:
         start = from_frame(frames[frame], materials)

@@ -200,7 +200,9 @@ def _region(box: Box, extent: Any) -> Box:
             f"a gas needs a box that is periodic, or its extent along open axes, and this box is open along "
             f"{', '.join(missing)}; give extent, such as '1 um'"
         )
-    periodic = [a for a, length, own in zip("xyz", box.lengths, given, strict=True) if not (length is None or own is None)]
+    periodic = [
+        a for a, length, own in zip("xyz", box.lengths, given, strict=True) if not (length is None or own is None)
+    ]
     if periodic or (extent is not None and None not in box.lengths):
         along = ", ".join(periodic or "xyz")
         raise BadInput(f"extent: the box is periodic along {along}; give extent along open axes only")

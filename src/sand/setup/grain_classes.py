@@ -12,8 +12,8 @@ import numpy as np
 from ..arguments import MOST_GRAINS, checked
 from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
 from ..grains import Grains, moment_size, vector_for_all
-from ..io.run_folder import checked_name
 from ..material import PRESETS, Material, as_material
+from ..paths import checked_name
 from ..units import dimensions, si, whole_number
 from .aggregates import KINDS, build
 from .encounters import combined, turned
@@ -270,7 +270,7 @@ def _body_and_contacts(
     BadInput
         If the file cannot be read, or a key does not apply to it.
     """
-    path = Path(given.file).expanduser()
+    path = Path(given.file)
     if path.suffix in TEXT_SUFFIXES:
         if given.frame is not None:
             raise BadInput(f"frame = {given.frame}: {path} is a body, without frames; leave frame out")
