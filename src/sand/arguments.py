@@ -171,7 +171,10 @@ def _type_check(part: Any) -> _TypeCheck | None:
     origin, inner = typing.get_origin(part) or part, typing.get_args(part)
     simple = {
         type(None): _TypeCheck(lambda v: v is None, ""),
-        int: _TypeCheck(lambda v: isinstance(v, numbers.Integral) and not isinstance(v, bool), "a whole number"),
+        int: _TypeCheck(
+            lambda v: isinstance(v, numbers.Integral) and not isinstance(v, bool) and type(v).__name__ != "timedelta64",
+            "a whole number",
+        ),
         bool: _TypeCheck(
             lambda v: isinstance(v, bool) or type(v).__name__ == "bool", "True or False"
         ),  # numpy.bool too
@@ -184,9 +187,9 @@ def _type_check(part: Any) -> _TypeCheck | None:
     if origin is tuple and inner and inner[-1] is not Ellipsis:
         what = "whole numbers" if set(inner) == {int} else "values"
         words = f"{_WORDS.get(len(inner), len(inner))} {what}"
-        return _TypeCheck(lambda v: not isinstance(v, str) and hasattr(v, "__len__") and len(v) == len(inner), words)
+        return _TypeCheck(lambda v: not isinstance(v, str) and _length(v) == len(inner), words)
     if origin in _LISTS:
-        return _TypeCheck(lambda v: not isinstance(v, (str, bytes)) and hasattr(v, "__iter__"), "a list")
+        return _TypeCheck(lambda v: not isinstance(v, (str, bytes)) and _is_iterable(v), "a list")
     anything = origin is Any or not isinstance(origin, type) or origin in (float, complex, object)
     if anything or getattr(origin, "_is_protocol", False):
         return None
@@ -196,10 +199,32 @@ def _type_check(part: Any) -> _TypeCheck | None:
         return _TypeCheck(lambda v: isinstance(v, collections.abc.Mapping), "a dictionary")
     if _is_array(part):
         return _TypeCheck(
-            lambda v: isinstance(v, origin) and v.dtype.kind in "biufc", "an array of numbers", array=True
+            lambda v: isinstance(v, origin) and v.ndim > 0 and v.dtype.kind in "biufc",
+            "an array of numbers",
+            array=True,
         )
     call = _CONSTRUCTORS.get(origin.__name__, f"{_public_name(origin)}(…)")
     return _TypeCheck(lambda v: isinstance(v, origin), "", constructor=call)
+
+
+def _length(value: Any) -> int:
+    """Length of a value, −1 if it has none."""
+    try:
+        return len(value)
+    except Exception:  # a scalar quantity or array has the method, but no length
+        return -1
+
+
+def _is_array_of_numbers(value: Any) -> bool:
+    return hasattr(value, "dtype") and getattr(value, "ndim", 0) > 0 and value.dtype.kind in "biufc"
+
+
+def _is_iterable(value: Any) -> bool:
+    try:
+        iter(value)
+    except Exception:  # a scalar quantity or array has the method, but no entries
+        return False
+    return True
 
 
 def _public_name(cls: type) -> str:
@@ -213,10 +238,10 @@ def _read(allowed: list[_TypeCheck], unit: str | None, value: Any, name: str) ->
 
     Quantities are converted to the SI unit `unit`; None leaves them to the function.
     """
-    if unit is not None and not isinstance(value, (float, int)) and value is not None:
+    if unit is not None and not isinstance(value, float) and value is not None:
         from .units import has_unit_within, in_unit, not_a_quantity  # imports numpy
 
-        if has_unit_within(value) and not (isinstance(value, str) and allowed):
+        if not allowed or (has_unit_within(value) and not isinstance(value, str)):
             converted = in_unit(value, unit)
             if converted is None:
                 raise not_a_quantity(value, unit, name)
@@ -232,7 +257,7 @@ def _read(allowed: list[_TypeCheck], unit: str | None, value: Any, name: str) ->
             array = np.asarray(value)
         except (TypeError, ValueError):
             array = np.zeros(1, object)
-        if array.dtype.kind in "biufc":
+        if array.ndim and array.dtype.kind in "biufc":
             return array
     constructors = [check.constructor for check in allowed if check.constructor]
     words = [check.words for check in allowed if check.words]

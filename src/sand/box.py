@@ -132,6 +132,8 @@ class Box:
     def nearest(self, separation: np.ndarray) -> np.ndarray:
         """Shortest periodic images of separations (…, 3) [m]."""
         separation = si_array(separation, "m", "separation")
+        if not separation.ndim or separation.shape[-1] != 3:
+            raise BadInput(f"separation has shape {separation.shape} but must be (…, 3), in m")
         return np.stack(nearest_image(np.moveaxis(separation, -1, 0), self.span), axis=-1)
 
     def wrap(self, position: np.ndarray) -> np.ndarray:

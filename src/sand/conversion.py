@@ -38,6 +38,8 @@ EXAMPLES = {
 }
 """One quantity per unit, for error messages."""
 
+DEEPEST = 8
+"""Lists within lists that are looked through."""
 HINTS = (
     ("K", "C", "the unit of a temperature in degrees Celsius is degC"),
     ("T", "A/m", "give the flux density μ0 H, 4π × 1e-7 T for 1 A/m"),
@@ -60,7 +62,7 @@ def in_unit(value: Any, unit: str) -> Any:
     """
     try:
         return _converted(value, unit)
-    except (TypeError, ValueError, OverflowError, RecursionError):
+    except Exception:  # errors of NumPy, and of objects that are no numbers
         return None
 
 
@@ -150,10 +152,11 @@ def has_unit(value: Any) -> bool:
     return any(hasattr(value, name) for name in ("to_value", "units", "unit", "magnitude"))
 
 
-def has_unit_within(value: Any) -> bool:
+def has_unit_within(value: Any, depth: int = 0) -> bool:
     """Whether a value, or an entry of a list or an array, is text, has a unit or is masked."""
     if isinstance(value, (list, tuple)):
-        return not set(map(type, value)) <= {float, int} and any(map(has_unit_within, value))
+        plain = depth == DEEPEST or set(map(type, value)) <= {float, int}
+        return not plain and any(has_unit_within(one, depth + 1) for one in value)
     if type(value) is np.ndarray:
         return value.dtype.kind in "UTmM" or (value.dtype.kind == "O" and any(map(has_unit_within, value.flat)))
     return isinstance(value, (str, np.timedelta64, datetime.timedelta)) or has_unit(value) or is_masked(value)
@@ -164,8 +167,11 @@ def dimensions(value: Any) -> int:
 
     `numpy.ndim` drops units in lists, and raises errors for some.
     """
-    if isinstance(value, (list, tuple)):
-        return 1 + (dimensions(value[0]) if value else 0)
+    count = 0
+    while isinstance(value, (list, tuple)) and count < DEEPEST:
+        count, value = count + 1, value[0] if value else None
+    if count:
+        return count + (dimensions(value) if count < DEEPEST else 0)
     found = getattr(value, "ndim", 0)
     return found if isinstance(found, int) else 0
 
@@ -182,7 +188,7 @@ def _is_plain(values: Any, depth: int = 0) -> bool:
         return values.dtype.kind in "iuf"
     if isinstance(values, (list, tuple)):
         return set(map(type, values)) <= {float, int} or (
-            depth < 8 and all(_is_plain(one, depth + 1) for one in values)
+            depth < DEEPEST and all(_is_plain(one, depth + 1) for one in values)
         )
     return isinstance(values, (float, int, np.integer, np.floating, range)) and not isinstance(values, bool)
 
@@ -195,7 +201,9 @@ def _stacked(entries: list[Any], unit: str) -> Any:
 
 def not_a_quantity(value: Any, unit: str, name: str) -> BadInput:
     """The error for a value that `in_unit` does not convert; in lists and arrays it names the first such entry."""
-    while not isinstance(value, (str, bytes)):
+    for _ in range(3):  # (N, 3) and one more
+        if isinstance(value, (str, bytes)):
+            break
         if is_masked(value) and np.ndim(value.mask):
             missing = int(np.sum(value.mask))
             return BadInput(f"{name} has masked entries, {missing} of {value.mask.size}; fill them, or leave them out")

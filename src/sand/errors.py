@@ -123,7 +123,7 @@ def shown(value: Any) -> str:
         return f"array of shape {shape}" + ("" if unit is None else f" in {unit}")
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # integers of thousands of digits, lists that contain themselves
+    except Exception:  # integers of thousands of digits, lists that contain themselves
         return f"<{type(value).__name__}>"
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 

@@ -14,7 +14,7 @@ from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
 from .schema import BY_NAME, FIELDS, OWN, public, stored
-from .units import format_quantity, has_unit_within, in_unit, not_a_quantity, too_large
+from .units import dimensions, format_quantity, has_unit_within, in_unit, not_a_quantity, too_large
 
 ROUNDING = 1e-7
 """Largest gap of a contact without adhesion, relative to the sum of radii; allows for coordinates of seven digits."""
@@ -70,7 +70,9 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
     BadInput
         If the length is not N, a material is unknown, or two different materials have the same name.
     """
-    several = isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str)
+    several = (
+        isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str) and dimensions(material) > 0
+    )
     each: Sequence[Any] = list(material) if several else [as_material(material)] * count
     if len(each) != count:
         raise BadInput(f"material has {len(each)} entries but there are {count} grains")
@@ -230,12 +232,18 @@ class Grains:
         radii = " to ".join(format_quantity(r, "m") for r in sorted({self.radius.min(), self.radius.max()}))
         return f"<{len(self)} {'grain' if len(self) == 1 else 'grains'} of {names}, radius {radii}>"
 
+    @checked
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
         """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""
-        i, j = np.asarray(pairs).T
+        if pairs.ndim != 2 or pairs.shape[1] != 2 or (pairs.size and pairs.dtype.kind not in "iu"):
+            raise BadInput(f"pairs = {shown(pairs)} must be whole numbers (P, 2)")
+        if pairs.size and not -len(self) <= pairs.min() <= pairs.max() < len(self):
+            raise BadInput(f"pairs name grains from {pairs.min()} to {pairs.max()}; there are {len(self)}")
+        i, j = np.asarray(pairs, np.int64).T
         separation = box.nearest(self.position[i] - self.position[j])
         return self.radius[i] + self.radius[j] - np.linalg.norm(separation, axis=1)
 
+    @checked
     def touching(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
         """Pairs (P, 2) of grains in contact, sorted, with their overlaps [m]; a gap up to `ROUNDING` counts."""
         pairs = box.close_pairs(self.position, 2.0 * float(self.radius.max()) * (1.0 + ROUNDING))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .errors import BadInput
 from .units import si_array
 
 
@@ -47,7 +48,10 @@ class QuantityArray(np.ndarray):
         """Assign values in SI, text or quantities.  Raises BadInput."""
         if self.unit_of_entries is not None:
             value = si_array(value, self.unit_of_entries, self.name)
-        super().__setitem__(index, value)
+        try:
+            super().__setitem__(index, value)
+        except ValueError as error:  # of NumPy, about the shape
+            raise BadInput(f"{self.name}: {error}") from None
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         """Return the result of arithmetic as a plain array, but in-place arithmetic as this one."""

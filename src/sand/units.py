@@ -122,9 +122,14 @@ def is_word(value: Any, word: str) -> bool:
     return isinstance(value, str) and value == word
 
 
+def _is_whole(value: Any) -> bool:
+    """Whether a value is a whole number; time spans of numpy, which are integers to it, are none."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+
+
 def whole_number(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
     """Check a whole number from `least` to `most`. Raises BadInput."""
-    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    is_whole = _is_whole(value)
     if not is_whole or value < least or (most is not None and value > most):
         bounds = (
             f"of at least {least}" if most is None or (is_whole and value < least) else f"from {least} to {most:.3g}"
@@ -135,8 +140,7 @@ def whole_number(value: Any, name: str, least: int = 1, most: int | None = None)
 
 def seed_given(value: Any, bits: int = 64) -> int:
     """Check a random seed, 0 … 2**bits − 1. Raises BadInput."""
-    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not is_whole or not 0 <= value < 2**bits:
+    if not _is_whole(value) or not 0 <= value < 2**bits:
         raise BadInput(f"seed = {shown(value)} must be a whole number of at least 0, below 2**{bits}")
     return int(value)
 

@@ -209,7 +209,7 @@ EXPERIMENTS = [
     ("sand.theory.kinetics.capture('10 nm', 1e-20, 1e-18, 100, speed=np.ones(2))", "must be text"),
     ("sand.theory.kinetics.constant(1.0)('a', 'b')", "mass = 'a' is not a quantity in kg"),
     ("sand.theory.smoluchowski.coagulate(7, [1, 2], 1.0, [1.0], mass=1.0)", "kernel = 7 must be a function"),
-    ("sand.theory.smoluchowski.coagulate(max, 7, 1.0, [1.0], mass=1.0)", "sizes must be at least two"),
+    ("sand.theory.smoluchowski.coagulate(max, 7, 1.0, [1.0], mass=1.0)", "sizes = 7 must be an array of numbers"),
     ("sand.analysis.clusters.cluster_labels('2', [])", "count = '2' must be a whole number"),
     ("sand.analysis.clusters.cluster_labels(2, [[0, 5]])", "pairs name grains from 0 to 5; there are 2"),
     ("sand.analysis.clusters.cluster_labels(2, 'ab')", "pairs = 'ab' must be an array of numbers"),

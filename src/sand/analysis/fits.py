@@ -75,6 +75,7 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
     return PowerLawFit(float(slope), error, low, high, float(np.exp(offset - slope * mean)), len(x), count)
 
 
+@checked
 def jackknife(estimate: float, without: np.ndarray) -> tuple[float, float, float]:
     """Standard error and 95 % interval of an estimate by the jackknife.
 
@@ -92,6 +93,7 @@ def jackknife(estimate: float, without: np.ndarray) -> tuple[float, float, float
     """
     from scipy.stats import t
 
+    without = np.asarray(without, float)
     n = len(without)
     if n < 2 or not np.isfinite(without).all():
         return np.nan, np.nan, np.nan

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import checked
 from ..errors import BadInput
-from ..units import seed_given
+from ..units import seed_given, si
 from .fits import power_law
 from .shape import gyration_radius
 
@@ -71,6 +71,9 @@ def ensemble_dimension(
         If the aggregates used do not span a factor of 3 in N, or r_g does not grow with N.
     """
     n, r = np.asarray(sizes, float), np.asarray(gyration, float)
+    grain_radius = si(grain_radius, "m", "grain_radius", above=0.0)
+    if n.ndim != 1 or n.shape != r.shape or (groups is not None and np.shape(groups) != n.shape):
+        raise BadInput(f"sizes {n.shape}, gyration {r.shape} and groups must be (K,), one entry for each aggregate")
     used = n >= least
     if not used.any() or n[used].max() < RANGE * n[used].min():
         raise BadInput(

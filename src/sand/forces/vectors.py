@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..errors import BadInput
+from ..errors import BadInput, shown
 from ..units import si
 
 
@@ -46,7 +46,7 @@ def three(value: Any, unit: str, name: str, *, read: Callable[..., float] = si) 
     entries = components(value)
     if entries is None or len(entries) != 3:
         expected = "numbers, such as [0, 0, 1]" if unit == "1" else f"components, in {unit}"
-        raise BadInput(f"{name} = {value!r} must be three {expected}")
+        raise BadInput(f"{name} = {shown(value)} must be three {expected}")
     numbers, problems = [], []
     for entry, axis in zip(entries, "xyz", strict=True):
         try:
@@ -71,5 +71,5 @@ def along_z(value: Any, unit: str, name: str, direction: float = 1.0) -> tuple[f
         return 0.0, 0.0, 0.0 + direction * si(value, unit, f"{name} z")
     if len(entries) != 3:
         axis = "z" if direction > 0.0 else "−z"
-        raise BadInput(f"{name} = {value!r} must be one value along {axis} or three components, in {unit}")
+        raise BadInput(f"{name} = {shown(value)} must be one value along {axis} or three components, in {unit}")
     return three(entries, unit, name)

@@ -129,7 +129,7 @@ def _direction(along: Any) -> np.ndarray:
     found = in_unit(named.get(along, along) if isinstance(along, str) else along, "1")
     vector = np.zeros(0) if found is None else np.asarray(found)
     if vector.shape != (3,) or not np.linalg.norm(vector) > 0.0 or not np.isfinite(vector).all():
-        raise BadInput(f"along = {along!r} must be 'x', 'y', 'z' or three numbers, not all 0")
+        raise BadInput(f"along = {shown(along)} must be 'x', 'y', 'z' or three numbers, not all 0")
     return vector / np.linalg.norm(vector)
 
 

@@ -335,7 +335,7 @@ def in_library(given: Any, library: Mapping[str, Material]) -> Any:
         return library[given] if given in library else as_material(given)
     if isinstance(given, Mapping):
         return {in_library(name, library): part for name, part in given.items()}
-    if isinstance(given, (Sequence, np.ndarray)):
+    if isinstance(given, (Sequence, np.ndarray)) and dimensions(given) == 1:
         return [in_library(one, library) for one in given]
     return as_material(given)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 from collections.abc import Sequence
 from typing import Any
@@ -38,7 +39,7 @@ from ..state.state import (
     State,
     grains_from_arrays,
 )
-from ..units import si
+from ..units import has_unit_within, si
 from .assemble import build_engine
 from .changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
 from .checks import outside_box
@@ -141,7 +142,10 @@ class Change:
         BadInput
             At the end of the change, if there is no such grain, or no grain would remain.
         """
-        count, given = len(self.grains), np.atleast_1d(np.asarray(which))
+        count, given = len(self.grains), np.zeros(1)  # what is not an array is refused below
+        if not has_unit_within(which):
+            with contextlib.suppress(TypeError, ValueError, OverflowError, RecursionError):
+                given = np.atleast_1d(np.asarray(which))
         if given.size == 0:
             return
         if given.dtype == bool and given.shape != (count,):
@@ -221,7 +225,9 @@ class Change:
         BadInput
             If the simulation has no force of this kind.
         """
-        (given,) = read_forces(force)
+        given, *others = read_forces(force) or (None,)
+        if given is None or others:
+            raise BadInput(f"replace: {shown(force)}; give one force, such as sand.Field('0 T')")
         names = [own.name for own in self.forces]
         if given.name not in names:
             raise BadInput(f"forces: the simulation has no '{given.name}'; {did_you_mean(given.name, names)}")

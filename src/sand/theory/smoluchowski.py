@@ -83,7 +83,7 @@ def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
 def coagulate(
     kernel: KernelFunction,
     sizes: np.ndarray,
-    numbers: np.ndarray,
+    numbers: np.ndarray | float,
     times: np.ndarray,
     *,
     mass: Any,
