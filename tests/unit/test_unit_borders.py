@@ -99,9 +99,9 @@ def test_arrays_of_functions_are_converted_by_their_documented_units():
     assert litres[0, 0] == pytest.approx(2e-3, rel=1e-12, abs=0.0)
     rod = np.array(PAIR) * 1e6 * UNIT.um
     assert sand.analysis.shape.gyration_radius(rod) == pytest.approx(0.5e-6, rel=1e-12, abs=0.0)
-    with pytest.raises(sand.BadInput, match="position .*is not a quantity in m"):
+    with pytest.raises(sand.BadInput, match=r"position .*is not a quantity in m"):
         sand.analysis.shape.gyration_radius(np.array(PAIR) * UNIT.kg)
-    with pytest.raises(sand.BadInput, match="x = .* is not a number"):
+    with pytest.raises(sand.BadInput, match=r"x = .* is not a number"):
         sand.analysis.fits.power_law(np.array([1.0, 2.0]) * UNIT.s, [1.0, 2.0])
 
 
@@ -112,7 +112,7 @@ def test_entries_of_a_change_are_converted():
     velocity[1][2] = "5 mm/s"
     assert velocity.tolist() == [[0.01, 0.0, 0.0], [0.0, 0.0, 0.005]]
     assert type(2.0 * velocity) is np.ndarray
-    with pytest.raises(sand.BadInput, match="velocity = .* is not a quantity in m/s"):
+    with pytest.raises(sand.BadInput, match=r"velocity = .* is not a quantity in m/s"):
         velocity[0] = 1.0 * UNIT.m
     with pytest.raises(sand.BadInput, match="velocity: could not broadcast"):
         velocity[0] = [1.0, 2.0]
