@@ -255,7 +255,7 @@ def _read(allowed: list[_TypeCheck], unit: str | None, value: Any, name: str) ->
 
         try:
             array = np.asarray(value)
-        except (TypeError, ValueError):
+        except Exception:  # errors of NumPy, and of the object
             array = np.zeros(1, object)
         if array.ndim and array.dtype.kind in "biufc":
             return array

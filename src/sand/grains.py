@@ -210,7 +210,7 @@ class Grains:
         numbers = np.arange(len(self))
         try:
             chosen = np.atleast_1d(numbers[index])
-        except (IndexError, TypeError, ValueError):
+        except Exception:  # errors of NumPy, and of the object
             chosen = numbers[:0]
         if chosen.ndim != 1 or not chosen.size:
             asked = shown(index)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .errors import BadInput
+from .errors import BadInput, shown
 
 LONGEST_NAME, LONGEST_PATH = 255, 4000
 """Bytes of one name, and characters of a whole path."""
@@ -37,6 +37,8 @@ def checked_name(text: str, name: str) -> str:
     return os.path.expanduser(text)
 
 
-def user_path(path: str | os.PathLike[str], name: str = "path") -> Path:
+def user_path(path: str | Path, name: str = "path") -> Path:
     """A path from a name as the user gives it; see `checked_name`.  Raises BadInput."""
-    return Path(checked_name(os.fspath(path), name))
+    if not isinstance(path, (str, Path)):
+        raise BadInput(f"{name} = {shown(path)} must be a path")
+    return Path(checked_name(str(path), name))

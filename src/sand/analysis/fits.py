@@ -61,9 +61,9 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
         raise BadInput("a power-law fit needs x and y of equal length, all finite and above 0")
     if np.ptp(np.log(x)) < SAME:
         raise BadInput("a power-law fit needs at least two different x")
+    if groups is not None and np.shape(groups) != x.shape:
+        raise BadInput(f"groups must have one entry for each of {len(x)} points, not {np.size(groups)}")
     group = np.arange(len(x)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
-    if len(group) != len(x):
-        raise BadInput(f"groups must have one entry for each of {len(x)} points, not {len(group)}")
     # centred, so that sums of squares lose no digits
     mean = float(np.log(x).mean())
     u, v = np.log(x) - mean, np.log(y)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arguments import checked
-from ..errors import BadInput
+from ..errors import BadInput, shown
 from ..units import seed_given, si
 from .fits import power_law
 from .shape import gyration_radius
@@ -88,6 +88,16 @@ def ensemble_dimension(
     return Dimension(value, fit.error * value**2, fit.prefactor**-value, (float(n[used].min()), float(n[used].max())))
 
 
+def _window(given: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Two numbers, or None.  Raises BadInput."""
+    if given is None:
+        return None
+    low, high = (si(one, "m", "window", above=0.0) for one in given)
+    if not low < high:
+        raise BadInput(f"window = {shown(given)} is empty; give two distances in m, the smaller one first")
+    return low, high
+
+
 def _one(position: np.ndarray) -> tuple[np.ndarray, float, float]:
     """Positions, median nearest-neighbour distance [m] and r_g [m]. Raises BadInput for too few grains."""
     position = np.asarray(position, dtype=np.float64)
@@ -122,7 +132,7 @@ def correlation_dimension(position: np.ndarray, window: tuple[float, float] | No
         If there are too few grains, or the window is empty.
     """
     position, unit, size = _one(position)
-    low, high = window or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
+    low, high = _window(window) or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
     # half-way between neighbour shells, so that a straight chain has dimension 1 exactly
     radii = (np.unique((_spaced(low, high) / unit * ABOVE).astype(int)) + 0.5) * unit
     core = np.linalg.norm(position - position.mean(axis=0), axis=1) <= CORE * size * ABOVE
@@ -160,7 +170,7 @@ def box_dimension(position: np.ndarray, window: tuple[float, float] | None = Non
         If there are too few grains, or the window is empty.
     """
     position, unit, size = _one(position)
-    low, high = window or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))
+    low, high = _window(window) or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))
     sides, rng = _spaced(low, high), np.random.default_rng(seed_given(seed))
     needed = np.full((SHIFTS, len(sides)), np.inf)
     for shift in range(SHIFTS):

@@ -177,7 +177,8 @@ def radii_of(given: Any) -> Any:
     if np.ndim(values) == 0:
         return si(given, "m", "radius", above=0.0)
     values = np.asarray(values)
-    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0))) if values.ndim == 1 else [0]
+    is_list = values.ndim == 1 and values.size > 0
+    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0))) if is_list else [0]
     if len(bad):
         raise BadInput(f"radius: give N numbers above 0 in m; that of grain {bad[0]} is not")
     _refuse_wide(float(values.min()), float(values.max()))
