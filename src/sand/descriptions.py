@@ -16,7 +16,7 @@ import sys
 import textwrap
 from typing import Any
 
-_UNIT = re.compile(r"\[([A-Za-z][^\],]*)\]")
+_UNIT = re.compile(r"\[((?:1/)?[A-Za-z][^\],]*)\]")
 
 
 @functools.cache
@@ -33,7 +33,7 @@ def docstring(thing: Any) -> str:
 
 
 @functools.cache
-def parameter_docs(kind: type) -> dict[str, str]:
+def parameter_docs(kind: Any) -> dict[str, str]:
     """Descriptions of the parameters, or attributes, in a numpydoc docstring, by name."""
     text = docstring(kind)
     text = re.split(r"(?:Parameters|Attributes)\n-{10}\n", text, maxsplit=1)[-1]
@@ -53,8 +53,12 @@ def units_of(thing: Any) -> dict[str, str]:
     """Units of the arguments of an object that have one."""
     if hasattr(thing, "units"):  # a force of the user
         return dict(thing.units)
-    kind: Any = type(thing)
-    found = {name: _UNIT.search(text) for name, text in parameter_docs(kind).items()}
+    return documented_units(type(thing))
+
+
+def documented_units(thing: Any) -> dict[str, str]:
+    """Units in the docstring of a class or function, by parameter; those without a unit are missing."""
+    found = {name: _UNIT.search(text) for name, text in parameter_docs(thing).items()}
     return {name: match[1].replace("²", "^2").replace("³", "^3") for name, match in found.items() if match}
 
 

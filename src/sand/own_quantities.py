@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from .errors import BadInput, shown
+from .own_units import with_own_unit
 from .schema import BY_NAME, Field, public, stored
-from .units import in_unit, with_own_unit
+from .units import in_unit
 
 LONGEST_NAME = 60
 """Most characters of a name."""

@@ -22,6 +22,7 @@ from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
+from .paths import user_path
 from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -51,7 +52,7 @@ class Run:
     """
 
     def __init__(self, folder: str | Path):
-        self.folder = Path(folder)
+        self.folder = user_path(folder)
         if self.folder.is_file():
             raise BadInput(f"{folder} is a file; give the folder of a run")
         if not self.folder.is_dir():
@@ -346,6 +347,7 @@ def open(folder: Any, *others: Any) -> Any:
     for one in (*(folder if isinstance(folder, (list, tuple)) else [folder]), *others):
         if not isinstance(one, (str, Path)):
             raise BadInput(f"folder = {shown(one)} must be a path, or several of them")
+        one = str(user_path(one, "folder")) if isinstance(one, str) else one
         if isinstance(one, str) and glob.has_magic(one) and not Path(one).exists():
             several = True
             found = [name for name in glob.glob(one) if Path(name).is_dir()]

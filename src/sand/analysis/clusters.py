@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..box import Box
-from ..errors import BadInput
+from ..errors import BadInput, shown
+from ..units import whole_number
 
 FEW = 200
 """Grains plus contacts up to which a disjoint-set forest in Python is faster than SciPy's graph (130 µs)."""
+
+
+def checked_pairs(count: int, pairs: Any) -> np.ndarray:
+    """Contacts (C, 2) as whole numbers.  Raises BadInput for another shape, and for numbers that are no grain's."""
+    ends = np.asarray(pairs)
+    if ends.size % 2:
+        raise BadInput(f"pairs has shape {ends.shape} but must be (C, 2): two grains for each contact")
+    ends = ends.reshape(-1, 2)
+    if len(ends) and not 0 <= ends.min() <= ends.max() < count:
+        raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
+    return ends.astype(np.int64, copy=False)
+
+
+def checked_labels(labels: Any) -> np.ndarray:
+    """Cluster of each grain (N,) as whole numbers.  Raises BadInput for anything else."""
+    found = np.asarray(labels)
+    whole = found.ndim == 1 and found.size and found.dtype.kind in "iu" and found.min() >= 0
+    if not whole or found.max() >= MOST_GRAINS:
+        raise BadInput(f"labels = {shown(labels)} must be whole numbers (N,) from 0, the cluster of each grain")
+    return found
 
 
 @checked
@@ -33,13 +56,8 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     BadInput
         If `pairs` is not (C, 2) or has indices outside 0 … N−1.
     """
-    ends = np.asarray(pairs, dtype=np.int64)
-    if ends.size % 2:
-        raise BadInput(f"pairs has shape {ends.shape} but must be (C, 2): two grains for each contact")
-    ends = ends.reshape(-1, 2)
-    if len(ends) and not 0 <= ends.min() <= ends.max() < count:
-        raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
-    return labels_of(count, ends)
+    whole_number(count, "count", 0, MOST_GRAINS)
+    return labels_of(count, checked_pairs(count, pairs))
 
 
 def labels_of(count: int, ends: np.ndarray) -> np.ndarray:
@@ -75,7 +93,7 @@ def _disjoint_sets(count: int, ends: np.ndarray) -> np.ndarray:
 @checked
 def cluster_sizes(labels: np.ndarray) -> np.ndarray:
     """Number of grains of each cluster (K,)."""
-    return np.bincount(labels)
+    return np.bincount(checked_labels(labels))
 
 
 @checked
@@ -118,8 +136,11 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box, refuse_percolat
     BadInput
         If a cluster percolates and `refuse_percolating` is given.
     """
-    ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    whole = in_one_piece(np.array(position, dtype=np.float64), ends, box)
+    whole = np.array(position, dtype=np.float64)
+    if whole.ndim != 2 or whole.shape[1] != 3:
+        raise BadInput(f"position has shape {whole.shape} but must be (N, 3)")
+    ends = checked_pairs(len(whole), pairs)
+    whole = in_one_piece(whole, ends, box)
     if refuse_percolating and (found := _closes_through_boundary(whole, ends, box)).any():
         grain = ends[found][0, 0]
         raise BadInput(
@@ -188,6 +209,7 @@ def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndar
     return whole
 
 
+@checked
 def aggregate_moments(moment: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Total moment and alignment of each cluster.
 
@@ -205,7 +227,9 @@ def aggregate_moments(moment: np.ndarray, labels: np.ndarray) -> tuple[np.ndarra
     alignment : ndarray
         |Σμ|/Σ|μ| of each cluster (K,), 0 without moments.
     """
-    mu = np.asarray(moment, float)
+    mu, labels = np.asarray(moment, float), checked_labels(labels)
+    if mu.shape != (len(labels), 3):
+        raise BadInput(f"moment has shape {mu.shape} but must be (N, 3), with N = {len(labels)} as labels")
     sums = np.column_stack([np.bincount(labels, mu[:, axis]) for axis in range(3)])
     sizes = np.bincount(labels, np.linalg.norm(mu, axis=1))
     with np.errstate(invalid="ignore"):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import refuse_other
-from .clusters import aggregate_moments, cluster_labels, percolating_clusters, unwrapped
+from .clusters import aggregate_moments, checked_labels, cluster_labels, percolating_clusters, unwrapped
 from .network import network
 from .shape import elongation, filling_factor, gyration_radius
 
@@ -88,5 +88,5 @@ def size_distribution(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     labels : ndarray
         Cluster of each grain (N,).
     """
-    sizes, numbers = np.unique(np.bincount(labels), return_counts=True)
+    sizes, numbers = np.unique(np.bincount(checked_labels(labels)), return_counts=True)
     return sizes, numbers

@@ -9,7 +9,7 @@ import click
 
 from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 from ..errors import BadInput
-from ..io.run_folder import checked_name
+from ..paths import checked_name
 
 
 class PathName(click.ParamType):

@@ -105,7 +105,7 @@ def command(
 
 def _source(source: str) -> Path:
     """The trajectory to take grains from.  Raises BadInput."""
-    place = Path(source).expanduser().absolute().resolve()
+    place = Path(source).absolute().resolve()
     if not place.exists():
         raise BadInput(f"--from: there is no file or folder {source}")
     if place.is_dir() and not (place / TRAJECTORY).exists():

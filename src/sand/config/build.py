@@ -17,6 +17,7 @@ from ..io.checkpoint import newest_checkpoint
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
+from ..paths import user_path
 from ..setup.from_file import from_trajectory, is_own_trajectory, start_from_file
 from ..setup.from_frame import Start
 from ..setup.gas import gas_with_contacts
@@ -197,7 +198,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
         If there is no checkpoint, it is damaged, the case needs a force that SAND does not know, or another process
         writes to the folder.
     """
-    place = Path(folder)
+    place = user_path(folder)
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
     import_modules(imports)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -393,7 +394,7 @@ def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, 
     for table in [*tables, *(one for each in tables for one in _tables_in(each.get("classes")))]:
         file = table.get("file")
         if isinstance(file, str) and file.strip() and "\0" not in file:  # others are reported by the validation
-            table["file"] = str((Path(path).parent / Path(file).expanduser()).absolute())
+            table["file"] = str((Path(path).parent / os.path.expanduser(file)).absolute())
     return whole
 
 

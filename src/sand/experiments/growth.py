@@ -15,6 +15,7 @@ from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..analysis.growth_law import LocalDegree, RateLaw, local_degrees, rate_law
 from ..errors import BadInput
 from ..io import run_folder as files
+from ..paths import user_path
 from ..results import Run
 from .growth_boxes import grow, run_box, shared_settings
 
@@ -93,7 +94,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
     frames.close()
     moments = np.linalg.norm(first.moment, axis=1)
     return BoxResult(
-        Path(folder),
+        user_path(folder),
         ledger["time"],
         ledger["mean_cluster_size"],
         len(first),
@@ -113,7 +114,7 @@ def boxes_in(folder: str | Path) -> list[Path]:
     BadInput
         If there is none.
     """
-    place = Path(folder)
+    place = user_path(folder)
     if (place / files.TRAJECTORY).exists():
         return [place]
     found = [one.parent for one in place.glob(f"*/{files.TRAJECTORY}")]

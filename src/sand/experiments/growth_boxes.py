@@ -15,6 +15,7 @@ from ..errors import BadInput, warn
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
+from ..paths import user_path
 from ..simulation.serialise import case_of
 from .executors import results_of
 
@@ -62,7 +63,7 @@ def grow(
     Interrupted
         By Ctrl-C; the same call resumes.
     """
-    place = Path(folder)
+    place = user_path(folder)
     check_case(content, "case")
     places = {seed: place / f"seed-{seed}" for seed in seeds}
     files.make_folder(place, shared=True)
@@ -160,7 +161,7 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     BadInput
         If the folder contains a run of another case, or another process writes to it.
     """
-    place, case, own = Path(folder), check_case(content, "case"), list(observers)
+    place, case, own = user_path(folder), check_case(content, "case"), list(observers)
     if place.is_dir():
         with writing(place, patience=PATIENCE):  # a worker whose parent was killed may be writing its checkpoint
             pass

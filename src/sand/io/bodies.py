@@ -13,6 +13,7 @@ from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
+from ..paths import user_path
 from ..units import si
 from .extended_xyz import xyz_text
 from .frame import MODES
@@ -79,7 +80,7 @@ def read_grains(
         If the file is missing or in no such format, has lines that are not numbers (the first ten are named), grains
         with impossible numbers, quantities without a unit, no radii or two, no such frame, or unknown materials.
     """
-    file = Path(path)
+    file = user_path(path)
     if is_gsd(file) and (found := _read_own_gsd(file, frame)) is not None:
         data, contacts = found
     else:
@@ -231,7 +232,7 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     FilesFailed
         If the file cannot be written.
     """
-    target = Path(path)
+    target = user_path(path)
     refuse_target(target, overwrite=overwrite)
     if target.suffix != ".gsd":
         replace_file(target, xyz_text(grains).encode())

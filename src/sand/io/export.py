@@ -18,6 +18,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from ..errors import BadInput, warn
+from ..paths import user_path
 from .extended_xyz import ANGSTROM, format_rows, listed, own_columns, row_form, xyz_frame
 from .frame import Frame, FrameSequence
 from .run_folder import replace_file, replacing
@@ -254,7 +255,7 @@ def export_frames(
     numbers = range(len(frames))[chosen]
     if not numbers:
         raise BadInput("there is no frame to export")
-    place = Path(stem)
+    place = user_path(stem)
     if not place.parent.is_dir():
         raise BadInput(f"there is no folder {place.parent}; make it first")
     text_of, ending = FORMATS[form]

@@ -303,9 +303,9 @@ class FrameArrays(Sequence[np.ndarray]):
     """
 
     def __init__(self, frames: FrameSequence, name: str, chosen: range | None = None):
-        if not frames.has_array(name):
+        if not isinstance(name, str) or not frames.has_array(name):
             known = (*OF_GRAINS, *OF_CONTACTS, *frames.own_units)
-            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(str(name), known)}")
+            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(shown(name), known)}")
         self.frames, self.name = frames, name
         self.chosen = range(len(frames)) if chosen is None else chosen
 
@@ -371,10 +371,12 @@ class FrameSequence(Sequence[Frame]):
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
-        if not isinstance(index, (int, np.integer)):
+        if not isinstance(index, (int, np.integer)) or isinstance(index, np.timedelta64):
             raise NoSuchFrame(f"frame {shown(index)} must be a whole number, from 0 to {len(self) - 1}")
         if not -len(self) <= index < len(self):
-            raise NoSuchFrame(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+            raise NoSuchFrame(
+                f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {shown(index)}"
+            )
         return self._frame(index % len(self))
 
     def material_names(self) -> list[str]:

@@ -18,7 +18,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import BadInput, FilesFailed, warn
+from ..errors import BadInput, FilesFailed, shown, warn
+from ..paths import user_path
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
@@ -53,29 +54,6 @@ _NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
 """Errors by which systems report that they cannot sync a folder."""
 
 
-def checked_name(text: str, name: str) -> str:
-    """Check the name of a file or folder.
-
-    Parameters
-    ----------
-    text : str
-        The name as the user gave it.
-    name : str
-        Name of the option or setting, for the message.
-
-    Raises
-    ------
-    BadInput
-        If it is empty, or not valid on any system.
-    """
-    if not text.strip() or "\0" in text:
-        raise BadInput(f"{name} = {text!r} is not the name of a file or folder")
-    longest = max(len(os.fsencode(part)) for part in text.replace("\\", "/").split("/"))
-    if longest > 255 or len(text) > 4000:
-        raise BadInput(f"{name} = '{text[:40]}…' is too long for the name of a file or folder")
-    return text
-
-
 def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = False) -> Path:
     """Create the folder of a new run.
 
@@ -94,7 +72,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     FilesFailed
         If it cannot be created or written to.
     """
-    folder = Path(path)
+    folder = user_path(path, "folder")
     try:
         if folder.exists() and not folder.is_dir():
             raise BadInput(f"{folder} is a file; give the name of a new folder")
@@ -310,6 +288,7 @@ def read_text(path: str | Path, most: int | None = None, errors: str = "strict")
     BadInput
         If the file is missing, unreadable, too large, or not text.
     """
+    path = user_path(path, "file")
     if most is None:
         refuse_devices(path)
     try:
@@ -327,8 +306,21 @@ def read_text(path: str | Path, most: int | None = None, errors: str = "strict")
         raise BadInput(f"{path} is not a text file in UTF-8, but one in UTF-16; save it as UTF-8")
     try:
         return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig", errors=errors).read()
-    except UnicodeDecodeError:
-        raise BadInput(f"{path} is not a text file") from None
+    except UnicodeDecodeError as error:
+        raise BadInput(_not_utf8(path, content, error.start)) from None
+
+
+def _not_utf8(path: str | Path, content: bytes, start: int) -> str:
+    """Message about a file that is not text in UTF-8; names the line, and the encoding if it is probably Latin-1."""
+    if b"\0" in content:
+        return f"{path} is not a text file"
+    before = content[:start]
+    number = len(before.splitlines()) + (not before or before.endswith((b"\n", b"\r")))
+    line = content[before.rfind(b"\n") + 1 :].splitlines()[0].decode("latin-1").strip()
+    return (
+        f"{path} is not UTF-8: line {number}, {shown(line)}, has byte 0x{content[start]:02x}, "
+        f"{content[start : start + 1].decode('latin-1')!r} in Latin-1; save the file as UTF-8"
+    )
 
 
 MOST_TOML = 4 * 2**20

@@ -17,6 +17,7 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput, FilesFailed, shown, warn
 from ..grains import Grains
+from ..paths import user_path
 from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
@@ -231,7 +232,7 @@ class Frames(FrameSequence):
     """
 
     def __init__(self, path: str | Path):
-        self.path = Path(path)
+        self.path = user_path(path)
         if not self.path.exists():
             raise BadInput(f"there is no file {path}")
         try:

@@ -14,6 +14,7 @@ from ..errors import BadInput, warn
 from ..grains import Grains
 from ..io.run_folder import TRAJECTORY
 from ..material import Material
+from ..paths import user_path
 from ..units import format_quantity
 from .checks import cluster_labels, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
 from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
@@ -198,7 +199,8 @@ def from_trajectory(path: str | Path, frame: int, materials: Mapping[str, Materi
     """
     from ..io.trajectory import Frames
 
-    place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
+    place = user_path(path)
+    place = place / TRAJECTORY if place.is_dir() else place
     frames = Frames(place)
     try:
         start = from_frame(frames[frame], materials)

@@ -12,9 +12,9 @@ import numpy as np
 from ..arguments import MOST_GRAINS, checked
 from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown, warn
 from ..grains import Grains, moment_size, vector_for_all
-from ..io.run_folder import checked_name
 from ..material import PRESETS, Material, as_material
-from ..units import si, whole_number
+from ..paths import checked_name
+from ..units import dimensions, si, whole_number
 from .aggregates import KINDS, build
 from .encounters import combined, turned
 from .from_file import body_from_file, from_trajectory, is_own_trajectory, largest_body
@@ -125,7 +125,7 @@ class GrainClass:
             "radius": radius_as_given,
             "material": material_as_given,
             "moment": moment_as_given,
-            "charge": lambda v: si(v, "C", "charge") if np.ndim(v) == 0 else v,  # an array is checked by Grains
+            "charge": lambda v: si(v, "C", "charge") if dimensions(v) == 0 else v,  # an array is checked by Grains
         }
         for name, read in readers.items():
             if (value := getattr(self, name)) is not None and name not in foreign:
@@ -143,7 +143,7 @@ def radius_as_given(value: Any) -> Any:
 
 def moment_as_given(value: Any) -> Any:
     """Check a moment as `moment_size` does; it stays as it is. Raises BadInput."""
-    if np.ndim(value) == 0:  # an array is checked against the number of grains
+    if dimensions(value) == 0:  # an array is checked against the number of grains
         moment_size(value, np.ones(1))
     return value
 
@@ -274,7 +274,7 @@ def _body_and_contacts(
     BadInput
         If the file cannot be read, or a key does not apply to it.
     """
-    path = Path(given.file).expanduser()
+    path = Path(given.file)
     number = -1 if given.frame is None else given.frame
     if not is_own_trajectory(path):
         body = body_from_file(path, material, given.radius, given.length, library, frame=number)
@@ -341,7 +341,7 @@ def in_library(given: Any, library: Mapping[str, Material]) -> Any:
         return library[given] if given in library else as_material(given)
     if isinstance(given, Mapping):
         return {in_library(name, library): part for name, part in given.items()}
-    if isinstance(given, (Sequence, np.ndarray)):
+    if isinstance(given, (Sequence, np.ndarray)) and dimensions(given) == 1:
         return [in_library(one, library) for one in given]
     return as_material(given)
 

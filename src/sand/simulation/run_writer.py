@@ -22,6 +22,7 @@ from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
+from ..paths import user_path
 from ..state.state import (
     BODIES,
     CLOCK,
@@ -82,7 +83,7 @@ class RunWriter:
     def __init__(
         self, out: str | Path, overwrite: bool = False, resumed: bool = False, written: dict[str, Any] | None = None
     ):
-        self.folder = Path(out) if resumed else make_folder(out, overwrite=overwrite)
+        self.folder = user_path(out) if resumed else make_folder(out, overwrite=overwrite)
         self._resumed = resumed
         self.draws = True  # a figure at the end of each `run`
         self._trajectory: TrajectoryWriter | None = None

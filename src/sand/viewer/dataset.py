@@ -15,6 +15,7 @@ from ..analysis.tracking import SINGLE, Lineage
 from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
+from ..paths import user_path
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
 from ..version import __version__
@@ -336,7 +337,7 @@ def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunD
     BadInput
         If there is no run, no frame yet, or the trajectory is damaged or was written by another program.
     """
-    source = Path(path)
+    source = user_path(path)
     folder = find_run_folder(source)
     if folder is None:
         if not source.is_file():
