@@ -45,7 +45,7 @@ def empty_folder(tmp_path, monkeypatch):
         ("scatter a --resume --overwrite --workers 0", ["'--workers'", "exclude each other"]),
         ("plot a --size wide --dpi 1 --format gif --what x", ["'--format'", "'--dpi'", "--size 'wide'", "--what 'x'"]),
         ("collide a --seeds 3- --workers many", ["'--workers'", "--seeds '3-'"]),
-        ("run --frame 3", ["give --from, too", "give a case file"]),
+        ("run --frame 3", ["give --from, too"]),
         ("new", ["Missing argument 'NAME'"]),
         ("view a --port 70000 --every 0", ["'--port'", "'--every'"]),
         ("--foo", ["--foo"]),
