@@ -158,7 +158,7 @@ FAULTS = (
           "energy += norm(load(grains.moment, i)) * norm(load(fields, i))", "energy += 0.0",
           "physics/test_substeps.py::test_loads_besides_those_in_substeps_allow_the_step"),
     # settings and units
-    Fault("tesla with 1/s instead of 1/s²", "forgotten unit", "settings", "units.py",
+    Fault("tesla with 1/s instead of 1/s²", "forgotten unit", "settings", "unit_factors.py",
           '"T": (0, 0, 1, -2, -1, 0)', '"T": (0, 0, 1, -1, -1, 0)',
           "unit/test_units.py::test_built_in_units_agree_with_pint"),
     Fault("a run of no steps", "off by one", "settings", "config/sections.py",

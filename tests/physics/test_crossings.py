@@ -86,6 +86,7 @@ def test_crossings_are_kept(tmp_path):
     assert new[single] == pytest.approx(old * np.array([1.5, 1.5, 1.0]), abs=1e-12 * L)
 
 
+@pytest.mark.compiled("small")
 def test_a_cluster_across_the_boundary_of_a_scaled_box():
     """Its grains stay together: separations of unwrapped positions are those before."""
     rod = sand.setup.chain(3, radius="20 nm", material="silica")

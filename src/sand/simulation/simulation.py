@@ -315,8 +315,8 @@ class Simulation(ReadOnlySettings):
         energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
         return {"flux_density": flux} | energies | self._engine.energies_at_grains()
 
-    @checked
     @exclusive
+    @checked
     def run(self, until: Any = None, *, steps: Any = None, stop: Any = None) -> Result:
         """Run until a time, for a number of steps, or until a condition is met, whichever comes first.
 
@@ -461,8 +461,8 @@ class Simulation(ReadOnlySettings):
         if self.writer:
             self.writer.changed(self)
 
-    @checked
     @exclusive
+    @checked
     def view(self, path: str | Path | None = None) -> Any:
         """Show the grains in motion: a widget in a notebook with anywidget, otherwise a page in the browser.
 
