@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import resource
 import subprocess
 import tempfile
 import tomllib
@@ -82,6 +81,8 @@ def measure(path: Path) -> dict[str, Any]:
         after = _expected(path)
     words = [verb, str(path), "--out", str(folder), "--json"]
     _call(*words)  # compiles what is not compiled yet
+    import resource  # Windows has none
+
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     _call(*words, "--overwrite")
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)

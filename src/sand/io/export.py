@@ -62,7 +62,7 @@ def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
     """Format a frame as a snapshot of a custom dump.
 
     Columns: id, type, position, radius, velocity, spin, moment, cluster, mass, charge, and own quantities in SI, with
-    the prefix d_ that LAMMPS gives such numbers. The snapshot has a step number but no time, because some readers do
+    the prefix `d_` that LAMMPS gives such numbers. The snapshot has a step number but no time, because some readers do
     not accept `ITEM: TIME`.
     """
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
