@@ -1,7 +1,9 @@
 """Checks of the arguments of public functions and classes: a wrong argument raises BadInput with a one-line message.
 
 `checked` compares names and types with the signature: unknown or missing arguments, a number in place of text, a class
-in place of an object. Numbers, their units and ranges are checked by the functions themselves (`units`).
+in place of an object. Arguments annotated as float, as array or as list of floats may be quantities with a unit, which
+are converted to the SI unit that the docstring gives; `~` in a path is the home folder. Other numbers, and ranges, are
+checked by the functions themselves (`units`).
 """
 
 from __future__ import annotations
@@ -15,15 +17,17 @@ import os
 import types
 import typing
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from .descriptions import described
+from .descriptions import described, documented_units
 from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
+from .paths import checked_name
 
 MOST_GRAINS = 100_000_000
 """Largest number of grains of one simulation. The state takes about a kilobyte per grain, 100 GB in all."""
-MOST_STEPS = 2**62
-"""Largest number of steps; steps are counted in 64 bits."""
+MOST_STEPS = 10**15
+"""Largest number of steps: three years at ten million steps a second."""
 MOST_SEED = 2**63 - 1
 """Largest seed that the kernels take."""
 MOST_PROCESSES = 1024
@@ -39,9 +43,9 @@ def checked(thing: T) -> T:
     """Decorator of a public function, method or class (then of its `__init__`) that checks the arguments.
 
     Types are taken from the annotations int, bool, str, paths, arrays (lists of numbers are converted), functions,
-    lists, tuples of fixed length and classes; Any and float are not checked. Assignment to an attribute of a decorated
-    frozen dataclass raises a one-line NoSuchAttribute; its representation is that of `descriptions.described`,
-    unless the dataclass has one of its own (`repr=False`).
+    lists, tuples of fixed length and classes; Any is not checked, and float only for quantities. Assignment to an
+    attribute of a decorated frozen dataclass raises a one-line NoSuchAttribute; its representation is that of
+    `descriptions.described`, unless the dataclass has one of its own (`repr=False`).
     """
     if not isinstance(thing, type):
         return typing.cast(T, _wrapped(typing.cast(Callable, thing)))
@@ -107,7 +111,7 @@ def _value_errors(function: Callable, bound: inspect.BoundArguments) -> list[str
 @functools.cache
 def _readers(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[[Any, str], Any]]]:
     """The signature, and a reader for each argument whose type can be checked; built at the first call."""
-    signature = inspect.signature(function)
+    signature, units = inspect.signature(function), documented_units(function)
     readers: dict[str, Callable[[Any, str], Any]] = {}
     for name, parameter in signature.parameters.items():
         annotation = parameter.annotation
@@ -117,8 +121,10 @@ def _readers(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[
             except (NameError, AttributeError, TypeError):  # names imported for the type checker only
                 continue
         plain = parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-        if plain and annotation is not parameter.empty and (allowed := _allowed_types(annotation)):
-            readers[name] = functools.partial(_read, allowed)
+        if plain and annotation is not parameter.empty:
+            allowed, numeric = _allowed_types(annotation), _is_numeric(annotation)
+            if allowed or numeric:
+                readers[name] = functools.partial(_read, allowed, units.get(name, "1") if numeric else None)
     return signature, readers
 
 
@@ -131,11 +137,30 @@ class _TypeCheck(NamedTuple):
     array: bool = False
 
 
+def _parts(annotation: Any) -> tuple[Any, ...]:
+    """The types of a union, or the only one."""
+    union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+    return typing.get_args(annotation) if union else (annotation,)
+
+
+def _is_numeric(annotation: Any) -> bool:
+    """Whether an argument may be a float, an array or a list of floats, but not text."""
+    parts = _parts(annotation)
+    return str not in parts and any(part is float or _is_array(part) or _is_list_of_floats(part) for part in parts)
+
+
+def _is_list_of_floats(part: Any) -> bool:
+    return typing.get_origin(part) in (tuple, *_LISTS) and set(typing.get_args(part)) == {float}
+
+
+def _is_array(part: Any) -> bool:
+    origin = typing.get_origin(part) or part
+    return (getattr(origin, "__module__", ""), getattr(origin, "__name__", "")) == ("numpy", "ndarray")
+
+
 def _allowed_types(annotation: Any) -> list[_TypeCheck]:
     """Checks of an annotation; an empty list if every value is allowed."""
-    union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
-    parts = typing.get_args(annotation) if union else (annotation,)
-    checks = [_type_check(part) for part in parts]
+    checks = [_type_check(part) for part in _parts(annotation)]
     found = [check for check in checks if check is not None]
     by_name = any(check.constructor for check in found) and any(check.words == "text" for check in found)
     # arguments that are an object or its name, such as a material, are checked by the function, which has the names
@@ -146,7 +171,10 @@ def _type_check(part: Any) -> _TypeCheck | None:
     origin, inner = typing.get_origin(part) or part, typing.get_args(part)
     simple = {
         type(None): _TypeCheck(lambda v: v is None, ""),
-        int: _TypeCheck(lambda v: isinstance(v, numbers.Integral) and not isinstance(v, bool), "a whole number"),
+        int: _TypeCheck(
+            lambda v: isinstance(v, numbers.Integral) and not isinstance(v, bool) and type(v).__name__ != "timedelta64",
+            "a whole number",
+        ),
         bool: _TypeCheck(
             lambda v: isinstance(v, bool) or type(v).__name__ == "bool", "True or False"
         ),  # numpy.bool too
@@ -159,9 +187,9 @@ def _type_check(part: Any) -> _TypeCheck | None:
     if origin is tuple and inner and inner[-1] is not Ellipsis:
         what = "whole numbers" if set(inner) == {int} else "values"
         words = f"{_WORDS.get(len(inner), len(inner))} {what}"
-        return _TypeCheck(lambda v: not isinstance(v, str) and hasattr(v, "__len__") and len(v) == len(inner), words)
+        return _TypeCheck(lambda v: not isinstance(v, str) and _length(v) == len(inner), words)
     if origin in _LISTS:
-        return _TypeCheck(lambda v: not isinstance(v, (str, bytes)) and hasattr(v, "__iter__"), "a list")
+        return _TypeCheck(lambda v: not isinstance(v, (str, bytes)) and _is_iterable(v), "a list")
     anything = origin is Any or not isinstance(origin, type) or origin in (float, complex, object)
     if anything or getattr(origin, "_is_protocol", False):
         return None
@@ -169,12 +197,34 @@ def _type_check(part: Any) -> _TypeCheck | None:
         return _TypeCheck(lambda v: isinstance(v, os.PathLike), "a path")
     if issubclass(origin, collections.abc.Mapping):
         return _TypeCheck(lambda v: isinstance(v, collections.abc.Mapping), "a dictionary")
-    if (origin.__module__, origin.__name__) == ("numpy", "ndarray"):
+    if _is_array(part):
         return _TypeCheck(
-            lambda v: isinstance(v, origin) and v.dtype.kind in "biufc", "an array of numbers", array=True
+            lambda v: isinstance(v, origin) and v.ndim > 0 and v.dtype.kind in "biufc",
+            "an array of numbers",
+            array=True,
         )
     call = _CONSTRUCTORS.get(origin.__name__, f"{_public_name(origin)}(…)")
     return _TypeCheck(lambda v: isinstance(v, origin), "", constructor=call)
+
+
+def _length(value: Any) -> int:
+    """Length of a value, −1 if it has none."""
+    try:
+        return len(value)
+    except Exception:  # a scalar quantity or array has the method, but no length
+        return -1
+
+
+def _is_array_of_numbers(value: Any) -> bool:
+    return hasattr(value, "dtype") and getattr(value, "ndim", 0) > 0 and value.dtype.kind in "biufc"
+
+
+def _is_iterable(value: Any) -> bool:
+    try:
+        iter(value)
+    except Exception:  # a scalar quantity or array has the method, but no entries
+        return False
+    return True
 
 
 def _public_name(cls: type) -> str:
@@ -183,18 +233,31 @@ def _public_name(cls: type) -> str:
     return f"sand.setup.{cls.__name__}" if package[:2] == ["sand", "setup"] else shown(cls)
 
 
-def _read(allowed: list[_TypeCheck], value: Any, name: str) -> Any:
-    """The value, converted to an array if only an array is allowed. Raises BadInput if it has none of the types."""
-    if any(check.fits(value) for check in allowed):
+def _read(allowed: list[_TypeCheck], unit: str | None, value: Any, name: str) -> Any:
+    """The value, converted to an array if only an array is allowed. Raises BadInput if it has none of the types.
+
+    Quantities are converted to the SI unit `unit`; None leaves them to the function.
+    """
+    if unit is not None and not isinstance(value, float) and value is not None:
+        from .units import has_unit_within, in_unit, not_a_quantity  # imports numpy
+
+        if not allowed or (has_unit_within(value) and not isinstance(value, str)):
+            converted = in_unit(value, unit)
+            if converted is None:
+                raise not_a_quantity(value, unit, name)
+            value = tuple(converted) if isinstance(value, tuple) else converted
+    if any(check.words == "a path" for check in allowed) and isinstance(value, (str, Path)):
+        value = type(value)(checked_name(str(value), name))
+    if not allowed or any(check.fits(value) for check in allowed):
         return value
     if any(check.array for check in allowed) and not isinstance(value, str):
         import numpy as np  # here, because commands that take no array start faster without it
 
         try:
             array = np.asarray(value)
-        except (TypeError, ValueError):
+        except Exception:  # errors of NumPy, and of the object
             array = np.zeros(1, object)
-        if array.dtype.kind in "biufc":
+        if array.ndim and array.dtype.kind in "biufc":
             return array
     constructors = [check.constructor for check in allowed if check.constructor]
     words = [check.words for check in allowed if check.words]

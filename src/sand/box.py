@@ -10,7 +10,7 @@ import numpy as np
 from .arguments import checked
 from .compiler.jit import formula
 from .errors import BadInput, shown
-from .units import exact_quantity, format_quantity, si
+from .units import dimensions, exact_quantity, format_quantity, is_word, si, si_array
 
 ALL_PAIRS_UP_TO = 200
 """Number of points up to which `Box.close_pairs` examines all pairs."""
@@ -83,10 +83,10 @@ class Box:
 
         Parameters
         ----------
-        x : float or str
-            Length along x [m] > 0; by default also along y and z.
+        x : float, str or None
+            Length along x [m] > 0, None or "open" for an open axis; by default also along y and z.
         y, z : float, str or None, optional
-            Lengths along y and z [m] > 0; None for an open axis.
+            Lengths along y and z [m] > 0; None or "open" for an open axis.
 
         Returns
         -------
@@ -101,7 +101,7 @@ class Box:
         y = x if isinstance(y, str) and y == "same" else y
         z = x if isinstance(z, str) and z == "same" else z
         lengths = tuple(
-            None if v is None else si(v, "m", f"box length {axis}", above=0.0)
+            None if v is None or is_word(v, "open") else si(v, "m", f"box length {axis}", above=0.0)
             for v, axis in zip((x, y, z), "xyz", strict=True)
         )
         return cls(lengths)  # type: ignore[arg-type]
@@ -131,12 +131,18 @@ class Box:
 
     def nearest(self, separation: np.ndarray) -> np.ndarray:
         """Shortest periodic images of separations (…, 3) [m]."""
-        separation = np.asarray(separation, dtype=np.float64)
+        separation = si_array(separation, "m", "separation")
+        if not separation.ndim or separation.shape[-1] != 3:
+            raise BadInput(f"separation has shape {separation.shape} but must be (…, 3), in m")
         return np.stack(nearest_image(np.moveaxis(separation, -1, 0), self.span), axis=-1)
 
     def wrap(self, position: np.ndarray) -> np.ndarray:
         """Positions (…, 3) [m] wrapped into −L/2 … L/2 on periodic axes."""
         return self.nearest(position)
+
+    def image(self, position: np.ndarray) -> np.ndarray:
+        """Periodic image of each position (…, 3), int32: 1 where it is one length beyond the box, 0 on open axes."""
+        return np.rint(np.asarray(position) * np.array(self.span[3:])).astype(np.int32)
 
     def close_pairs(self, position: np.ndarray, reach: float) -> np.ndarray:
         """All pairs of points that are at most `reach` apart, by nearest images on periodic axes.
@@ -189,10 +195,8 @@ def as_box(value: Any) -> Box:
         return value
     if value is None:
         return Box.open()
-    if isinstance(value, (list, tuple)) or np.ndim(value) == 1:
+    if isinstance(value, (list, tuple)) or dimensions(value) == 1:
         if len(value) != 3:
-            raise BadInput(
-                f'box = {shown(value)} must be one length or three; for an open axis give None (in a case file "open")'
-            )
+            raise BadInput(f'box = {shown(value)} must be one length or three; for an open axis give None or "open"')
         return Box.periodic(*value)
     return Box.periodic(value)

@@ -5,20 +5,37 @@ Units are those of the docstring: the first one in brackets in the description o
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import dataclasses
 import enum
 import functools
 import inspect
 import re
+import sys
+import textwrap
 from typing import Any
 
-_UNIT = re.compile(r"\[([A-Za-z][^\],]*)\]")
+_UNIT = re.compile(r"\[((?:1/)?[A-Za-z][^\],]*)\]")
 
 
 @functools.cache
-def parameter_docs(kind: type) -> dict[str, str]:
+def docstring(thing: Any) -> str:
+    """Docstring of a class or function; under `python -OO`, which strips docstrings, from its source."""
+    if sys.flags.optimize < 2:
+        return inspect.getdoc(thing) or ""
+    for owner in getattr(thing, "__mro__", (thing,)):
+        with contextlib.suppress(OSError, TypeError, SyntaxError):  # no source
+            definition = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+            if isinstance(definition, (ast.ClassDef, ast.FunctionDef)) and (text := ast.get_docstring(definition)):
+                return text
+    return ""
+
+
+@functools.cache
+def parameter_docs(kind: Any) -> dict[str, str]:
     """Descriptions of the parameters, or attributes, in a numpydoc docstring, by name."""
-    text = inspect.getdoc(kind) or ""
+    text = docstring(kind)
     text = re.split(r"(?:Parameters|Attributes)\n-{10}\n", text, maxsplit=1)[-1]
     text = re.split(r"\n\n?[A-Z][a-z]+\n-{3,}\n", text)[0]
     found: dict[str, str] = {}
@@ -36,8 +53,12 @@ def units_of(thing: Any) -> dict[str, str]:
     """Units of the arguments of an object that have one."""
     if hasattr(thing, "units"):  # a force of the user
         return dict(thing.units)
-    kind: Any = type(thing)
-    found = {name: _UNIT.search(text) for name, text in parameter_docs(kind).items()}
+    return documented_units(type(thing))
+
+
+def documented_units(thing: Any) -> dict[str, str]:
+    """Units in the docstring of a class or function, by parameter; those without a unit are missing."""
+    found = {name: _UNIT.search(text) for name, text in parameter_docs(thing).items()}
     return {name: match[1].replace("²", "^2").replace("³", "^3") for name, match in found.items() if match}
 
 

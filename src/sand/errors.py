@@ -119,10 +119,11 @@ def shown(value: Any) -> str:
         return f"sand.{value.__name__}" if value.__module__.startswith("sand.") else value.__name__
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple) and shape and hasattr(value, "dtype"):
-        return f"array of shape {shape}"
+        unit = getattr(value, "units", getattr(value, "unit", None))
+        return f"array of shape {shape}" + ("" if unit is None else f" in {unit}")
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # integers of thousands of digits, lists that contain themselves
+    except Exception:  # integers of thousands of digits, lists that contain themselves
         return f"<{type(value).__name__}>"
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 

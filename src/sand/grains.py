@@ -15,10 +15,13 @@ from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
 from .own_quantities import OwnQuantities, read_own, refuse_same_letters
 from .schema import BY_NAME, CHANGEABLE, FIELDS, public, stored
-from .units import format_quantity, in_unit
+from .units import dimensions, format_quantity, has_unit_within, in_unit, not_a_quantity, too_large
 
 ROUNDING = 1e-7
 """Largest gap of a contact without adhesion, relative to the sum of radii; allows for coordinates of seven digits."""
+
+ROUNDED = 1e-3
+"""Largest gap, in smaller radii of the pair, of grains in a file that are in contact: their coordinates are rounded."""
 
 SMALLEST = 1e-10
 """Smallest radius [m] of a grain, that of an atom."""
@@ -43,6 +46,7 @@ class GrainArrays(NamedTuple):
     own: np.ndarray  # own quantities, (K, N); their names and units are those of Grains.own
     material: np.ndarray  # index into Grains.materials, uint32
     id: np.ndarray  # the user's index of the grain, uint32
+    image: np.ndarray  # (3, N) how often it has crossed the periodic box along each axis, int32
 
 
 NAMES = tuple(name for name in GrainArrays._fields if name != "own")
@@ -71,7 +75,9 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
     BadInput
         If the length is not N, a material is unknown, or two different materials have the same name.
     """
-    several = isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str)
+    several = (
+        isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str) and dimensions(material) > 0
+    )
     each: Sequence[Any] = list(material) if several else [as_material(material)] * count
     if len(each) != count:
         raise BadInput(f"material has {len(each)} entries but there are {count} grains")
@@ -92,7 +98,7 @@ class Grains:
 
     `grains[3]`, `grains[2:5]` and `grains[mask]` are new grains, copies of these; a loop gives one after the other.
 
-    All numbers may be SI floats, text with a unit, or pint/astropy quantities.
+    All numbers may be SI floats, text with a unit, or quantities of pint, astropy or unyt, also within lists.
 
     Parameters
     ----------
@@ -172,7 +178,8 @@ class Grains:
         arrays["moment"] = arrays["body_moment"].copy()
         self.own_units = carried.units
         rows = np.array(list(carried.values())).reshape(len(carried), count)
-        self.arrays = GrainArrays(**arrays, own=rows, material=index, id=np.arange(count, dtype=np.uint32))
+        image = np.zeros((3, count), np.int32)
+        self.arrays = GrainArrays(**arrays, own=rows, material=index, id=np.arange(count, dtype=np.uint32), image=image)
 
     def __len__(self) -> int:
         return self.arrays.radius.size
@@ -244,7 +251,7 @@ class Grains:
         numbers = np.arange(len(self))
         try:
             chosen = np.atleast_1d(numbers[index])
-        except (IndexError, TypeError, ValueError):
+        except Exception:  # errors of NumPy, and of the object
             chosen = numbers[:0]
         if chosen.ndim != 1 or not chosen.size:
             asked = shown(index)
@@ -266,17 +273,26 @@ class Grains:
         radii = " to ".join(format_quantity(r, "m") for r in sorted({self.radius.min(), self.radius.max()}))
         return f"<{len(self)} {'grain' if len(self) == 1 else 'grains'} of {names}, radius {radii}>"
 
+    @checked
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
         """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""
-        i, j = np.asarray(pairs).T
+        if pairs.ndim != 2 or pairs.shape[1] != 2 or (pairs.size and pairs.dtype.kind not in "iu"):
+            raise BadInput(f"pairs = {shown(pairs)} must be whole numbers (P, 2)")
+        if pairs.size and not -len(self) <= pairs.min() <= pairs.max() < len(self):
+            raise BadInput(f"pairs name grains from {pairs.min()} to {pairs.max()}; there are {len(self)}")
+        i, j = np.asarray(pairs, np.int64).T
         separation = box.nearest(self.position[i] - self.position[j])
         return self.radius[i] + self.radius[j] - np.linalg.norm(separation, axis=1)
 
-    def touching(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs (P, 2) of grains in contact, sorted, with their overlaps [m]; a gap up to `ROUNDING` counts."""
-        pairs = box.close_pairs(self.position, 2.0 * float(self.radius.max()) * (1.0 + ROUNDING))
-        overlap = self.overlaps(pairs, box)
-        found = overlap >= -ROUNDING * self.radius[pairs].sum(axis=1)
+    @checked
+    def touching(self, box: Box, gap: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs (P, 2) of grains in contact, sorted, with their overlaps [m].
+
+        A gap up to `ROUNDING`, or up to `gap` smaller radii of the pair, counts as a contact.
+        """
+        pairs = box.close_pairs(self.position, 2.0 * float(self.radius.max()) * (1.0 + max(ROUNDING, 0.5 * gap)))
+        overlap, radius = self.overlaps(pairs, box), self.radius[pairs]
+        found = overlap >= -np.maximum(ROUNDING * radius.sum(axis=1), gap * radius.min(axis=1))
         return pairs[found], overlap[found]
 
     def copy(self) -> Grains:
@@ -293,6 +309,8 @@ class Grains:
 
 def _count(position: Any) -> int:
     array = in_unit(position, "m")
+    if array is None and has_unit_within(position):
+        raise not_a_quantity(position, "m", "position")
     if array is None or np.ndim(array) != 2 or np.shape(array)[1] != 3 or np.shape(array)[0] == 0:
         shape = "" if array is None else f", not {np.shape(array)}"
         raise BadInput(f"position must be an array of shape (N, 3) in m with N ≥ 1{shape}")
@@ -362,6 +380,8 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
     size = in_unit(moment, "A m^2")
     if size is None:
         per_mass = in_unit(moment, "A m^2/kg")
+        if per_mass is not None and (reason := too_large(float(np.max(per_mass)), "A m^2/kg")):
+            raise BadInput(f"moment = {shown(moment)} is {reason}")
         size = None if per_mass is None else per_mass * mass
     fits = size is not None and np.shape(size) in ((), mass.shape)
     if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):

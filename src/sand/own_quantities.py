@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from .errors import BadInput, shown
+from .own_units import with_own_unit
 from .schema import BY_NAME, Field, public, stored
-from .units import in_unit, with_own_unit
+from .units import in_unit
 
 LONGEST_NAME = 60
 """Most characters of a name."""
@@ -48,6 +49,7 @@ RESERVED = frozenset(
             "refuse_overlaps",
         ),
         *("step", "time", "pair", "overlap", "formed", "slide", "roll", "twist", "share", "drawn", "at_rest"),
+        *("image", "images", "unwrapped", "ix", "iy", "iz", "v_time", "material_names"),
         *(
             "path",
             "close",

@@ -22,6 +22,7 @@ from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
+from .paths import user_path
 from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -51,7 +52,7 @@ class Run:
     """
 
     def __init__(self, folder: str | Path):
-        self.folder = Path(folder)
+        self.folder = user_path(folder)
         if self.folder.is_file():
             raise BadInput(f"{folder} is a file; give the folder of a run")
         if not self.folder.is_dir():
@@ -184,7 +185,7 @@ class Run:
             If the format is unknown, there is no frame, or the folder does not exist.
         """
         place = self.folder / "trajectory" if stem is None else Path(stem)
-        return export_frames(self.frames[frames], place, form, cluster_labels)
+        return export_frames(self.frames, place, form, cluster_labels, frames)
 
     def to_xarray(self) -> Any:
         """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray.
@@ -198,10 +199,10 @@ class Run:
         whole: list[Frame] = list(self.frames)
         if any(not np.array_equal(one.id, whole[0].id) for one in whole):
             raise BadInput(f"to_xarray: the grains of {self.folder} change; use its frames one by one, and their id")
-        vectors = ("position", "velocity", "moment", "spin")
+        vectors = ("position", "velocity", "moment", "spin", "image")
         data = {
             name: (("frame", "grain", "axis"), np.array([getattr(one, name) for one in whole]), {"units": unit})
-            for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s"), strict=True)
+            for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s", "1"), strict=True)
         }
         labels = np.array([cluster_labels(len(one), one.pair) for one in whole])
         rest = [one.at_rest for one in whole if one.at_rest is not None]
@@ -210,10 +211,13 @@ class Run:
             "time": ("frame", np.array([one.time for one in whole]), {"units": "s"}),
             "step": ("frame", np.array([one.step for one in whole])),
             "radius": ("grain", whole[0].radius, {"units": "m"}),
+            "mass": ("grain", whole[0].mass, {"units": "kg"}),
             "material": ("grain", np.array(whole[0].materials)[whole[0].material]),
             "axis": ("axis", list("xyz")),
         }
-        columns: dict[str, Any] = {name: (("frame", "grain"), values) for name, values in of_grains.items()}
+        charge = np.array([one.charge for one in whole])
+        columns: dict[str, Any] = {"charge": (("frame", "grain"), charge, {"units": "C"})}
+        columns |= {name: (("frame", "grain"), values) for name, values in of_grains.items()}
         columns |= {
             name: (("frame", "grain"), np.array([one.own[name] for one in whole]), {"units": unit})
             for name, unit in whole[0].own.units.items()
@@ -343,6 +347,7 @@ def open(folder: Any, *others: Any) -> Any:
     for one in (*(folder if isinstance(folder, (list, tuple)) else [folder]), *others):
         if not isinstance(one, (str, Path)):
             raise BadInput(f"folder = {shown(one)} must be a path, or several of them")
+        one = str(user_path(one, "folder")) if isinstance(one, str) else one
         if isinstance(one, str) and glob.has_magic(one) and not Path(one).exists():
             several = True
             found = [name for name in glob.glob(one) if Path(name).is_dir()]

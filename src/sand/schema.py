@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .errors import BadInput
-from .units import EXAMPLES, in_unit
+from .units import in_unit, not_a_quantity, too_large
 
 
 class Field(NamedTuple):
@@ -79,8 +79,7 @@ def stored(field: Field, values: Any, count: int, *, positive: bool = False, cal
     name = called or field.name
     array = in_unit(values, field.unit)
     if array is None:
-        example = EXAMPLES.get(field.unit, f"1 {field.unit}")
-        raise BadInput(f"{name} is not in {field.unit}; give numbers in SI or text such as '{example}'")
+        raise not_a_quantity(values, field.unit, name)
     array = np.asarray(array, dtype=np.float64)
     if array.ndim == 0 and field.width == 1:
         array = np.full(count, float(array))
@@ -99,6 +98,9 @@ def stored(field: Field, values: Any, count: int, *, positive: bool = False, cal
             f"{name} of grain {bad[0]} is {array[bad[0]]}: numbers must be finite, in {field.unit}"
             f" ({bad.size} of {count} grains affected)"
         )
+    if field.kind != "own" and (reason := too_large(float(np.abs(rows).max()), field.unit)):
+        large = int(np.abs(rows).max(axis=1).argmax())
+        raise BadInput(f"{name} of grain {large} is {array[large]}, {reason}")
     if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
         raise BadInput(f"{name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0")
     return np.array(array.T, order="C")

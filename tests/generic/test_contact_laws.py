@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import sand
 from sand.compiler.jit import formula
-from sand.compiler.user_code import user_code_digest
+from sand.compiler.user_code import code_digest
 from sand.contact import jkr, mechanics, tangential
 from sand.contact.damping import NONE
 from sand.contact.law import LAWS, ContactLaw, contact_constants, register, ringing_energy
@@ -386,7 +386,7 @@ def test_pull_off_force_and_tabor_parameter():
 
 
 def test_code_with_a_formula_of_the_user_is_cached_by_its_source():
-    """Stages of SAND's laws have no digest of code of the user; with a formula from elsewhere they have one.
+    """Stages of different laws have different digests; so have stages of a law with a formula from elsewhere.
 
     The warning is no part of compiled code.
     """
@@ -397,14 +397,16 @@ def test_code_with_a_formula_of_the_user_is_cached_by_its_source():
             *contact_event_stages(law, NONE).values(),
             pair_list_stage(law, False),
         ]
-        return {user_code_digest(stage.function) for stage in [*stages, energies_stage(law), contacts_stage(law)]}
+        return {code_digest(stage.function) for stage in [*stages, energies_stage(law), contacts_stage(law)]}
 
-    assert all(digests(law) == {""} for law in LAWS.values())
+    before = digests(jkr.LAW)
+    assert None not in before and before == digests(jkr.LAW._replace())
+    assert all(before.isdisjoint(digests(law)) for name, law in LAWS.items() if name != "jkr")
     formulas = [name for name, member in jkr.LAW._asdict().items() if callable(member) and name != "constants_type"]
     assert len(formulas) == 10
     for name in formulas:
         found = digests(jkr.LAW._replace(**{name: formula(lambda *numbers: 0.0)}))
-        assert (found == {""}) is (name == "warning"), name
+        assert (found == before) is (name == "warning"), name
 
 
 def test_code_with_constants_of_the_user_is_cached_by_their_order():
@@ -415,9 +417,9 @@ def test_code_with_constants_of_the_user_is_cached_by_their_order():
         constants = namedtuple("Constants", names, module="users_module")
         law = jkr.LAW._replace(constants_type=constants)
         digests.append(
-            [user_code_digest(each.function) for each in (contact_pass_stage(law, NONE, False), energies_stage(law))]
+            [code_digest(each.function) for each in (contact_pass_stage(law, NONE, False), energies_stage(law))]
         )
-    assert "" not in digests[0] and digests[0] == digests[2]
+    assert digests[0] == digests[2]
     assert all(one != other for one, other in zip(*digests[:2], strict=True))
 
 

@@ -15,13 +15,13 @@ from sand.grains import GrainArrays
 from sand.io.bodies import read_body, write_body
 from sand.io.frame import OF_CONTACTS, OF_GRAINS, Frame, FrameSequence
 from sand.own_quantities import RESERVED, OwnQuantities, joined
+from sand.own_units import si_unit, with_own_unit
 from sand.plotting.plots import HISTORY
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import si_prefix
 from sand.schema import FIELDS
 from sand.setup.encounters import encounter
 from sand.simulation.change import Change
-from sand.units import si_unit, with_own_unit
 from sand.viewer.packets import frame_packet
 from sand.viewer.series import quantity_ranges
 
@@ -61,8 +61,8 @@ def assert_same(own, index=slice(None)):
 
 
 def test_grain_arrays_are_those_of_the_schema():
-    """`GrainArrays` names the quantities of the schema in the same order, then own quantities, material and id."""
-    assert GrainArrays._fields == (*(field.name for field in FIELDS), "own", "material", "id")
+    """`GrainArrays` names the quantities of the schema in the same order, then others."""
+    assert GrainArrays._fields == (*(field.name for field in FIELDS), "own", "material", "id", "image")
 
 
 @pytest.mark.parametrize(

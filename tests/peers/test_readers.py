@@ -61,7 +61,8 @@ def test_ase_reads_xyz(opened_run, tmp_path):
         assert theirs.pbc.all() and theirs.cell.lengths() == pytest.approx(
             np.array(ours.drawn) * 1e10, rel=1e-9, abs=0.0
         )
-        assert theirs.info["Time"] == ours.time
+        assert theirs.info["Time"] == ours.time and theirs.info["materials"] == "iron;silica"
+        assert (theirs.arrays["id"] == ours.id).all() and (theirs.arrays["images"] == ours.image).all()
     assert frames[0].get_chemical_symbols() == ["Fe"] * 4 + ["Si"] * 2
 
 
@@ -76,6 +77,8 @@ def test_vtk_reads_vtp(opened_run, tmp_path):
     assert np.asarray(mesh.points) == pytest.approx(last.position, rel=1e-12, abs=0)
     assert mesh.point_data["radius"] == pytest.approx(last.radius, rel=1e-12, abs=0)
     assert all((mesh.point_data[name] == values).all() for name, values in last.own.items())
+    assert (mesh.point_data["id"] == last.id).all() and (mesh.point_data["image"] == last.image).all()
+    assert list(mesh.field_data["materials"]) == last.materials
     assert mesh.point_data["moment"] == pytest.approx(last.moment, rel=1e-12, abs=0)
     inside = np.abs(np.diff(last.position[last.pair], axis=1)).max(axis=(1, 2)) < 2e-7
     assert mesh.n_verts == 6 and mesh.n_lines == inside.sum() == len(last.pair) - 1
@@ -101,6 +104,9 @@ def test_ovito_reads_xyz_dump_and_gsd(run, opened_run, tmp_path):
         own = {name: name if unit > 1.0 else f"d_{name.lower()}" for name in last.own}
         for name, values in last.own.items():  # OVITO reads 17 digits to some roundings
             assert data.particles[own[name]][...][order] == pytest.approx(values, rel=1e-15, abs=0.0)
+        assert (data.particles["Particle Identifier" if unit == 1.0 else "id"][...] >= 0).all()
+        if unit == 1.0:
+            assert (data.particles["Periodic Image"][...][order] == last.image).all()
         assert np.diag(data.cell[:3, :3]) == pytest.approx(np.array(last.drawn) * unit, rel=1e-6, abs=0.0)
         assert all(data.cell.pbc)
     data = ovito_io.import_file(str(run / "trajectory.gsd")).compute(4)

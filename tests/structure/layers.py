@@ -16,10 +16,13 @@ MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 
 LAYERS = (
     ("errors", "constants", "version"),
+    ("paths", "unit_factors"),
+    ("conversion",),
     ("units",),
     ("descriptions",),
     ("arguments",),
-    ("material", "ramps", "schema", "threads"),
+    ("own_units",),
+    ("material", "quantity_array", "ramps", "schema", "threads"),
     ("own_quantities",),
     ("compiler",),
     ("numerics",),

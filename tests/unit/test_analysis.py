@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sand import BadInput
-from sand.analysis.clusters import aggregate_moments
+from sand.analysis.clusters import aggregate_moments, cluster_labels, percolating_clusters, unwrapped
 from sand.analysis.fits import power_law, separation
 from sand.analysis.fractal import box_dimension, correlation_dimension, ensemble_dimension, grains_within
 from sand.analysis.frame_statistics import COLUMNS, aggregate_statistics, size_distribution
@@ -327,3 +327,55 @@ def test_wrong_arguments_are_refused(call, part):
     """One line each."""
     with pytest.raises(BadInput, match=part):
         call()
+
+
+def percolates_in_a_supercell(position, pairs, lengths, copies=9):
+    """Whether each grain is connected with another copy of itself in an open supercell of copies in x and y."""
+    count, tiles = len(position), list(itertools.product(range(copies), repeat=2))
+    number = {tile: k for k, tile in enumerate(tiles)}
+    shift = np.rint((position[pairs[:, 1]] - position[pairs[:, 0]]) / lengths).astype(int)
+    ends = []
+    for (i, j), (x, y) in zip(pairs, shift, strict=True):  # j is nearest to i in the tile that lies by −shift
+        for a, b in tiles:
+            if (a - x, b - y) in number:
+                ends.append((number[a, b] * count + i, number[a - x, b - y] * count + j))
+    labels = cluster_labels(count * len(tiles), np.array(ends).reshape(-1, 2)).reshape(len(tiles), count)
+    middle = labels[number[copies // 2, copies // 2]]
+    return (labels == middle).sum(axis=0) > 1
+
+
+def test_percolating_clusters_are_those_of_a_supercell():
+    """A cluster percolates if, in many copies of the box side by side, a grain is connected with a copy of itself."""
+    rng, seen = np.random.default_rng(7), []
+    lengths = np.array([10.0, 7.0])
+    box = Box.periodic(10.0, 7.0, None)
+    for _ in range(60):
+        position = np.column_stack([rng.uniform(-0.5, 0.5, (12, 2)) * lengths, np.zeros(12)])
+        pairs = box.close_pairs(position, rng.uniform(1.5, 3.4))
+        found = percolating_clusters(position, pairs, box)[cluster_labels(12, pairs)]
+        assert found.tolist() == percolates_in_a_supercell(position[:, :2], pairs, lengths).tolist()
+        seen.append(found.any())
+    assert 10 < sum(seen) < 50
+
+
+def test_size_of_percolating_clusters_is_refused():
+    """A rod through the box is marked and has no radius of gyration; one grain less, or an open box, and it has."""
+    rod = np.column_stack([np.arange(-4.0, 5.0, 2.0), np.zeros(5), np.zeros(5)])
+    closed = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]])
+
+    def rows(pairs, box):
+        more = {"radius": np.ones(5), "mass": np.ones(5), "moment": np.zeros((5, 3))}
+        return aggregate_statistics(SimpleNamespace(position=rod, pair=pairs, box=box, **more))
+
+    found = rows(closed, Box.periodic(10.0))
+    assert found["percolating"].tolist() == [1]
+    assert all(np.isnan(found[name]).all() for name in ("gyration_radius", "elongation", "filling_factor"))
+    for one in (rows(closed[:4], Box.periodic(10.0)), rows(closed[:4], Box.open())):
+        assert one["percolating"].tolist() == [0]
+        # r_g² of 5 points 2 apart: 4 (5² − 1)/12
+        assert one["gyration_radius"] == pytest.approx([math.sqrt(8.0)], rel=1e-12, abs=0.0)
+    assert unwrapped(rod, closed, Box.periodic(10.0)).shape == (5, 3)  # for pictures
+    with pytest.raises(BadInput, match=r"cluster of grain .* touches its own periodic image"):
+        unwrapped(rod, closed, Box.periodic(10.0), refuse_percolating=True)
+    with pytest.raises(BadInput, match="1 of the aggregates percolate"):
+        ensemble_dimension([8, 30, 90], [1.0, 2.0, np.nan], 1.0)

@@ -9,7 +9,6 @@ from scipy.sparse.csgraph import connected_components
 
 import sand
 from sand.cli.main import main
-from sand.config.build import body_from_file
 from sand.contact.jkr import rest_overlap, rest_radius
 from sand.contact.mixing import pairing_between
 from sand.io.bodies import read_body, write_body
@@ -18,6 +17,7 @@ from sand.setup._kernels.aggregation import return_to_sphere
 from sand.setup._kernels.hash_grid import gap_to_nearest, insert_grain
 from sand.setup.aggregates import rest_distance
 from sand.setup.deposit import cut_sphere
+from sand.setup.from_file import body_from_file
 from sand.setup.growing import empty_hash_grid
 from sand.setup.population import Lognormal, PowerLaw, grain_set_of
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from pathlib import Path
 
 import pytest
 
@@ -92,7 +91,7 @@ def test_a_folder_of_another_user_is_refused(home, monkeypatch):
     monkeypatch.setattr(os, "getuid", lambda: me)  # the folder belongs to another user
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        assert cache.unsafe(home / "theirs") == f"belongs to another user (uid {owner}), who could run code as you"
+        assert cache.unsafe(home / "theirs").startswith(f"belongs to another user (uid {owner}), ")
         with pytest.raises(cache._UnsafeFolder):  # here all folders belong to another user, the new one, too
             cache.private_folder("digest")
     assert "belongs to another user" in str(caught[0].message)
@@ -158,10 +157,9 @@ def test_importing_sand_imports_no_folder_library():
     subprocess.run([sys.executable, "-c", IMPORT], check=True)
 
 
-def test_a_process_has_one_folder(monkeypatch, tmp_path):
+def test_a_process_has_one_folder():
     """Repeated requests give the same folder, named by the digest; summaries give it as `source_digest`."""
     from sand.compiler import jit
 
     assert jit.cache_folder() is jit.cache_folder()
     assert jit.cache_folder().name == jit._digest() and len(jit._digest()) == 16
-    assert Path(jit._FOLDER) == jit.cache_folder()

@@ -460,7 +460,7 @@ def test_shortest_relaxation_time(accommodation):
         ({"molecule_mass": "0 kg"}, r"gas: molecule_mass = '0 kg' must be above 0 kg"),
         ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a fraction of the molecules and must be at most 1"),
         ({"accommodation": -0.1}, r"gas: accommodation = -0.1 must be at least 0"),
-        ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a quantity in 1"),
+        ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a number"),
         ({"brownian": "no"}, r"gas: brownian = 'no' must be true or false"),
         ({"wind": 3.0}, r"gas: wind = 3.0 must be three components, in m/s"),
         ({"wind": [1, math.inf, 0]}, r"gas: wind y = inf is not finite; give a number in m/s"),

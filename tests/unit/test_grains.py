@@ -42,7 +42,7 @@ def test_every_quantity_of_the_table_is_there():
         assert np.shares_memory(view, getattr(grains.arrays, field.name))
         with pytest.raises(ValueError):
             view[...] = 0.0
-    assert {f.name for f in FIELDS} | {"own", "material", "id"} == set(GrainArrays._fields)
+    assert {f.name for f in FIELDS} | {"own", "material", "id", "image"} == set(GrainArrays._fields)
 
 
 def test_a_copy_is_independent():
@@ -58,7 +58,7 @@ def test_a_copy_is_independent():
     ("changes", "message"),
     [
         ({"radius": -1e-8}, r"radius of grain 0 is -1e-08 m: it must be above 0"),
-        ({"radius": "10 kg"}, r"radius is not in m; .*'10 nm'"),
+        ({"radius": "10 kg"}, r"radius = '10 kg' is not a quantity in m; .*'10 nm'"),
         ({"radius": [1e-8, 1e-8, 1e-8]}, r"radius has shape \(3,\) but must be \(2,\)"),
         ({"velocity": [[0, 0, 0]]}, r"velocity has shape \(1, 3\) but must be \(2, 3\).*m/s"),
         ({"velocity": [[0, 0, math.nan], [0, 0, 0]]}, r"velocity of grain 0 .*finite.*m/s"),

@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..box import Box
-from ..errors import BadInput
+from ..errors import BadInput, shown
+from ..units import whole_number
 
 FEW = 200
 """Grains plus contacts up to which a disjoint-set forest in Python is faster than SciPy's graph (130 µs)."""
+
+
+def checked_pairs(count: int, pairs: Any) -> np.ndarray:
+    """Contacts (C, 2) as whole numbers.  Raises BadInput for another shape, and for numbers that are no grain's."""
+    ends = np.asarray(pairs)
+    if ends.size % 2:
+        raise BadInput(f"pairs has shape {ends.shape} but must be (C, 2): two grains for each contact")
+    ends = ends.reshape(-1, 2)
+    if len(ends) and not 0 <= ends.min() <= ends.max() < count:
+        raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
+    return ends.astype(np.int64, copy=False)
+
+
+def checked_labels(labels: Any) -> np.ndarray:
+    """Cluster of each grain (N,) as whole numbers.  Raises BadInput for anything else."""
+    found = np.asarray(labels)
+    whole = found.ndim == 1 and found.size and found.dtype.kind in "iu" and found.min() >= 0
+    if not whole or found.max() >= MOST_GRAINS:
+        raise BadInput(f"labels = {shown(labels)} must be whole numbers (N,) from 0, the cluster of each grain")
+    return found
 
 
 @checked
@@ -33,13 +56,8 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     BadInput
         If `pairs` is not (C, 2) or has indices outside 0 … N−1.
     """
-    ends = np.asarray(pairs, dtype=np.int64)
-    if ends.size % 2:
-        raise BadInput(f"pairs has shape {ends.shape} but must be (C, 2): two grains for each contact")
-    ends = ends.reshape(-1, 2)
-    if len(ends) and not 0 <= ends.min() <= ends.max() < count:
-        raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
-    return labels_of(count, ends)
+    whole_number(count, "count", 0, MOST_GRAINS)
+    return labels_of(count, checked_pairs(count, pairs))
 
 
 def labels_of(count: int, ends: np.ndarray) -> np.ndarray:
@@ -75,7 +93,7 @@ def _disjoint_sets(count: int, ends: np.ndarray) -> np.ndarray:
 @checked
 def cluster_sizes(labels: np.ndarray) -> np.ndarray:
     """Number of grains of each cluster (K,)."""
-    return np.bincount(labels)
+    return np.bincount(checked_labels(labels))
 
 
 @checked
@@ -94,7 +112,7 @@ def mean_size(sizes: np.ndarray) -> float:
 
 
 @checked
-def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box, refuse_percolating: bool = False) -> np.ndarray:
     """Positions (N, 3) [m] with every cluster in one piece across periodic boundaries.
 
     Parameters
@@ -105,14 +123,61 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
         Contacts (C, 2).
     box : Box
         Boundary conditions.
+    refuse_percolating : bool, optional
+        Refuse percolating clusters: these have no extent, and `gyration_radius` of their positions means nothing.
 
     Returns
     -------
     ndarray
         Positions; the lowest grain of each cluster keeps its image.
+
+    Raises
+    ------
+    BadInput
+        If a cluster percolates and `refuse_percolating` is given.
+    """
+    whole = np.array(position, dtype=np.float64)
+    if whole.ndim != 2 or whole.shape[1] != 3:
+        raise BadInput(f"position has shape {whole.shape} but must be (N, 3)")
+    ends = checked_pairs(len(whole), pairs)
+    whole = in_one_piece(whole, ends, box)
+    if refuse_percolating and (found := _closes_through_boundary(whole, ends, box)).any():
+        grain = ends[found][0, 0]
+        raise BadInput(
+            f"the cluster of grain {grain} touches its own periodic image: it has no size, radius of gyration or "
+            "fractal dimension"
+        )
+    return whole
+
+
+@checked
+def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Which clusters (K,) percolate: a path along contacts leads from a grain to its own periodic image.
+
+    Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration. On a path that
+    closes within the box the separations of neighbours (nearest images) add up to 0, on one that percolates to a
+    multiple of the side of the box.
+
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m].
+    pairs : ndarray
+        Contacts (C, 2).
+    box : Box
+        Boundary conditions.
     """
     ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    return in_one_piece(np.array(position, dtype=np.float64), ends, box)
+    labels = cluster_labels(len(position), ends)
+    whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
+    found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
+    found[labels[ends[_closes_through_boundary(whole, ends, box), 0]]] = True
+    return found
+
+
+def _closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Contacts (C,) whose grains, in clusters that are in one piece, touch across a periodic boundary all the same."""
+    return np.asarray(box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1))
 
 
 def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndarray | None = None) -> np.ndarray:
@@ -144,6 +209,7 @@ def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndar
     return whole
 
 
+@checked
 def aggregate_moments(moment: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Total moment and alignment of each cluster.
 
@@ -161,7 +227,9 @@ def aggregate_moments(moment: np.ndarray, labels: np.ndarray) -> tuple[np.ndarra
     alignment : ndarray
         |Σμ|/Σ|μ| of each cluster (K,), 0 without moments.
     """
-    mu = np.asarray(moment, float)
+    mu, labels = np.asarray(moment, float), checked_labels(labels)
+    if mu.shape != (len(labels), 3):
+        raise BadInput(f"moment has shape {mu.shape} but must be (N, 3), with N = {len(labels)} as labels")
     sums = np.column_stack([np.bincount(labels, mu[:, axis]) for axis in range(3)])
     sizes = np.bincount(labels, np.linalg.norm(mu, axis=1))
     with np.errstate(invalid="ignore"):

@@ -58,9 +58,9 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
         raise BadInput("a power-law fit needs x and y of equal length, all finite and above 0")
     if np.ptp(np.log(x)) < SAME:
         raise BadInput("a power-law fit needs at least two different x")
+    if groups is not None and np.shape(groups) != x.shape:
+        raise BadInput(f"groups must have one entry for each of {len(x)} points, not {np.size(groups)}")
     group = np.arange(len(x)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
-    if len(group) != len(x):
-        raise BadInput(f"groups must have one entry for each of {len(x)} points, not {len(group)}")
     # centred, so that sums of squares lose no digits
     mean = float(np.log(x).mean())
     u, v = np.log(x) - mean, np.log(y)
@@ -72,6 +72,7 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
     return PowerLawFit(float(slope), error, low, high, float(np.exp(offset - slope * mean)), len(x), count)
 
 
+@checked
 def jackknife(estimate: float, without: np.ndarray) -> tuple[float, float, float]:
     """Standard error and 95 % interval of an estimate by the jackknife.
 
@@ -89,6 +90,7 @@ def jackknife(estimate: float, without: np.ndarray) -> tuple[float, float, float
     """
     from scipy.stats import t
 
+    without = np.asarray(without, float)
     n = len(without)
     if n < 2 or not np.isfinite(without).all():
         return np.nan, np.nan, np.nan

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arguments import checked
-from ..errors import BadInput
-from ..units import seed_given
+from ..errors import BadInput, shown
+from ..units import seed_given, si
 from .fits import power_law
 from .shape import gyration_radius
 
@@ -57,7 +57,7 @@ def ensemble_dimension(
     sizes : ndarray
         Numbers of grains N (K,) of the aggregates.
     gyration : ndarray
-        Radii of gyration r_g (K,) [m].
+        Radii of gyration r_g (K,) [m]; percolating aggregates have none and must be left out.
     grain_radius : float
         Radius of a grain a [m].
     groups : ndarray or None, optional
@@ -68,10 +68,15 @@ def ensemble_dimension(
     Raises
     ------
     BadInput
-        If the aggregates used do not span a factor of 3 in N, or r_g does not grow with N.
+        If the aggregates used do not span a factor of 3 in N, r_g does not grow with N, or is not a number.
     """
     n, r = np.asarray(sizes, float), np.asarray(gyration, float)
+    grain_radius = si(grain_radius, "m", "grain_radius", above=0.0)
+    if n.ndim != 1 or n.shape != r.shape or (groups is not None and np.shape(groups) != n.shape):
+        raise BadInput(f"sizes {n.shape}, gyration {r.shape} and groups must be (K,), one entry for each aggregate")
     used = n >= least
+    if (unknown := np.isnan(r[used]).sum()) > 0:
+        raise BadInput(f"{unknown} of the aggregates percolate and have no radius of gyration; leave them out")
     if not used.any() or n[used].max() < RANGE * n[used].min():
         raise BadInput(
             f"a fractal dimension needs aggregates from {least} grains on, "
@@ -83,6 +88,16 @@ def ensemble_dimension(
         raise BadInput("the radii of gyration do not grow with the number of grains: too few aggregates")
     value = 1.0 / fit.exponent
     return Dimension(value, fit.error * value**2, fit.prefactor**-value, (float(n[used].min()), float(n[used].max())))
+
+
+def _window(given: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Two numbers, or None.  Raises BadInput."""
+    if given is None:
+        return None
+    low, high = (si(one, "m", "window", above=0.0) for one in given)
+    if not low < high:
+        raise BadInput(f"window = {shown(given)} is empty; give two distances in m, the smaller one first")
+    return low, high
 
 
 def _one(position: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -119,7 +134,7 @@ def correlation_dimension(position: np.ndarray, window: tuple[float, float] | No
         If there are too few grains, or the window is empty.
     """
     position, unit, size = _one(position)
-    low, high = window or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
+    low, high = _window(window) or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
     # half-way between neighbour shells, so that a straight chain has dimension 1 exactly
     radii = (np.unique((_spaced(low, high) / unit * ABOVE).astype(int)) + 0.5) * unit
     core = np.linalg.norm(position - position.mean(axis=0), axis=1) <= CORE * size * ABOVE
@@ -157,7 +172,7 @@ def box_dimension(position: np.ndarray, window: tuple[float, float] | None = Non
         If there are too few grains, or the window is empty.
     """
     position, unit, size = _one(position)
-    low, high = window or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))
+    low, high = _window(window) or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))
     sides, rng = _spaced(low, high), np.random.default_rng(seed_given(seed))
     needed = np.full((SHIFTS, len(sides)), np.inf)
     for shift in range(SHIFTS):

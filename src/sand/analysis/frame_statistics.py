@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import refuse_other
-from .clusters import aggregate_moments, cluster_labels, unwrapped
+from .clusters import aggregate_moments, checked_labels, cluster_labels, percolating_clusters, unwrapped
 from .network import network
 from .shape import elongation, filling_factor, gyration_radius
 
@@ -28,6 +28,7 @@ COLUMNS = {
     "junctions": ("1", "grains with three or more contacts"),
     "rings": ("1", "independent closed loops"),
     "longest": ("1", "grains on the longest path along contacts"),
+    "percolating": ("1", "1 if it touches its own periodic image, and so has no size and shape (NaN), else 0"),
 }
 """Unit and meaning of every column of `aggregate_statistics`."""
 
@@ -46,12 +47,14 @@ def aggregate_statistics(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of str to ndarray
-        Columns (K,) as in `COLUMNS`.
+        Columns (K,) as in `COLUMNS`. Of a percolating aggregate, which touches its own periodic image, radius of
+        gyration, elongation and filling factor are NaN.
     """
     refuse_other(frame, "position", "pair", "moment", "box")
     labels = cluster_labels(len(frame.position), frame.pair)
     sizes = np.bincount(labels)
     whole = unwrapped(frame.position, frame.pair, frame.box)
+    percolates = percolating_clusters(frame.position, frame.pair, frame.box)
     moments, aligned = aggregate_moments(frame.moment, labels)
     order = np.argsort(-sizes, kind="stable")
     members = np.split(np.argsort(labels, kind="stable"), np.cumsum(sizes)[:-1])
@@ -64,9 +67,10 @@ def aggregate_statistics(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
         values = network(len(grains), pairs)._asdict() | {
             "grains": len(grains),
             "mass": mass.sum(),
-            "gyration_radius": gyration_radius(position, mass),
-            "elongation": elongation(position, mass, radius),
-            "filling_factor": filling_factor(position, radius),
+            "gyration_radius": np.nan if percolates[k] else gyration_radius(position, mass),
+            "elongation": np.nan if percolates[k] else elongation(position, mass, radius),
+            "filling_factor": np.nan if percolates[k] else filling_factor(position, radius),
+            "percolating": percolates[k],
             "moment": np.linalg.norm(moments[k]),
             "alignment": aligned[k],
         }
@@ -84,5 +88,5 @@ def size_distribution(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     labels : ndarray
         Cluster of each grain (N,).
     """
-    sizes, numbers = np.unique(np.bincount(labels), return_counts=True)
+    sizes, numbers = np.unique(np.bincount(checked_labels(labels)), return_counts=True)
     return sizes, numbers

@@ -8,7 +8,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
 
-from .clusters import cluster_labels
+from ..arguments import MOST_GRAINS, checked
+from ..units import whole_number
+from .clusters import checked_pairs, cluster_labels
 from .shape import coordination
 
 
@@ -23,6 +25,7 @@ class Network(NamedTuple):
     coordination: float  # mean number of contacts of a grain
 
 
+@checked
 def network(count: int, pairs: np.ndarray) -> Network:
     """Ends, junctions, rings and chains of one aggregate.
 
@@ -36,7 +39,7 @@ def network(count: int, pairs: np.ndarray) -> Network:
     pairs : ndarray
         Contacts (C, 2), each once.
     """
-    ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    ends = checked_pairs(whole_number(count, "count", 1, MOST_GRAINS), pairs)
     contacts = coordination(count, ends)
     unbranched = (contacts[ends] <= 2).all(axis=1)
     pieces = cluster_labels(count, ends[unbranched])

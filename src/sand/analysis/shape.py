@@ -6,12 +6,16 @@ import math
 
 import numpy as np
 
-from ..arguments import checked
-from ..errors import BadInput
+from ..arguments import MOST_GRAINS, checked
+from ..errors import BadInput, shown
+from ..units import MOST, whole_number
+from .clusters import checked_pairs
 from .projection import area_of_union
 
 DIRECTIONS = 64
 """Number of directions of view over which a projected area is averaged."""
+MOST_VIEWS = 1_000_000
+"""Largest number of directions of view."""
 
 
 def _centred(position: np.ndarray, mass: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -24,6 +28,14 @@ def _centred(position: np.ndarray, mass: np.ndarray | None) -> tuple[np.ndarray,
     return x - np.average(x, axis=0, weights=weight), weight
 
 
+def _of_each(radius: np.ndarray | float, count: int) -> np.ndarray:
+    """Radii (N,) of grains.  Raises BadInput."""
+    given = np.asarray(radius, float)
+    if given.shape not in ((), (count,)) or not (np.isfinite(given) & (given >= 0.0) & (given < MOST)).all():
+        raise BadInput(f"radius = {shown(radius)} must be one number or (N,), with N = {count}, in m, finite and ≥ 0")
+    return np.broadcast_to(given, count)
+
+
 @checked
 def gyration_radius(
     position: np.ndarray, mass: np.ndarray | None = None, radius: np.ndarray | float | None = None
@@ -33,7 +45,7 @@ def gyration_radius(
     Parameters
     ----------
     position : ndarray
-        (N, 3) [m], unwrapped (see `clusters.unwrapped`).
+        (N, 3) [m], unwrapped (see `clusters.unwrapped`); a cluster that touches its own periodic image has no size.
     mass : ndarray or None, optional
         (N,) [kg]; equal by default.
     radius : ndarray or float or None, optional
@@ -52,7 +64,7 @@ def gyration_tensor(
     """
     x, weight = _centred(position, mass)
     tensor = (x * weight[:, None]).T @ x / weight.sum()
-    own = 0.0 if radius is None else float(np.average(np.broadcast_to(np.square(radius), len(x)), weights=weight))
+    own = 0.0 if radius is None else float(np.average(_of_each(radius, len(x)) ** 2, weights=weight))
     return tensor + np.eye(3) * own / 5.0
 
 
@@ -103,7 +115,7 @@ def filling_factor(position: np.ndarray, radius: np.ndarray | float, mass: np.nd
 
     Parameters as for `gyration_radius`; masses are proportional to volumes by default.
     """
-    each = np.broadcast_to(np.asarray(radius, float), len(position))
+    each = _of_each(radius, len(position))
     weight = each**3 if mass is None else mass
     return float((each**3).sum() / characteristic_radius(position, weight, each) ** 3)
 
@@ -119,12 +131,14 @@ def coordination(count: int, pairs: np.ndarray) -> np.ndarray:
     pairs : ndarray
         Contacts (C, 2).
     """
-    return np.bincount(np.asarray(pairs, dtype=np.int64).reshape(-1), minlength=count)
+    whole_number(count, "count", 0, MOST_GRAINS)
+    return np.bincount(checked_pairs(count, pairs).reshape(-1), minlength=count)
 
 
+@checked
 def directions_of_view(count: int) -> np.ndarray:
     """Unit vectors (count, 3), evenly distributed over a hemisphere (Fibonacci lattice)."""
-    k = np.arange(count) + 0.5
+    k = np.arange(whole_number(count, "count", 1, MOST_VIEWS)) + 0.5
     z, turn = 1.0 - k / count, math.pi * (1.0 + math.sqrt(5.0)) * k
     across = np.sqrt(1.0 - z * z)
     return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
@@ -153,8 +167,10 @@ def projected_area(
         Mean and standard error [m²].
     """
     centred, _ = _centred(position, None)
-    size = np.broadcast_to(np.asarray(radius, float), len(centred)).copy()
+    size = _of_each(radius, len(centred)).copy()
     views = directions_of_view(directions) if isinstance(directions, int) else np.asarray(directions, float)
+    if views.ndim != 2 or views.shape[1] != 3 or not len(views) or not np.isfinite(views).all():
+        raise BadInput(f"directions = {shown(directions)} must be unit vectors (K, 3), or their number")
     areas, work = [], np.empty((2, 2 * len(size) + 2))
     for axis in views:
         flat = centred @ _across(axis)

@@ -21,6 +21,7 @@ SHOWN = 12
 @click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
+@options.wall_time
 @options.imports
 @options.threads
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
@@ -29,10 +30,9 @@ def command(
     case: str,
     out: str | None,
     seeds: list[int] | None,
-    workers: int,
-    threads: int | None,
     overwrite: bool,
-    **output: bool,
+    threads: int | None,
+    **how: Any,
 ) -> None:
     """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 
@@ -45,11 +45,11 @@ def command(
 
     job = CollisionJob(case, None if out is None else Path(out), seeds, overwrite=overwrite)
     refuse_folder(job.folder, Path(case), overwrite=overwrite)
-    collide(job, f"collide {case}", workers, threads, **output)
+    collide(job, f"collide {case}", threads=threads, **how)
 
 
-def collide(job: Any, heading: str, workers: int, threads: int | None, *, as_json: bool, quiet: bool) -> None:
-    """Run a `CollisionJob` and print the results.
+def collide(job: Any, heading: str, *, workers: int, as_json: bool, quiet: bool, **execution: Any) -> None:
+    """Run a `CollisionJob` and print the results; `execution` as for `job.running_job`.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, *, as_jso
     observers: list[Any] = [] if several or hidden else [Progress(math.inf, math.inf)]
     with (
         report.progress_bar(1.0, hidden or not several, bar_format=report.LAYOUT) as bar,
-        running_job(job.folder, workers if several else 1, threads=threads, quiet=hidden) as (executor, interrupts),
+        running_job(job.folder, workers if several else 1, quiet=hidden, **execution) as (executor, interrupts),
     ):
 
         def progress(done: int, total: int) -> None:

@@ -24,6 +24,7 @@ DEFAULT_SEEDS = list(range(1, 9))
 )
 @options.workers
 @options.scheduler
+@options.wall_time
 @options.imports
 @options.threads
 @options.output

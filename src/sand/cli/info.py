@@ -13,6 +13,7 @@ import click
 from ..config.commands import command_for
 from ..errors import BadInput
 from ..io import run_folder as files
+from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
 from . import options, parsing, report
 from .collide import collision_rows
@@ -121,7 +122,7 @@ def _describe_run(path: Path, listed: tuple[str, str]) -> Description:
     rows.append(listed)
     until = planned.get("until", 0.0)
     ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
-    if report.checkpoints(path) and not ended:
+    if checkpoint_files(path) and not ended:
         rows.append(("continue with", report.resume_line(path)))
     content = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
     return "a run", rows, content | {"planned_end": planned.get("until"), "files": report.files_of(path)}

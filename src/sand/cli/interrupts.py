@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
 
+BEGAN = time.monotonic()
+"""Beginning of the command [s]."""
 TYPE_CHECKING = False  # typing takes as long to load as everything else here
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,6 +27,8 @@ class Interrupts:
     after : optional
         Signal handler to install at the end; by default the one before.
     """
+
+    stops_runs = True  # runs may put their own handlers in place of this one
 
     def __init__(self, numbers: Sequence[int], after: Any = None):
         self.received = False

@@ -1,30 +1,92 @@
-"""Shared part of `sand collide`, `sand grow` and `sand scatter`: worker processes, Ctrl-C, and how to continue."""
+"""Shared part of commands that compute for long: worker processes, signals, the wall time, and how to continue."""
 
 from __future__ import annotations
 
+import _thread
+import signal
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..compiler.program import before_first_calls
 from ..errors import BadInput
 from ..experiments.executors import executor_for
 from ..simulation.observers import Observer
-from ..simulation.signals import STOPS
+from ..simulation.signals import STOPS, Signals
+from ..units import format_quantity
 from . import report
-from .interrupts import Interrupts
+from .exits import WALL_TIME
+from .interrupts import BEGAN, Interrupts
+
+
+class WallTimeUsed(KeyboardInterrupt):
+    """The wall time that the user allows is used up, and the work is saved."""
+
+    exit_code = WALL_TIME
 
 
 class InterruptObserver(Interrupts, Observer):
-    """Raises KeyboardInterrupt on both signals in the block; during steps `simulation.signals` handles them.
+    """Raises KeyboardInterrupt on all stop signals in the block; during steps `simulation.signals` handles them.
 
-    An exception raised while the compiler calls back into Python is lost. As an observer, this class raises it again at
-    the first frame, after everything has been compiled.
+    An exception raised while the compiler calls back into Python is lost. It is raised again before the next
+    compilation, or, as this class is an observer, at the first frame.
+
+    Attributes
+    ----------
+    why : str
+        Why the command was interrupted.
+    is_late : bool
+        Whether the wall time is used up.
     """
 
     def __init__(self) -> None:
         super().__init__(STOPS)
+        self.why, self.is_late = "interrupted", False
+        self._timer: threading.Timer | None = None
+
+    def __enter__(self) -> InterruptObserver:
+        super().__enter__()
+        before_first_calls.append(self._check)
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        before_first_calls.remove(self._check)
+        super().__exit__(*problem)
+
+    def limit(self, wall_time: float | None) -> None:
+        """Interrupt the block, as by a signal, after the wall time `wall_time` [s] of the command; None: no limit."""
+        if wall_time is not None:
+            left = min(max(BEGAN + wall_time - time.monotonic(), 0.0), threading.TIMEOUT_MAX)
+            late = f"the wall time of {format_quantity(wall_time, 's')} is used up"
+            self._timer = threading.Timer(left, self._end_wall_time, [late])
+            self._timer.daemon = True
+            self._timer.start()
+
+    def _end_wall_time(self, why: str) -> None:
+        """Interrupt the main thread, also where it waits."""
+        self.is_late, self.why = True, why
+        # Ctrl-C is ignored in a background job of a shell
+        number = next((one for one in STOPS if one != signal.SIGINT and one in self._before), signal.SIGINT)
+        if hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(threading.main_thread().ident or 0, number)
+        else:
+            _thread.interrupt_main(number)
+
+    def _raise(self, number: int, frame: Any) -> None:
+        try:
+            super()._raise(number, frame)
+        except KeyboardInterrupt:
+            raise (WallTimeUsed(self.why) if self.is_late else KeyboardInterrupt) from None
+
+    def _check(self) -> None:
+        Signals.check()
+        self.see(None, {})
 
     def see(self, simulation: Any, row: dict[str, float]) -> None:
         """Raise an exception that was lost."""
@@ -34,7 +96,13 @@ class InterruptObserver(Interrupts, Observer):
 
 @contextmanager
 def running_job(
-    folder: Path, workers: int, scheduler: str | None = None, threads: int | None = None, *, quiet: bool
+    folder: Path,
+    workers: int,
+    scheduler: str | None = None,
+    threads: int | None = None,
+    wall_time: float | None = None,
+    *,
+    quiet: bool,
 ) -> Iterator[tuple[Executor | None, InterruptObserver]]:
     """Executor of a job in a folder, and an observer for simulations that run in this process.
 
@@ -43,16 +111,16 @@ def running_job(
     BadInput
         If a worker process dies, or `executor_for` refuses the arguments.
     KeyboardInterrupt
-        After Ctrl-C; its text says how to continue.
+        After a signal, or as `WallTimeUsed` after the wall time `wall_time` [s]; its text says how to continue.
     """
+    interrupts = InterruptObserver()
     try:
-        with (
-            report.compiling(quiet),
-            InterruptObserver() as interrupts,
-            executor_for(workers, scheduler, threads) as executor,
-        ):
-            yield executor, interrupts
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {report.how_to_continue(folder)}") from None
-    except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
+        with report.compiling(quiet), interrupts:
+            interrupts.limit(wall_time)
+            with executor_for(workers, scheduler, threads) as executor:
+                yield executor, interrupts
+    except (KeyboardInterrupt, BrokenExecutor) as error:
+        if isinstance(error, BrokenExecutor) and not (interrupts.received or interrupts.is_late):
+            raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
+        text = f"{interrupts.why}; {report.how_to_continue(folder)}"
+        raise (WallTimeUsed if interrupts.is_late else KeyboardInterrupt)(text) from None

@@ -11,12 +11,13 @@ from typing import Any
 from ..config.case import with_absolute_files
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..simulation.outcome import Outcome, Result
 from ..units import format_quantity
 from . import report
-from .exits import DONE, INTERRUPTED, PHYSICS
+from .exits import DONE, INTERRUPTED, PHYSICS, WALL_TIME
 from .job import InterruptObserver
 from .progress import Progress
 
@@ -25,9 +26,8 @@ def launch(
     make: Callable[[], Any],
     folder: Path,
     heading: str,
-    until: float | None,
-    steps: int | None = None,
-    stop: str | None = None,
+    ends: tuple[float | None, int | None, str | None],
+    wall_time: float | None,
     *,
     quiet: bool,
     as_json: bool,
@@ -40,17 +40,20 @@ def launch(
         Returns the simulation, which writes its files to `folder`.
     heading : str
         Heading of the description before the start.
-    until, steps, stop : float or None, int or None, str or None
+    ends : tuple[float or None, int or None, str or None]
         End of the run: a time [s], a number of further steps, a condition, or whichever comes first; without all, the
         planned end of the simulation.
+    wall_time : float or None
+        Wall time of the command [s] after which the run stops with a checkpoint.
 
     Returns
     -------
     int
         The exit code.
     """
-    bar = None
+    bar, (until, steps, stop) = None, ends
     with report.compiling(quiet), InterruptObserver() as interrupts:
+        interrupts.limit(wall_time)
         simulation = make()
         simulation.observers.append(interrupts)
         end, last_step, condition = simulation.planned
@@ -64,8 +67,8 @@ def launch(
             simulation.observers.append(bar)
         try:
             result = simulation.run(until, steps=steps, stop=stop)
-        except Interrupted as stop:
-            result = stop.result
+        except Interrupted as interruption:
+            result = interruption.result
         except FilesFailed as error:
             raise FilesFailed(f"{error}; {_how_to_recover(folder)}") from error
         except (Exception, KeyboardInterrupt) as error:
@@ -73,12 +76,13 @@ def launch(
                 raise
             result = _finished_result(simulation, goal, folder)
             if result is None:
-                return _interrupted(folder)  # an interrupted compiler may raise any exception
+                return _interrupted(folder, interrupts)  # an interrupted compiler may raise any exception
             report.note("the figure is not drawn")
         finally:
             if bar is not None:
                 bar.finish()
-    return _conclude(result, folder, quiet=quiet, as_json=as_json)
+    code = _conclude(result, folder, interrupts.why, quiet=quiet, as_json=as_json)
+    return WALL_TIME if code == INTERRUPTED and interrupts.is_late else code
 
 
 def _finished_result(simulation: Any, goal: Sequence[float], folder: Path) -> Any:
@@ -97,8 +101,8 @@ def _finished_result(simulation: Any, goal: Sequence[float], folder: Path) -> An
     return Result(outcome, simulation.steps, simulation.time, simulation.ledger.drift, condition=met)
 
 
-def _conclude(result: Any, folder: Path, **output: bool) -> int:
-    """Report how a run ended; returns the exit code."""
+def _conclude(result: Any, folder: Path, why: str, **output: bool) -> int:
+    """Report how a run ended, or `why` it was interrupted; returns the exit code."""
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
     rows = [*report.results(summary), ("files", report.listed(folder))]
@@ -107,33 +111,36 @@ def _conclude(result: Any, folder: Path, **output: bool) -> int:
     if outcome is Outcome.CONDITION_MET:
         report.note(f"ended at {when}: {outcome.value}: {result.condition}")
     if outcome is Outcome.INTERRUPTED:
-        report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
+        report.note(f"{why} at {when}; resume with: {report.resume_line(folder)}")
         return INTERRUPTED
+    if outcome is Outcome.WALL_TIME:
+        report.note(f"the wall time of the condition is used up at {when}; resume with: {report.resume_line(folder)}")
+        return WALL_TIME
     if outcome.is_physics:
         report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
-        last = report.checkpoints(folder)[-1]
+        last = checkpoint_files(folder)[-1]
         kept = int(last.stem.removeprefix("checkpoint-")) == result.steps
         report.note(f"the {'last state' if kept else 'last good state'} is in {last}")
         return PHYSICS
     return DONE
 
 
-def _interrupted(folder: Path) -> int:
+def _interrupted(folder: Path, interrupts: InterruptObserver) -> int:
     """Report an interruption before the first step, or a second one; returns the exit code."""
     if not folder.is_dir():
-        report.note(f"interrupted; the folder {folder} does not exist, start again")
-    elif report.checkpoints(folder):
-        report.note(f"interrupted at once; continue from the last checkpoint with: {report.resume_line(folder)}")
+        report.note(f"{interrupts.why}; the folder {folder} does not exist, start again")
+    elif checkpoint_files(folder):
+        report.note(f"{interrupts.why} at once; continue from the last checkpoint with: {report.resume_line(folder)}")
     else:
-        report.note("interrupted before the first step; nothing is lost, start again")
-    return INTERRUPTED
+        report.note(f"{interrupts.why} before the first step; nothing is lost, start again")
+    return WALL_TIME if interrupts.is_late else INTERRUPTED
 
 
 def _how_to_recover(folder: Path) -> str:
     """What to do after a file could not be written."""
     if not folder.is_dir():
         return f"the folder {folder} has been removed; start again"
-    if report.checkpoints(folder):
+    if checkpoint_files(folder):
         return f"once this is solved, continue from the last checkpoint with: {report.resume_line(folder)}"
     return "there is no checkpoint yet; once this is solved, start again with --overwrite"
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import signal
 import sys
 
-from .exits import INTERRUPTED
+from .exits import BAD_INPUT, DONE, INTERRUPTED
 from .interrupts import Interrupts
+from .streams import keep_working_without_streams, lost
 
 TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    outputs = keep_working_without_streams() if argv is None else []
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # replace characters that the terminal cannot show, such as µ and …
             stream.reconfigure(errors="replace")
@@ -35,7 +37,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             from .program import run_command
 
-            return run_command(words, lambda: interrupts.received)
+            code = run_command(words, lambda: interrupts.received)
+            if problem := lost(outputs):
+                sys.stderr.write(f"sand: cannot write to standard output: {problem}\n")
+                return code if code != DONE else BAD_INPUT
+            return code
         except KeyboardInterrupt:
             pass
         except Exception:  # an interrupted import can raise anything

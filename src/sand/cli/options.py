@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
 
 from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 from ..errors import BadInput
-from ..io.run_folder import checked_name
+from ..paths import checked_name
 
 
 class PathName(click.ParamType):
@@ -80,6 +80,22 @@ threads = click.option(
 )
 
 
+def reading(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --radius, --length and --material of commands that read files of grains of other programs."""
+    radius = click.option("--radius", metavar="R", help="Radius of the grains of a file without radii.")
+    length = click.option("--length", metavar="LENGTH", help="Unit of length of a file of another program, as '1 nm'.")
+    material = click.option("--material", metavar="M", help="Material of a file that names none (silica).")
+    return radius(length(material(command)))
+
+
+def refuse_reading(folder: Any, given: Mapping[str, Any]) -> None:
+    """Refuse options of `reading` that were given for the folder of a run.  Raises BadInput."""
+    if wrong := [
+        f"--{name}: the run in {folder} has it; leave --{name} out" for name in given if given[name] is not None
+    ]:
+        raise BadInput(wrong)
+
+
 def _import(context: click.Context, _option: click.Parameter, names: tuple[str, ...]) -> None:
     if names and not context.resilient_parsing:  # not while a shell completes a word
         from ..forces.own import import_modules
@@ -102,7 +118,7 @@ def end_of_run(text: str) -> Any:
     return click.option("--until", metavar="TIME", callback=_seconds, help=text)
 
 
-def _seconds(context: click.Context, _option: click.Parameter, text: str | None) -> float | None:
+def _seconds(context: click.Context, option: click.Parameter, text: str | None) -> float | None:
     """Convert a time to seconds, checked as in a case file; a bare number is SI.  Raises BadInput."""
     if text is None or context.resilient_parsing:
         return None
@@ -112,7 +128,15 @@ def _seconds(context: click.Context, _option: click.Parameter, text: str | None)
         value: float | str = float(text)
     except ValueError:
         value = text
-    return duration(value, "--until")
+    return duration(value, option.opts[0])
+
+
+wall_time = click.option(
+    "--wall-time",
+    metavar="TIME",
+    callback=_seconds,
+    help="Stop after this wall time, such as 23h, with a checkpoint and exit code 4; continue with `sand resume`.",
+)
 
 
 def seeds(text: str) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ..descriptions import docstring
 from ..errors import BadInput
 
 
@@ -166,4 +167,4 @@ def _text(error: Exception) -> str:
 
 def command(name: str, **settings: Any) -> Callable[[Callable[..., Any]], Command]:
     """Decorator that makes a `Command` of a function; the settings are those of `click.command`, and `check`."""
-    return click.command(name, cls=Command, **settings)
+    return lambda function: click.command(name, cls=Command, help=docstring(function), **settings)(function)

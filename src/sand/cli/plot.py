@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +14,9 @@ from . import options, parsing, report
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
-FOLDER = "plots"
+FOLDER = "plots"  # as `io.run_folder.PLOTS`, whose import is slow
+READING = ("radius", "length", "material")
+"""Options of `options.reading`."""
 
 
 class PrintSize(NamedTuple):
@@ -73,7 +76,8 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     from ..plotting.plots import HISTORY
     from ..plotting.render.still import check_picture_options
 
-    one = None if values["source"] is None else _first_frame(Path(values["source"]))
+    given = {name: values[name] for name in READING}
+    one = None if values["source"] is None else _first_frame(Path(values["source"]), given)
     allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
     yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
     if values["cluster"] is not None and (others := [name for name in names if name != STILL]):
@@ -132,6 +136,7 @@ def _bonds(given: str | None) -> str | None:
 @click.option("--transparent", is_flag=True, help="Transparent background.")
 @click.option("--dark", is_flag=True, help="Dark background.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@options.reading
 @options.output
 def command(
     source: str,
@@ -144,7 +149,9 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
+    """Draw the run in DIR: figures over time, a still picture of a frame, histograms over grains.
+
+    DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
     QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
@@ -156,7 +163,8 @@ def command(
 
     folder, names = _place(Path(source), what, out, form, overwrite)
     how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
-    pictures = _draw(_open_source(Path(source)), names, frame, form, how)
+    given = {name: how.pop(name) for name in READING}
+    pictures = _draw(_open_source(Path(source), given), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)
     paths = [folder / f"{name}.{form}" for name in names]
@@ -190,27 +198,27 @@ def _place(
     return folder, names
 
 
-def _open_source(path: Path) -> Source:
-    """Open a run or a trajectory.  Raises BadInput if there is none of SAND."""
-    from ..io.trajectory import Frames
+def _open_source(path: Path, given: Mapping[str, Any]) -> Source:
+    """Open a run, a trajectory or a file of grains.  Raises BadInput."""
+    from ..io.file_frames import open_frames
     from ..results import Run
 
-    if not path.is_file():
-        run = Run(path)
-        return Source(path, run.frames, run)
-    frames = Frames(path)
-    if not frames.written_by_sand:
-        raise BadInput(f"{path} is not a trajectory of SAND, or has no frame")
-    return Source(path, frames, None)
+    if path.is_file():
+        return Source(path, open_frames(path, **given), None)
+    options.refuse_reading(path, given)
+    run = Run(path)
+    return Source(path, run.frames, run)
 
 
-def _first_frame(path: Path) -> Any:
+def _first_frame(path: Path, given: Mapping[str, Any]) -> Any:
     """The first frame, for the names of own quantities; None if it cannot be read, which is reported later."""
-    try:
-        frames = _open_source(path).frames
-        return frames[0] if len(frames) else None
-    except BadInput:
-        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # notes appear when the frames are drawn
+        try:
+            frames = _open_source(path, given).frames
+            return frames[0] if len(frames) else None
+        except BadInput:
+            return None
 
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import click
 
+from ..descriptions import docstring
 from ..errors import SandError
 from ..version import __version__
 from . import (
@@ -42,12 +43,14 @@ COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view
 def sand(context: click.Context) -> None:
     """SAND: grain-by-grain simulation of dust aggregates with adhesive contacts and magnetic dipoles.
 
-    Exit codes: 0 done, 2 an error in the input, 3 stopped by physics, 130 interrupted.
+    Exit codes: 0 done, 2 an error in the input or of files, 3 stopped by physics, 4 the wall time is used up,
+    130 interrupted.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
 
+sand.help = docstring(sand.callback)
 for _module in COMMANDS:
     sand.add_command(_module.command)
 
@@ -78,7 +81,7 @@ def run_command(words: list[str], interrupted: Callable[[], bool]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or flushing at exit would fail
         return DONE
     except (KeyboardInterrupt, click.Abort) as stop:
-        return _fail([str(stop) or "interrupted"], INTERRUPTED, words)
+        return _fail([str(stop) or "interrupted"], getattr(stop, "exit_code", INTERRUPTED), words)
     except Exception as error:
         if interrupted() and not isinstance(error, (SandError, click.ClickException)):
             return _fail(["interrupted"], INTERRUPTED, words)  # an interrupted import can raise anything

@@ -18,6 +18,7 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput, FilesFailed
+from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml
 
@@ -132,7 +133,7 @@ def how_to_continue(folder: Path) -> str:
 
 def is_resumable(folder: Path) -> bool:
     """Whether `sand resume` can continue the content of a folder."""
-    if checkpoints(folder):
+    if checkpoint_files(folder):
         return True
     try:
         command, _, begun = job_in(folder)
@@ -149,14 +150,9 @@ def job_in(folder: Path) -> tuple[str | None, Path, bool]:
     return command, case, command is not None and is_job(folder, case)
 
 
-def checkpoints(folder: Path) -> list[Path]:
-    """The checkpoints in a run's folder, oldest first."""
-    return sorted(folder.glob("checkpoint-*.npz"))
-
-
 def files_of(folder: Path) -> list[str]:
     """Names of the files of SAND in a folder."""
-    return [name for name in OWN_FILES if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
+    return [name for name in OWN_FILES if (folder / name).exists()] + [p.name for p in checkpoint_files(folder)]
 
 
 def listed(folder: Path) -> str:

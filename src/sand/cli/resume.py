@@ -24,6 +24,7 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 @parsing.command("resume", short_help="Continue an interrupted run or job of any command.")
 @click.argument("folder", metavar="DIR", type=options.RUN)
 @options.end_of_run('For a run: a new end instead of the planned one, such as "10 us".')
+@options.wall_time
 @options.imports
 @options.workers
 @options.scheduler
@@ -35,6 +36,7 @@ def command(
     workers: int,
     scheduler: str | None,
     threads: int | None,
+    wall_time: float | None,
     **output: bool,
 ) -> int | None:
     """Continue the run in DIR from its newest checkpoint to its planned end, or to --until.
@@ -52,11 +54,11 @@ def command(
             raise BadInput(f"--until applies to runs; {folder} holds a job of `sand {kind}`")
         if scheduler is not None and kind == "collide":
             raise BadInput("--scheduler applies to jobs of `sand scatter` and `sand grow`; use --workers")
-        _job(kind, place, scheduler, {"workers": workers, "threads": threads, **output})
+        _job(kind, place, scheduler, {"workers": workers, "threads": threads, "wall_time": wall_time, **output})
         return None
     if workers > 1 or scheduler is not None:
         raise BadInput("--workers and --scheduler apply to jobs of many parts; for a run use --threads")
-    return _run(place, until, **output)
+    return _run(place, until, wall_time, **output)
 
 
 def _kind(folder: Path) -> str:
@@ -97,7 +99,7 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
         collide(job, f"resume {folder}", **how)
 
 
-def _run(place: Path, until: float | None, *, quiet: bool, as_json: bool) -> int | None:
+def _run(place: Path, until: float | None, wall_time: float | None, *, quiet: bool, as_json: bool) -> int | None:
     """Continue a run; returns the exit code, None if its planned end is reached."""
     from ..config.build import resume
     from ..simulation.condition import GIVEN
@@ -133,4 +135,5 @@ def _run(place: Path, until: float | None, *, quiet: bool, as_json: bool) -> int
         elif met:
             report.note(f"the condition {stop} is met and no longer applies")
     kept = None if until is None or met or stop == GIVEN else stop
-    return launch(lambda: simulation, place, f"resume {place}", until, None, kept, quiet=quiet, as_json=as_json)
+    ends = (until, None, kept)
+    return launch(lambda: simulation, place, f"resume {place}", ends, wall_time, quiet=quiet, as_json=as_json)

@@ -37,6 +37,7 @@ def _check(values: parsing.OptionValues) -> Iterator[str]:
 @options.end_of_run('End of the run in place of that in the case, such as "5 us".')
 @click.option("--seed", type=options.SEED, metavar="N", help="Seed in place of that in the case.")
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
+@options.wall_time
 @options.imports
 @options.threads
 @options.output
@@ -49,6 +50,7 @@ def command(
     seed: int | None,
     overwrite: bool,
     threads: int | None,
+    wall_time: float | None,
     **output: bool,
 ) -> int:
     """Run the simulation that CASE.toml describes.
@@ -97,12 +99,13 @@ def command(
             return simulation_of(described, folder, overwrite=overwrite)
 
     heading = f"run {name}" + (f" from {source}" if source else "")
-    return launch(build, folder, heading, described.run.until, described.run.steps, described.run.stop, **output)
+    ends = described.run.until, described.run.steps, described.run.stop
+    return launch(build, folder, heading, ends, wall_time, **output)
 
 
 def _source(source: str) -> Path:
     """The trajectory to take grains from.  Raises BadInput."""
-    place = Path(source).expanduser().absolute().resolve()
+    place = Path(source).absolute().resolve()
     if not place.exists():
         raise BadInput(f"--from: there is no file or folder {source}")
     if place.is_dir() and not (place / TRAJECTORY).exists():

@@ -26,6 +26,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
 @options.workers
 @options.scheduler
+@options.wall_time
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
 @click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
 @options.output

@@ -6,6 +6,7 @@ import os
 import shlex
 import threading
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ YOUNG = 5.0
 )
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 @click.option("--overwrite", is_flag=True, help="Replace FILE if it exists.")
+@options.reading
 @options.output
 def command(
     folder: str,
@@ -44,9 +46,14 @@ def command(
     port: int,
     no_browser: bool,
     overwrite: bool,
+    radius: str | None,
+    length: str | None,
+    material: str | None,
     **output: bool,
 ) -> None:
-    """Show the grains of the run in DIR, or of a trajectory of SAND, in the browser.
+    """Show the grains of the run in DIR in the browser.
+
+    DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD.
 
     New frames of a running simulation appear as they are written; if there is none yet, the first one is waited for.
     The page can be opened on this machine only; Ctrl-C ends the server.
@@ -58,7 +65,8 @@ def command(
         _refuse_target(target, overwrite)
     selection = frame_slice(frames, every)
     silent = output["quiet"] or output["as_json"]
-    dataset = _open_dataset(Path(folder), verbose=not silent)
+    given = {"radius": radius, "length": length, "material": material}
+    dataset = _open_dataset(Path(folder), given, verbose=not silent)
     if selection != slice(None, None, 1):
         ends = ("" if k is None else str(k) for k in (frames.start, frames.stop, frames.step))
         chosen = ":".join(ends).removesuffix(":")
@@ -77,12 +85,17 @@ def command(
         report.note(f"note: a page of {megabytes} opens slowly; --every {fewer} would reduce it to about 100 MB")
 
 
-def _open_dataset(path: Path, verbose: bool) -> Any:
-    """Open a run as soon as it has a frame.  Raises BadInput if it does not get one within WAIT."""
-    from ..viewer.dataset import run_dataset
+def _open_dataset(path: Path, given: Mapping[str, Any], verbose: bool) -> Any:
+    """Open a run as soon as it has a frame, or a file.  Raises BadInput if a run does not get one within WAIT."""
+    from ..io.file_frames import FileFrames
+    from ..setup.from_file import is_own_trajectory
+    from ..viewer.dataset import frames_dataset, run_dataset
     from ..viewer.external_field import read_field
     from ..viewer.run_files import find_run_folder
 
+    if path.is_file() and find_run_folder(path) is None and not is_own_trajectory(path):
+        return frames_dataset(path, FileFrames(path, **given))
+    options.refuse_reading(path, given)
     begun, noted = time.monotonic(), not verbose
     while True:
         waited = time.monotonic() - begun

@@ -19,12 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from filelock import BaseFileLock
 from numba.core import event
 from numba.extending import register_jitable
 
-from .cache import private_folder
-from .progress import CompilationListener, acquire_lock, making_code
+from .cache import cache_folders
+from .entries import CodeCache, Entries
+from .progress import CompilationListener, making_code
+from .user_code import code_digest
 
 __all__ = ["COMPILED", "COMPILE_TIMES", "cache_folder", "caller", "compile_error", "formula", "in_cache", "kernel"]
 __all__ += ["loop", "rare", "separate"]
@@ -141,44 +142,23 @@ def _digest() -> str:
 
 
 @cache
+def _entries() -> Entries:
+    """Files of compiled code, in folders named after the digest of sources and compiler."""
+    return Entries(*cache_folders(_digest()))
+
+
 def cache_folder() -> Path:
-    """Folder of compiled code, named after the digest of sources and compiler; see `cache.private_folder`."""
-    return private_folder(_digest())
+    """Folder to which compiled code is written; see `cache.cache_folders`."""
+    return _entries().own
 
 
-_FOLDER = cache_folder()
-COMPILE_TIMES = _FOLDER.parent / "compile-times.json"
+COMPILE_TIMES = cache_folder().parent / "compile-times.json"
 """Record of the last duration of each compilation."""
 
 
-def _share_cache(compiled: Any) -> None:
-    """Load cached code without initialising numba's compiler, and let only one of several processes compile.
-
-    The first saves an eighth of a second at start.  A process that finds no code in the cache takes the lock of this
-    code, looks again, and holds the lock until it has compiled; where there are no locks, it compiles without one.
-    """
-    try:
-        from numba.core.runtime import rtsys
-
-        cache = compiled._cache
-        guard, load, key_of = cache._guard_against_spurious_io_errors, cache._load_overload, cache._index_key
-    except (ImportError, AttributeError):
-        return
-    held: list[BaseFileLock] = []
-
-    def load_overload(signature: Any, target: Any) -> Any:
-        rtsys.initialize(target)  # machine code may refer to its functions
-        with guard():
-            found = load(signature, target)
-        if found is None and not held:
-            name = hashlib.sha256(repr(key_of(signature, target.codegen())).encode()).hexdigest()[:16]
-            lock = acquire_lock(_FOLDER / f"{name}.lock", _PURPOSES[id(compiled)])
-            if lock is not None:
-                held.append(lock)
-                with guard():
-                    found = load(signature, target)
-        return found
-
+def _use_cache(compiled: Any, function: Callable, digest: str) -> None:
+    """Make numba's dispatcher load compiled code from the disk, and let only one of several processes compile it."""
+    code = compiled._cache = CodeCache(_entries(), function, digest, _PURPOSES[id(compiled)])
     compile_or_load = compiled.compile
 
     def compile_with_lock(signature: Any) -> Any:
@@ -186,19 +166,15 @@ def _share_cache(compiled: Any) -> None:
             with making_code:
                 return compile_or_load(signature)
         finally:
-            while held:
-                held.pop().release()
+            code.release()
 
-    cache.load_overload, compiled.compile = load_overload, compile_with_lock
+    compiled.compile = compile_with_lock
 
 
 def in_cache(compiled: Any, signature: Any) -> bool:
-    """Whether the code of a kernel for this signature is on the disk; nothing is compiled. True if unknown."""
-    try:
-        cache = compiled._cache
-        return cache._index_key(signature, compiled.targetctx.codegen()) in cache._cache_file._load_index()
-    except AttributeError:
-        return True
+    """Whether the code of a kernel for this signature is on the disk; nothing is compiled."""
+    code = compiled._cache
+    return isinstance(code, CodeCache) and code.holds(signature, compiled.targetctx.codegen())
 
 
 _PURPOSES: dict[int, str] = {}
@@ -212,14 +188,12 @@ def kernel(
 ) -> Callable:
     """Compile `function` on its first call and cache the result in SAND's cache folder.
 
-    numba's global cache folder is restored at once, so that kernels of the user are cached where the user wants.
-
     Parameters
     ----------
     function : callable
         The function.
     cached : bool, optional
-        False to compile it in each process.
+        False to compile it in each process, as is done with code of unknown objects of the user.
     nogil : bool, optional
         True for code during which other Python threads may run.
     wrapper : bool, optional
@@ -232,16 +206,11 @@ def kernel(
     callable
         The compiled function.
     """
-    global_folder = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_FOLDER)
-    try:
-        options = _KERNEL | _COMMON | _NO_ALIASES | {"no_cpython_wrapper": not wrapper, "no_cfunc_wrapper": True}
-        compiled = numba.njit(cache=cached, nogil=nogil, **options)(function)
-    finally:
-        numba.config.CACHE_DIR = global_folder
+    options = _KERNEL | _COMMON | _NO_ALIASES | {"no_cpython_wrapper": not wrapper, "no_cfunc_wrapper": True}
+    compiled = numba.njit(nogil=nogil, **options)(function)
     _PURPOSES[id(compiled)] = purpose or f"'{function.__name__.replace('_', ' ')}'"
-    if cached and COMPILED:
-        _share_cache(compiled)
+    if cached and COMPILED and (digest := code_digest(function)) is not None:
+        _use_cache(compiled, function, f"{digest} {nogil} {wrapper}")
     return compiled
 
 

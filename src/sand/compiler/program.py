@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from .native_calls import status_and_result
 from .stage import PythonStage, Stage
 from .table import Table, words_of
 
-__all__ = ["Program", "call_stage", "has_stage", "stage_fails"]
+__all__ = ["Program", "before_first_calls", "call_stage", "has_stage", "stage_fails"]
 
 _NATIVE = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 4, ctypes.c_int64)
 """Numba's calling convention of a stage: status, pointers to result and exception, table, parameters, block."""
@@ -33,6 +33,8 @@ def _first_call(
     @_NATIVE
     def compile_and_call(*arguments: Any) -> int:
         try:
+            for check in before_first_calls:
+                check()
             address = stage.address(tables[0](), parameters)  # type: ignore[arg-type]
             status = int(_NATIVE(address)(*arguments))
             entry[0] = address
@@ -62,6 +64,8 @@ def _python_call(
     return call
 
 
+before_first_calls: list[Callable[[], None]] = []
+"""Functions called before a stage is compiled; an exception of theirs, such as KeyboardInterrupt, prevents that."""
 FAILED = -1
 """Numba's status of a function that has raised a Python exception."""
 NOT_READY, READY = 0, 1

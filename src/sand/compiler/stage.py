@@ -42,7 +42,7 @@ from .table import (
     structure_of,
     words_of,
 )
-from .user_code import user_code_digest
+from .user_code import code_digest
 
 __all__ = ["PythonStage", "Stage", "stage"]
 
@@ -212,12 +212,10 @@ class Stage:
         def entry(table, parameters, block):
             return separated(*open_parts(table, parameters, block))
 
-        digest = user_code_digest(self.function)
-        words = self.function.__qualname__, "wide" if wide else "", digest or ""
+        # symbols of machine code that several processes have compiled must differ
+        words = self.function.__qualname__, "wide" if wide else "", code_digest(self.function) or ""
         entry = _renamed(entry, "_".join(word for word in words if word))
-        return kernel(
-            entry, cached=self._cached and digest is not None, nogil=True, wrapper=False, purpose=self.purpose
-        )
+        return kernel(entry, cached=self._cached, nogil=True, wrapper=False, purpose=self.purpose)
 
 
 class PythonStage:

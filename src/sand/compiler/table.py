@@ -14,6 +14,7 @@ from numba import from_dtype, types
 from numba.core.datamodel import models
 from numba.extending import intrinsic, register_model
 
+from .entries import described
 from .groups import WORD, Group, array_of
 from .jit import COMPILED
 
@@ -28,17 +29,7 @@ class Address(types.Opaque):
 
     def __init__(self, parts: Any):
         self.parts = parts
-        super().__init__(name=f"Address({_described(parts)})")
-
-
-def _described(kind: Any) -> str:
-    """Name of a type that identifies it; numba's names of named tuples lack those of their members."""
-    if isinstance(kind, types.BaseNamedTuple):
-        name = f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}"
-        return f"{name}({', '.join(f'{n}: {_described(t)}' for n, t in zip(kind.fields, kind.types, strict=True))})"
-    if isinstance(kind, (types.BaseTuple, tuple)):
-        return f"({', '.join(map(_described, kind.types if isinstance(kind, types.BaseTuple) else kind))})"
-    return str(kind)
+        super().__init__(name=f"Address({described(parts)})")
 
 
 register_model(Address)(models.OpaqueModel)

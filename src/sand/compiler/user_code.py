@@ -1,8 +1,9 @@
-"""Digest of the user's formulas in a compiled function, under which its machine code is cached on disk.
+"""Digest of a compiled function, under which its machine code is cached on disk.
 
-Code with SAND's own formulas is cached by the digest of SAND's sources (`jit`).  A formula of the user is identified by
-its bytecode, its constants and the values of all globals and closure variables that it refers to, in turn.  If one of
-them is another object, whose compiled value does not follow from its source, the code is not cached.
+All functions of SAND are identified by the digest of SAND's sources (`jit`), and one of them by its bytecode and the
+values in its closure.  A formula of the user is identified by its bytecode, its constants and the values of all globals
+and closure variables that it refers to, in turn.  If one of them is another object, whose compiled value does not
+follow from its source, the code is not cached.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["user_code_digest"]
+__all__ = ["code_digest"]
 
 NUMBERS = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
@@ -26,8 +27,12 @@ class _UnknownCodeError(Exception):
     """An object whose compiled value does not follow from its source."""
 
 
-def user_code_digest(function: Callable) -> str | None:
-    """Digest of all code of the user that a function refers to; "" if there is none, None if it must not be cached.
+def code_digest(function: Callable) -> str | None:
+    """Digest of a function and of the formulas in its closure; None if its compiled code must not be cached.
+
+    Functions that a factory makes of different formulas have the same name and different digests.  There are no paths
+    in the digest, so that a copy of the same sources in another folder has the same.  Sources of SAND to which the
+    function refers by global names are not part of it.
 
     Parameters
     ----------
@@ -35,49 +40,52 @@ def user_code_digest(function: Callable) -> str | None:
         A function of SAND, in whose closure there may be formulas of the user, or such a formula itself.
     """
     try:
-        words = list(_words(function, set()))
+        words = list(_words(function, {}))
     except _UnknownCodeError:
         return None
-    return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16] if words else ""
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
 
 
-def _words(value: Any, seen: set[int], user: bool = False) -> Iterator[str]:
-    """Words that identify the user's code in a value; of numbers only if code of the `user` refers to them."""
+def _words(value: Any, seen: dict[int, int]) -> Iterator[str]:
+    """Words that identify a value; `seen` are the numbers of the functions so far by their id."""
     value = getattr(value, "py_func", value)  # functions compiled by numba.njit
     if isinstance(value, FunctionType):
-        if id(value) not in seen:
-            seen.add(id(value))
+        if id(value) in seen:
+            yield f"function {seen[id(value)]}"
+        else:
+            seen[id(value)] = len(seen)
             yield from _words_of_function(value, seen)
     elif isinstance(value, type):
-        if not _is_of_a_package(value.__module__):
-            yield f"{value.__qualname__} {getattr(value, '_fields', '')}"
+        yield f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
     elif isinstance(value, tuple):
+        yield f"{len(value)} members"
         yield from _words(type(value), seen)
         for each in value:
-            yield from _words(each, seen, user)
+            yield from _words(each, seen)
     elif isinstance(value, NUMBERS):
-        yield from [repr(value)] if user else []
-    elif not (isinstance(value, (ModuleType, BuiltinFunctionType, np.ufunc)) or value is Ellipsis):
+        yield repr(value)
+    elif isinstance(value, (ModuleType, BuiltinFunctionType, np.ufunc)):
+        yield value.__name__
+    elif value is Ellipsis:
+        yield "..."
+    else:
         raise _UnknownCodeError
 
 
-def _words_of_function(function: FunctionType, seen: set[int]) -> Iterator[str]:
+def _words_of_function(function: FunctionType, seen: dict[int, int]) -> Iterator[str]:
+    yield f"{function.__qualname__} {function.__defaults__} {function.__kwdefaults__}"
+    yield from _words_of_code(function.__code__)
     user = not _is_of_a_package(function.__module__)
-    if user:
-        yield f"{function.__qualname__} {function.__defaults__} {function.__kwdefaults__}"
-        yield from _words_of_code(function.__code__)
-        for name in _global_names(function.__code__):
-            value = function.__globals__.get(name, getattr(builtins, name, None))
-            if isinstance(value, ModuleType) and not _is_of_a_package(value.__name__):
-                raise _UnknownCodeError
-            yield name
-            yield from _words(value, seen, user)
-    elif function.__globals__ is not vars(sys.modules.get(function.__module__, builtins)):  # made by exec
-        for name in _global_names(function.__code__):
-            yield from _words(function.__globals__.get(name, getattr(builtins, name, None)), seen)
+    made_by_exec = function.__globals__ is not vars(sys.modules.get(function.__module__, builtins))
+    for name in _global_names(function.__code__) if user or made_by_exec else ():
+        value = function.__globals__.get(name, getattr(builtins, name, None))
+        if user and isinstance(value, ModuleType) and not _is_of_a_package(value.__name__):
+            raise _UnknownCodeError
+        yield name
+        yield from _words(value, seen)
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        yield from [name] if user else []
-        yield from _words(cell.cell_contents, seen, user)
+        yield name
+        yield from _words(cell.cell_contents, seen)
 
 
 def _words_of_code(code: CodeType) -> Iterator[str]:

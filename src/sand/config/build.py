@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from ..arguments import checked
-from ..box import Box, as_box
+from ..box import Box
 from ..errors import BadInput
 from ..forces.own import import_modules
 from ..grains import Grains
 from ..io.checkpoint import newest_checkpoint
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
-from ..setup.from_file import TEXT_SUFFIXES, body_from_file, from_trajectory
+from ..paths import user_path
+from ..setup.from_file import from_trajectory, is_own_trajectory, start_from_file
 from ..setup.from_frame import Start
 from ..setup.gas import gas_with_contacts
 from ..simulation.condition import GIVEN
@@ -101,10 +103,11 @@ def _of_gas(case: Case) -> Start:
 def _of_file(case: Case) -> Start:
     section, path = case.grains, Path(case.grains.file or "")
     try:
-        if path.suffix in TEXT_SUFFIXES:
-            start = _of_body(case, path)
-        else:
-            start = from_trajectory(path, section.frame, case.materials_by_name())
+        if not is_own_trajectory(path):
+            return _of_other(case, path)
+        if extra := [name for name in ("radius", "length") if getattr(section, name) is not None]:
+            raise BadInput(f"{extra[0]}: the trajectory {path} has it; leave {extra[0]} out")
+        start = from_trajectory(path, section.frame, case.materials_by_name())
     except BadInput as error:
         raise error.at("grains") from None
     given = section.material if isinstance(section.material, list) else [section.material]
@@ -119,16 +122,15 @@ def _of_file(case: Case) -> Start:
     return start
 
 
-def _of_body(case: Case, path: Path) -> Start:
-    """Grains of extended XYZ or plain columns, shifted so that their centre of mass is at the origin."""
+def _of_other(case: Case, path: Path) -> Start:
+    """Grains of a file that is no trajectory of SAND."""
     section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
         raise BadInput("material of grains in a file must be one name; several materials are named in the file itself")
     own = library[section.material]
     one = own if "material" in section.model_fields_set else None
-    body = body_from_file(path, one, section.radius, section.length, library, otherwise=own)
-    note = f"{path}, centred on the centre of mass"
-    return Start(body, None, as_box(case.box.periodic), note)
+    given = section.radius, section.length, library, own, section.frame
+    return start_from_file(path, case.box.periodic, one, *given)
 
 
 def same_box(first: Box, second: Box) -> bool:
@@ -196,11 +198,11 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
         If there is no checkpoint, it is damaged, the case needs a force that SAND does not know, or another process
         writes to the folder.
     """
-    place = Path(folder)
+    place = user_path(folder)
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
     import_modules(imports)
-    if not any(place.glob("checkpoint-*.npz")):
+    if not checkpoint_files(place):
         advice = ""
         if (place / TRAJECTORY).exists():
             advice = f"; to start a new run from its last frame: sand run --from {shlex.quote(str(place))}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -56,7 +57,7 @@ class RunSection(Section):
     stop: str | None = None
     """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
     ledger compared (< <= > >= == !=) with numbers with units; checked every 100 steps, with rigid clusters in every
-    step, see `Simulation.run`."""
+    step. "wall > 23 h" stops the run after this wall time, to be continued. See `Simulation.run`."""
     frame_every: Cadence | None = None
     """Frames: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default 1/200
     of the run."""
@@ -123,7 +124,7 @@ class MaterialSection(Section):
 
 
 class GrainsSection(Section):
-    """[grains]: a gas of grains, or grains of a `file`: a frame of a trajectory, or a body; "given": from a script."""
+    """[grains]: a gas of grains, or grains of a `file`: a frame, free grains or bodies; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
@@ -151,11 +152,12 @@ class GrainsSection(Section):
     """Length of the gas along open axes of the box [m]: one, or three with "periodic" along periodic axes; the gas is
     centred on the origin, and its members are wholly inside."""
     file: PathName | None = None
-    """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
+    """Run folder, trajectory or body of SAND, or a file of another program: XYZ, columns, CSV, LAMMPS data and dump,
+    GSD; its content tells the format."""
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
-    """Index of the frame of a trajectory; −1 is the last."""
+    """Index of the frame; −1 is the last."""
     length: str | None = None
-    """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
+    """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> GrainsSection:
@@ -392,7 +394,7 @@ def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, 
     for table in [*tables, *(one for each in tables for one in _tables_in(each.get("classes")))]:
         file = table.get("file")
         if isinstance(file, str) and file.strip() and "\0" not in file:  # others are reported by the validation
-            table["file"] = str((Path(path).parent / Path(file).expanduser()).absolute())
+            table["file"] = str((Path(path).parent / os.path.expanduser(file)).absolute())
     return whole
 
 

@@ -9,10 +9,12 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import BadInput, did_you_mean
+from ..errors import BadInput, did_you_mean, first_problems
 from .sections import INTEGRATORS
 
 Model = TypeVar("Model", bound=BaseModel)
+MOST_ERRORS = 100
+"""Errors of a case file that are described, each of which takes milliseconds; the others are counted."""
 RENAMED = {"path": "file"}
 """Keys of earlier versions, with their present names."""
 
@@ -34,13 +36,15 @@ def validate(model: type[Model], content: Any, name: str, problems: Iterable[str
     Raises
     ------
     BadInput
-        All errors, one line each.
+        All errors, one line each, the first `MOST_ERRORS` of this model.
     """
     found, case = list(problems), None
     try:
         case = model.model_validate(content)
     except ValidationError as error:
-        found += [line for slip in error.errors() for line in _messages(slip, model, table)]
+        slips = error.errors()
+        lines = [line for slip in slips[:MOST_ERRORS] for line in _messages(slip, model, table)]
+        found += first_problems(lines, len(lines) + max(len(slips) - MOST_ERRORS, 0), "errors")
     if found or case is None:
         raise BadInput(f"{name}: {problem}" for problem in found)
     return case

@@ -14,7 +14,7 @@ from ..grains import moment_size
 from ..integrate.registry import INTEGRATORS
 from ..integrate.rigid_clusters import RigidClusters
 from ..integrate.verlet import Verlet
-from ..io.run_folder import checked_name
+from ..paths import checked_name
 from ..setup.grain_classes import material_as_given, radius_as_given
 from ..simulation.cadence import duration, read_cadence
 from ..units import si

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import tomli_w
 from pydantic import BaseModel
 
-from ..descriptions import parameter_docs
+from ..descriptions import docstring, parameter_docs
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
 from ..material import PRESETS, Material
@@ -137,7 +137,7 @@ def _toml(value: Any) -> str:
 
 def summary(kind: type) -> str:
     """The first line of the docstring of a class."""
-    return (inspect.getdoc(kind) or "").splitlines()[0]
+    return docstring(kind).partition("\n")[0]
 
 
 def material_table() -> Table:

@@ -22,6 +22,7 @@ from ..grains import Grains
 from ..integrate.base import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
+from ..paths import user_path
 from ..setup.encounters import encounter, turned_at_random
 from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
@@ -130,7 +131,7 @@ def resume_collision(
     requested, stored = (case_of(one, math.inf, math.inf) for one in (prepare(start, forces, stepping), simulation))
     changed = [name for name in requested if name != "run" and requested[name] != stored[name]]
     try:
-        with closing(Frames(Path(folder) / TRAJECTORY)) as frames:
+        with closing(Frames(user_path(folder, "folder") / TRAJECTORY)) as frames:
             first = frames[0]
     except BadInput:  # missing or damaged; the resumed run repairs it
         first = None

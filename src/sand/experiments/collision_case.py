@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -28,6 +26,7 @@ from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, prepare, run_to_end
+from .executors import results_of
 
 BodyKind = Literal[
     "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
@@ -41,15 +40,17 @@ class BodySection(Section):
     kind: BodyKind
     """Builder (as for `sand build`), or `file`."""
     file: PathName | None = None
-    """File of the body, relative to the case file; required with `kind = "file"`."""
+    """File of the body, relative to the case file, in any format of `file` in [grains]; required with
+    `kind = "file"`."""
     length: str | None = None
-    """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
+    """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
     grains: Count | None = None
     """Number of grains; required except for a grain, a lattice or a file."""
     shape: list[Count] | None = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
     radius: Any = None
-    """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; optional for a file."""
+    """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
+    radii."""
     material: str = "silica"
     """Preset or name in [materials]."""
     moment: Moment | None = None
@@ -178,10 +179,8 @@ def read_collision(path: str | Path) -> CollisionCase:
 
 def run_seed(content: dict[str, Any], seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
     """Simulate one collision of a case and return the outcome as a dictionary; runs in worker processes."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        case = with_integrator(CollisionCase, content).model_validate(content)
-        return case.run(seed, observers=list(observers))[0].to_dict()
+    case = with_integrator(CollisionCase, content).model_validate(content)
+    return case.run(seed, observers=list(observers))[0].to_dict()
 
 
 def run_seeds(
@@ -212,20 +211,8 @@ def run_seeds(
     work = partial(run_seed, case, observers=() if executor is not None else observers)
     found = dict(known or {})
     left = [seed for seed in dict.fromkeys(seeds) if seed not in found]
-    for seed, outcome in _outcomes(work, left, executor):
+    for seed, outcome in results_of(executor, work, left):
         found[seed] = outcome
         if keep is not None:
             keep(seed, outcome)
     return [found[seed] for seed in seeds]
-
-
-def _outcomes(
-    work: Callable[[int], dict[str, Any]], seeds: list[int], executor: Any
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Pairs of seed and outcome, in order of completion."""
-    if executor is None:
-        yield from ((seed, work(seed)) for seed in seeds)
-        return
-    waiting = {executor.submit(work, seed): seed for seed in seeds}
-    for future in as_completed(waiting):
-        yield waiting[future], future.result()

@@ -11,6 +11,7 @@ from typing import Any
 from ..compiler.progress import announce
 from ..config.case import with_absolute_files
 from ..errors import BadInput
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import (
     CASE,
@@ -106,7 +107,7 @@ class CollisionJob:
     def _one(self, seed: int, observers: Sequence[Any]) -> dict[str, Any]:
         """Simulate a single collision with all files of a run."""
         start, case, own = self._with_case_name(lambda: self.case.approach(seed)), self.case, list(observers)
-        if self.resume and any(self.folder.glob("checkpoint-*.npz")):
+        if self.resume and checkpoint_files(self.folder):
             simulation = resume_collision(start, self.folder, *case.physics(), observers=own)
         else:  # without a checkpoint there is nothing to resume
             replace = self.overwrite or self.resume

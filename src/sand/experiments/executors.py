@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
+import os
 import re
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import partial
+from multiprocessing.connection import wait
+from typing import Any
 
-from ..errors import BadInput, import_optional
-from ..forces.own import IMPORTED, import_modules
-from ..threads import set_threads
+from ..errors import BadInput, import_optional, warn
+from ..forces.own import IMPORTED
+from ..simulation.signals import STOPS
+from .worker import SHIELDED, Item, Result, begin_worker, do_task, done_apart
 
 ANSWER = 10.0
 """Timeout of the connection to a scheduler [s]."""
+LONGEST_STOP = 60.0
+"""Wall time [s] that workers get to write their checkpoints; they need it only on a very slow disk."""
 MOST_ON_WINDOWS = 61
 """Largest number of processes of a pool on Windows, a limit of `concurrent.futures`."""
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable by which Python leaves the current folder out of its path."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
@@ -29,7 +38,9 @@ def executor_for(
 ) -> Iterator[Executor | None]:
     """Context manager of an executor; None for a single worker, which is this process.
 
-    Exceptions in the block, including Ctrl-C, terminate the worker processes; each run writes its checkpoint first.
+    An exception in the block, also Ctrl-C or the death of a worker, stops all worker processes: no task begins after
+    it, and runs that write files end with a checkpoint. Workers do the same when this process dies. Tasks that a dask
+    worker has begun go on to their end, all others are cancelled.
 
     Parameters
     ----------
@@ -55,44 +66,114 @@ def executor_for(
     elif workers > MOST_ON_WINDOWS and sys.platform == "win32":
         raise BadInput(f"workers = {workers}; on Windows Python starts at most {MOST_ON_WINDOWS} processes")
     else:
-        context = multiprocessing.get_context("spawn")
-        begin = partial(_begin_worker, threads or 1, list(IMPORTED))
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=begin) as pool:
-            _start(pool, workers)
-            processes = list((getattr(pool, "_processes", None) or {}).values())
+        with _starting():  # the first lock of a pool starts a process, too
+            pool = _Pool(workers, threads or 1)
+        with pool:
             try:
+                pool.start(workers)
                 yield pool
             except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                for process in processes:  # otherwise the program would wait for their current tasks
-                    process.terminate()
+                pool.stop()
                 raise
 
 
-def _begin_worker(threads: int, imports: list[str]) -> None:
-    """Ignore Ctrl-C, which a terminal sends to all processes; only the parent handles it and shows notes."""
-    from ..compiler.progress import suppress_notes
+def results_of(
+    executor: Executor | None, work: Callable[[Item], Result], items: Sequence[Item]
+) -> Iterator[tuple[Item, Result]]:
+    """Pairs of item and `work(item)`, in order of completion; warnings of other processes are issued in this one.
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    set_threads(threads)
-    suppress_notes()
-    import_modules(imports)
-
-
-def _nothing() -> None:
-    """Task that makes the pool start a process."""
-
-
-def _start(pool: Executor, workers: int) -> None:
-    """Start all processes, which ignore Ctrl-C from their start."""
-    in_main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main else None
+    Parameters
+    ----------
+    executor : Executor or None
+        Any `concurrent.futures.Executor`; None works through the items in this process, in their order.
+    """
+    if executor is None:
+        yield from ((item, work(item)) for item in items)
+        return
+    waiting = {executor.submit(done_apart, os.getpid(), work, item): item for item in items}
     try:
-        for future in [pool.submit(_nothing) for _ in range(workers)]:
-            future.result()
+        for future in as_completed(waiting):
+            result, warnings = future.result()
+            for text in warnings:
+                warn(text)
+            yield waiting[future], result
     finally:
-        if in_main:
-            signal.signal(signal.SIGINT, before)
+        for future in waiting:
+            future.cancel()
+
+
+class _Pool(ProcessPoolExecutor):
+    """Worker processes that end with this process, and after the task that a signal stops."""
+
+    def __init__(self, workers: int, threads: int):
+        begin = partial(begin_worker, threads, list(IMPORTED))
+        super().__init__(workers, mp_context=multiprocessing.get_context("spawn"), initializer=begin)
+        self._workers = self._processes  # the base class drops its own
+        self._has_started = False
+
+    def submit(self, work: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        """Submit a task; starts a process if there are fewer than `workers`."""
+        with _starting():
+            return super().submit(do_task, work, *given, **named)
+
+    def start(self, workers: int) -> None:
+        """Start all processes, and wait until they are ready."""
+        for future in [self.submit(int) for _ in range(workers)]:
+            future.result()
+        self._has_started = True
+
+    def stop(self) -> None:
+        """Stop all processes: those that write the files of a run write a checkpoint first."""
+        manager: Any = self._executor_manager_thread
+        self.shutdown(wait=False, cancel_futures=True)
+        processes = list(self._workers.values())
+        with _only_ctrl_c():
+            try:
+                for process in processes if self._has_started else ():
+                    process.terminate()
+                left = {process.sentinel for process in processes} if self._has_started else set()
+                while left and (ended := wait(left, LONGEST_STOP)):
+                    left -= set(ended)
+            finally:  # also after a second Ctrl-C
+                for process in processes:
+                    process.kill()
+                if manager is not None:  # at the end of the program it must not be at work
+                    manager.join(LONGEST_STOP)
+
+
+@contextmanager
+def _only_ctrl_c() -> Iterator[None]:
+    """In the block, which runs after a first signal, only Ctrl-C interrupts: other signals may be sent repeatedly."""
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        before = {number: signal.signal(number, signal.SIG_IGN) for number in set(STOPS) - {signal.SIGINT}}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _starting() -> Iterator[None]:
+    """In the block new processes begin without the current folder on their path, and with blocked signals.
+
+    A terminal or a batch system sends signals to all processes; workers wait for the one of this process instead.
+    Later they get the path of this process.
+    """
+    before = os.environ.get(SAFE_PATH)
+    can_block = hasattr(signal, "pthread_sigmask")
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {*SHIELDED, signal.SIGTERM}) if can_block else set()
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
+        if can_block:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 @contextmanager
@@ -106,4 +187,9 @@ def _dask(address: str) -> Iterator[Executor]:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BadInput(f"the scheduler at {address} does not answer within {ANSWER:g} s ({reason})") from None
     with client, client.get_executor(pure=False, retries=3) as executor:
-        yield executor
+        try:
+            yield executor
+        except BaseException:
+            with contextlib.suppress(Exception):  # a scheduler that no longer answers
+                executor.shutdown(wait=False)  # cancels what has not begun, and waits for nothing
+            raise

@@ -15,6 +15,7 @@ from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..analysis.growth_law import LocalDegree, RateLaw, local_degrees, rate_law
 from ..errors import BadInput
 from ..io import run_folder as files
+from ..paths import user_path
 from ..results import Run
 from .growth_boxes import grow, run_box, shared_settings
 
@@ -93,7 +94,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
     frames.close()
     moments = np.linalg.norm(first.moment, axis=1)
     return BoxResult(
-        Path(folder),
+        user_path(folder),
         ledger["time"],
         ledger["mean_cluster_size"],
         len(first),
@@ -113,7 +114,7 @@ def boxes_in(folder: str | Path) -> list[Path]:
     BadInput
         If there is none.
     """
-    place = Path(folder)
+    place = user_path(folder)
     if (place / files.TRAJECTORY).exists():
         return [place]
     found = [one.parent for one in place.glob(f"*/{files.TRAJECTORY}")]
@@ -220,6 +221,10 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
             raise BadInput("the grains have no moments")
         return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
 
+    def dimension() -> Dimension:
+        sized = ~np.isnan(rows["gyration_radius"])  # percolating ones have none
+        return ensemble_dimension(rows["grains"][sized], rows["gyration_radius"][sized], boxes[0].radius, of_box[sized])
+
     # moments that vanish within rounding have no logarithm
     heavy = (rows["grains"] >= LEAST) & (rows["moment"] > 1e-9 * boxes[0].moment)
     return GrowthResult(
@@ -231,7 +236,7 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
         law("slope", lambda: _slope(*_within(time, sizes, chosen))),
         law("moment", lambda: moment_law(heavy)),
         law("moment_without_rings", lambda: moment_law(heavy & (rows["rings"] == 0))),
-        law("dimension", lambda: ensemble_dimension(rows["grains"], rows["gyration_radius"], boxes[0].radius, of_box)),
+        law("dimension", dimension),
         missing,
         _temperatures(boxes),
     )

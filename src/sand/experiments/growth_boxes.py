@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
@@ -11,10 +11,16 @@ from typing import Any
 
 from ..config.build import resume, simulation_of
 from ..config.case import check_case
-from ..errors import BadInput
+from ..errors import BadInput, warn
 from ..io import run_folder as files
+from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
+from ..paths import user_path
 from ..simulation.serialise import case_of
+from .executors import results_of
+
+PATIENCE = 10.0
+"""Longest wall time [s] to wait for another process that writes to the folder for a moment."""
 
 
 def grow(
@@ -27,7 +33,8 @@ def grow(
 ) -> list[Path]:
     """Run the same box for many seeds, each in its own folder; existing runs are resumed.
 
-    The folder receives the case (case.toml) and, at the end, the summaries of all boxes (growth.json).
+    The folder receives the case (case.toml) and, when all boxes are finished, their summaries (growth.json). Several
+    processes may run different seeds in the same folder.
 
     Parameters
     ----------
@@ -56,19 +63,21 @@ def grow(
     Interrupted
         By Ctrl-C; the same call resumes.
     """
-    place = Path(folder)
+    place = user_path(folder)
     check_case(content, "case")
-    places = [place / f"seed-{seed}" for seed in seeds]
-    _refuse_other_boxes(place, places, content)
+    places = {seed: place / f"seed-{seed}" for seed in seeds}
     files.make_folder(place, shared=True)
-    with writing(place):
-        all_seeds = _describe(place, content, seeds)
-        _run_all(content, seeds, places, executor, on_result, observers)
+    with writing(place, patience=PATIENCE):
+        _refuse_other_boxes(place, list(places.values()), content)
+        _describe(place, content, seeds)
+    _run_all(content, places, executor, on_result, observers)
+    with writing(place, patience=PATIENCE):
+        all_seeds = files.read_toml(place / files.CASE)["grow"]["seeds"]  # also those of other processes
         ends = {seed: _finished_summary(place / f"seed-{seed}") for seed in all_seeds}
         if all(ends.values()):
             named = {f"seed-{seed}": end for seed, end in ends.items()}
             files.write_json(place / files.GROWTH, {"seeds": all_seeds, "boxes": named})
-    return places
+    return list(places.values())
 
 
 def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, Any]) -> None:
@@ -92,27 +101,37 @@ def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, 
 
 def _run_all(
     content: dict[str, Any],
-    seeds: Sequence[int],
-    places: Sequence[Path],
+    places: Mapping[int, Path],
     executor: Executor | None,
     on_result: Callable[[int, str], None] | None,
     observers: Sequence[Any],
 ) -> None:
     """Run the boxes of `grow`. Raises BadInput for boxes that stopped for physical reasons."""
-    run, own = (map, observers) if executor is None else (executor.map, ())
-    outcomes = run(partial(run_box, content, observers=own), seeds, map(str, places))
-    problems = []
-    for seed, one, outcome in zip(seeds, places, outcomes, strict=True):
+    folders = {seed: str(place.absolute()) for seed, place in places.items()}  # workers may be in another folder
+    run = partial(_run_one, content, folders)
+    if executor is None:
+        run = partial(run, observers=observers)
+    outcomes: dict[int, str] = {}
+    for seed, outcome in results_of(executor, run, list(places)):
+        outcomes[seed] = outcome
         if on_result is not None:
             on_result(seed, outcome)
-        if outcome != "finished":
-            problems.append(f"seed {seed}: stopped ({outcome}); see {one / files.SUMMARY}")
+    problems = []
+    for seed, place in places.items():
+        if outcomes[seed] != "finished":
+            problems.append(f"seed {seed}: stopped ({outcomes[seed]}); see {place / files.SUMMARY}")
+        elif not (place / files.SUMMARY).exists():
+            problems.append(f"seed {seed}: finished, but not in {place}; its worker must see the same folders")
     if problems:
         raise BadInput(problems)
 
 
-def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> list[int]:
-    """Write the case to the folder, with the seeds of all boxes present or requested; returns these seeds.
+def _run_one(content: dict[str, Any], places: Mapping[int, str], seed: int, observers: Sequence[Any] = ()) -> str:
+    return run_box(content, seed, places[seed], observers)
+
+
+def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> None:
+    """Write the case to the folder, with the seeds of all boxes present or requested.
 
     Raises
     ------
@@ -122,13 +141,16 @@ def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> lis
     path = place / files.CASE
     before: list[int] = []
     if path.exists():
+        if not files.was_written_by_sand(path):
+            raise BadInput(
+                f"{path} is not from SAND, and the case file of the job would replace it; give another folder"
+            )
         before = files.read_toml(path).get("grow", {}).get("seeds", [])
         if not before:
             raise BadInput(f"{place} contains a run; give another folder for the boxes")
     (place / files.GROWTH).unlink(missing_ok=True)  # written when all boxes are finished
     all_seeds = sorted({*before, *seeds})
     files.write_toml(path, {**content, "grow": {"seeds": all_seeds}}, "settings of sand grow, read by sand resume")
-    return all_seeds
 
 
 def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence[Any] = ()) -> str:
@@ -137,12 +159,15 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     Raises
     ------
     BadInput
-        If the folder contains a run of another case.
+        If the folder contains a run of another case, or another process writes to it.
     """
-    place, case, own = Path(folder), check_case(content, "case"), list(observers)
+    place, case, own = user_path(folder), check_case(content, "case"), list(observers)
+    if place.is_dir():
+        with writing(place, patience=PATIENCE):  # a worker whose parent was killed may be writing its checkpoint
+            pass
     case.run.seed = seed
     until = case.run.until
-    if any(place.glob("checkpoint-*.npz")):
+    if checkpoint_files(place):
         simulation = resume(place, observers=own)
         requested, stored = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
         if changed := [name for name in requested if name != "run" and requested[name] != stored[name]]:
@@ -163,9 +188,13 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
 
 
 def _finished_summary(place: Path) -> dict[str, Any]:
-    """Summary of a finished run; empty if it has not finished."""
+    """Summary of a finished run; empty if it has not finished, or is damaged."""
     path = place / files.SUMMARY
-    summary = files.read_json(path) if path.exists() else {}
+    try:
+        summary = files.read_json(path) if path.exists() else {}
+    except BadInput as error:
+        warn(f"{error}; the end of this run is computed again")
+        summary = {}
     return summary if summary.get("outcome") == "finished" else {}
 
 

@@ -13,6 +13,7 @@ from ..analysis.fits import separation
 from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
+from ..paths import user_path
 from .growth import BoxResult, GrowthResult, Temperatures, all_aggregates, boxes_in, growth_of, joined, read_box
 
 NAMES = ("analysis.json", "growth.csv", "degrees.csv", "aggregates.csv", "growth.png")
@@ -44,7 +45,7 @@ def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None)
     """
     boxes = [read_box(one) for one in boxes_in(folder)]
     try:
-        return Ensemble(Path(folder).absolute().name, growth_of(boxes, window), boxes)
+        return Ensemble(user_path(folder).absolute().name, growth_of(boxes, window), boxes)
     except BadInput as error:
         raise error.at(str(folder)) from None
 

@@ -18,7 +18,10 @@ from ..errors import BadInput
 from ..io.run_folder import replace_file
 from ..io.table import write_table
 from ..theory.kinetics import CollisionKernel, KernelFunction
+from ..units import in_unit, si_array
 
+UNITS = ("kg", "kg", "m^2", "m/s")
+"""Units of the numbers in a row of measurements."""
 GRAM, CUBIC_CM = 1e3, 1e6
 """Grams per kg, cm³ per m³."""
 
@@ -84,11 +87,24 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Col
 
 @checked
 def on_grid(kernel: KernelFunction, masses: np.ndarray) -> np.ndarray:
-    """Tabulate K(m_i, m_j) (K, K) [m³/s] on increasing masses (K,) [kg] > 0. Raises BadInput."""
-    m = np.asarray(masses, float)
+    """Tabulate K(m_i, m_j) (K, K) [m³/s] on increasing masses.
+
+    Parameters
+    ----------
+    kernel : KernelFunction
+        K(m1, m2) [m³/s].
+    masses : array_like
+        (K,) [kg] > 0, increasing.
+
+    Raises
+    ------
+    BadInput
+        If masses are invalid or not increasing, or the kernel returns no numbers in m³/s.
+    """
+    m = si_array(masses, "kg", "masses")
     if m.ndim != 1 or not len(m) or not (np.isfinite(m) & (m > 0.0)).all() or not (np.diff(m) > 0.0).all():
         raise BadInput("masses must be finite, above 0 kg, and increasing")
-    return np.asarray(kernel(*np.broadcast_arrays(m[:, None], m[None, :])), float)
+    return si_array(kernel(*np.broadcast_arrays(m[:, None], m[None, :])), "m^3/s", "kernel(m1, m2)")
 
 
 @checked
@@ -111,7 +127,7 @@ def write_csv(path: str | Path, kernel: KernelFunction, masses: np.ndarray) -> N
     FilesFailed
         If the file cannot be written.
     """
-    table, m = on_grid(kernel, masses), np.asarray(masses, float)
+    table, m = on_grid(kernel, masses), si_array(masses, "kg", "masses")
     i, j = np.triu_indices(len(m))
     columns = {"mass1": m[i], "mass2": m[j], "kernel": table[i, j]}
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
@@ -122,7 +138,21 @@ def write_csv(path: str | Path, kernel: KernelFunction, masses: np.ndarray) -> N
 def write_cgs(path: str | Path, kernel: KernelFunction, masses: np.ndarray) -> None:
     """Write text for `numpy.loadtxt`: masses (K,) [g] in the first row, then K (K, K) [cm³/s].
 
-    Parameters and errors as for `write_csv`.
+    Parameters
+    ----------
+    path : str or Path
+        File.
+    kernel : KernelFunction
+        K(m1, m2) [m³/s].
+    masses : array_like
+        (K,) [kg] > 0, increasing.
+
+    Raises
+    ------
+    BadInput
+        If masses are invalid or not increasing.
+    FilesFailed
+        If the file cannot be written.
     """
     table = np.vstack([np.multiply(masses, GRAM), on_grid(kernel, masses) * CUBIC_CM]).tolist()
     lines = ["# collision kernel; first row: masses m_j [g]; row 1 + i: K(m_i, m_j) [cm^3/s]"]
@@ -154,7 +184,7 @@ def for_dustpy(table: Any, scale_heights: Any) -> np.ndarray:
     BadInput
         If the shapes do not match.
     """
-    k, height = np.asarray(table, float), np.asarray(scale_heights, float)
+    k, height = si_array(table, "cm^3/s", "table"), si_array(scale_heights, "cm", "scale_heights")
     if height.ndim != 2 or k.shape != (height.shape[1], height.shape[1]) or not (height > 0.0).all():
         raise BadInput(f"table {k.shape} and scale heights {height.shape} must be (Nm, Nm) and (Nr, Nm), these above 0")
     squares = height**2
@@ -165,7 +195,7 @@ def for_dustpy(table: Any, scale_heights: Any) -> np.ndarray:
 
 def _rows(rows: Iterable[Sequence[Any]]) -> np.ndarray:
     try:
-        table = np.array([[float(value) for value in row] for row in rows])
+        table = np.array([[in_unit(v, unit) for v, unit in zip(row, UNITS, strict=True)] for row in rows], float)
     except (TypeError, ValueError):
         table = np.zeros(0)
     if table.ndim != 2 or table.shape[1] != 4 or not (np.isfinite(table) & (table > 0.0)).all():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import keyword
+import os
 import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterable
@@ -20,7 +21,7 @@ from ..compiler.jit import compile_error, formula
 from ..descriptions import described
 from ..errors import BadInput, did_you_mean
 from ..grains import Grains
-from ..units import si
+from ..units import finite_number
 from .external.formulas import GrainState
 from .pair.cutoff import CutoffForce, cutoff_for
 from .pair.generic_loops import PairGrain, PairParameters, pair_sums
@@ -150,7 +151,7 @@ class OwnForce:
     def __repr__(self) -> str:
         return f"<{self.where}, {self.path}>"
 
-    def __call__(self, **values: Any) -> OwnExternal | OwnPair:
+    def __call__(self, /, **values: Any) -> OwnExternal | OwnPair:
         """Make the force from values of its parameters: SI numbers, text with a unit, or three of these."""
         options = {key: values.pop(key) for key in ("cutoff", "cut") if self.pair and key in values}
         allowed = [*self.units, *(("cutoff", "cut") if self.pair else ())]
@@ -159,14 +160,17 @@ class OwnForce:
             for key in values
             if key not in self.units
         ]
-        read = {}
+        read: dict[str, Any] = {}
         for key, unit in self.units.items():
             if key not in values:
                 problems.append(f"{self.name}: {key} is missing; add {key}=… in {unit}")
                 continue
-            read_one = si if components(values[key]) is None else three
+            label = f"{self.name}: {key}"
             try:
-                read[key] = read_one(values[key], unit, f"{self.name}: {key}")
+                if components(values[key]) is None:
+                    read[key] = finite_number(values[key], unit, label)
+                else:
+                    read[key] = three(values[key], unit, label, read=finite_number)
             except BadInput as error:
                 problems += error.problems
         if problems:
@@ -362,7 +366,8 @@ def import_modules(names: Iterable[str]) -> None:
     BadInput
         If a module cannot be imported.
     """
-    for name in [names] if isinstance(names, str) else names:
+    for given in [names] if isinstance(names, str) else names:
+        name = os.path.expanduser(given)
         folder, module = ("", name) if not name.endswith(".py") else (str(Path(name).parent), Path(name).stem)
         sys.path.insert(0, str(Path(folder).absolute()))
         try:

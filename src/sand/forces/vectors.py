@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..errors import BadInput
+from ..errors import BadInput, shown
 from ..units import si
 
 
 def components(value: Any) -> list[Any] | None:
     """The entries of a sequence; None for a single quantity (a number, text, a quantity with a unit)."""
-    if isinstance(value, str):
+    if isinstance(value, (str, bytes, Mapping)):
         return None
     try:
         return list(value)
@@ -18,7 +19,7 @@ def components(value: Any) -> list[Any] | None:
         return None
 
 
-def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
+def three(value: Any, unit: str, name: str, *, read: Callable[..., float] = si) -> tuple[float, float, float]:
     """Convert three components to SI.
 
     Parameters
@@ -29,6 +30,8 @@ def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
         The SI unit, "1" for dimensionless numbers.
     name : str
         Name of the parameter in error messages.
+    read : callable, optional
+        Converts one component, as `units.si` does.
 
     Returns
     -------
@@ -43,11 +46,11 @@ def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
     entries = components(value)
     if entries is None or len(entries) != 3:
         expected = "numbers, such as [0, 0, 1]" if unit == "1" else f"components, in {unit}"
-        raise BadInput(f"{name} = {value!r} must be three {expected}")
+        raise BadInput(f"{name} = {shown(value)} must be three {expected}")
     numbers, problems = [], []
     for entry, axis in zip(entries, "xyz", strict=True):
         try:
-            numbers.append(si(entry, unit, f"{name} {axis}"))
+            numbers.append(read(entry, unit, f"{name} {axis}"))
         except BadInput as error:
             problems += error.problems
     if problems:
@@ -68,5 +71,5 @@ def along_z(value: Any, unit: str, name: str, direction: float = 1.0) -> tuple[f
         return 0.0, 0.0, 0.0 + direction * si(value, unit, f"{name} z")
     if len(entries) != 3:
         axis = "z" if direction > 0.0 else "−z"
-        raise BadInput(f"{name} = {value!r} must be one value along {axis} or three components, in {unit}")
+        raise BadInput(f"{name} = {shown(value)} must be one value along {axis} or three components, in {unit}")
     return three(entries, unit, name)

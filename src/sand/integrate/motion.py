@@ -67,6 +67,14 @@ def _no_moment(grains, i, q):
     """For grains without moments."""
 
 
+@formula
+def count_crossings(grains, i, position, span):
+    """Count how often grain i crosses the periodic box before `nearest_image` brings `position` [m] back into it."""
+    grains.image[0, i] += np.int32(np.rint(position[0] * span.inverse_x))
+    grains.image[1, i] += np.int32(np.rint(position[1] * span.inverse_y))
+    grains.image[2, i] += np.int32(np.rint(position[2] * span.inverse_z))
+
+
 @functools.cache
 def drift_for(magnetic: bool) -> Callable:
     """The loop of the first half of a step; if `magnetic`, moments rotate with their grains."""
@@ -83,7 +91,9 @@ def drift_for(magnetic: bool) -> Callable:
             i = first + k
             v, w = kicked(grains, i, 0.5 * dt)
             fastest = max(fastest, magnitude_bits(dot(v, v)))
-            put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
+            position = axpy(dt, v, load(grains.position, i))
+            put(grains.position, i, nearest_image(position, span))
+            count_crossings(grains, i, position, span)
             q = turn(load4(grains.orientation, i), scale(dt, w))
             put4(grains.orientation, i, q)
             rotate_moment(grains, i, q)
@@ -96,4 +106,6 @@ def drift_for(magnetic: bool) -> Callable:
 def wrap_all(grains, span):
     """Wrap all positions into the periodic box."""
     for i in range(grains.mass.size):
-        put(grains.position, i, nearest_image(load(grains.position, i), span))
+        position = load(grains.position, i)
+        put(grains.position, i, nearest_image(position, span))
+        count_crossings(grains, i, position, span)

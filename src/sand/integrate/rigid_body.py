@@ -23,6 +23,7 @@ from ..compiler.jit import formula, loop
 from ..numerics.quaternion import normalised, turned, turned_back
 from ..numerics.vec import accrue, add, axpy, cross, dot, load, load4, norm, put, put4, scale, sub
 from ..state.state import BODIES
+from .motion import count_crossings
 
 LARGEST_PIECE = 0.1
 """Free rotation is computed in pieces t with t |L| √(…) at most this, see `parting_rate`, and at most η, so that its
@@ -198,7 +199,10 @@ def place_grains(grains, bodies, b, span, is_wrapped):
         i = bodies.member[k]
         position = add(centre, turned(q, load(bodies.offset, i)))
         if is_wrapped:
-            put(grains.position, i, nearest_image(position, span))
+            wrapped = nearest_image(position, span)
+            # both are within the box: they are most of a box apart if the grain has crossed a boundary between them
+            count_crossings(grains, i, sub(load(grains.position, i), wrapped), span)
+            put(grains.position, i, wrapped)
         else:
             accrue(grains.position, i, nearest_image(sub(position, load(grains.position, i)), span))
         own = product(q, load4(bodies.turn, i))

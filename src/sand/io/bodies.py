@@ -1,86 +1,181 @@
-"""Bodies in files: extended XYZ, GSD, or plain columns."""
+"""Grains in files of any format, and bodies that are written as extended XYZ or GSD."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS
 from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
+from ..paths import user_path
 from ..units import si
-from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
+from .extended_xyz import xyz_text
 from .frame import MODES
-from .run_folder import read_text, replace_file
+from .grain_files import FileBox, GrainData, is_gsd, open_grains
+from .run_folder import replace_file
 from .trajectory import Frames, TrajectoryWriter
 
-NAMED = 10
-"""Lines that are named one by one in a message."""
+SINGLE = 6e-8
+"""Relative rounding error of single precision, in which trajectories store masses."""
+OPEN = Box.open()
 SUFFIXES = (".xyz", ".extxyz", ".gsd")
 
 
-def read_body(
+class ReadGrains(NamedTuple):
+    """Grains of one frame of a file, in SI, as they are there: neither shifted nor made whole."""
+
+    grains: Grains
+    box: Box  # of the file; open space if it states none
+    centre: np.ndarray | None  # (3,) centre of this box [m]; None if the file states none
+    contacts: tuple[np.ndarray, np.ndarray] | None  # pairs (C, 2) and overlaps [m], in frames of SAND
+    notes: tuple[str, ...]
+    time: float | None = None  # [s], if the file states it
+    step: int | None = None
+
+
+MASSES = 1e3
+"""Largest factor between a mass in a file and that of a sphere of the material; beyond, its unit must be another."""
+
+
+def read_grains(
     path: str | Path,
     material: Material | None = None,
     radius: Any = None,
     length: str | None = None,
     materials: Mapping[str, Material] = PRESETS,
     otherwise: Material | None = None,
-) -> Grains:
-    """Read a body: grains at rest, with the centre of mass at the origin.
+    frame: int = -1,
+) -> ReadGrains:
+    """Read grains from a file of any format that `io.grain_files` knows, or a trajectory of SAND.
+
+    Velocities, spins, moments, charges, masses and own quantities are kept, or refused if their unit is unknown.
 
     Parameters
     ----------
     path : str or Path
-        Extended XYZ or `.gsd` (of SAND or of other programs), of which the last frame is read; or text with one grain
-        per line, `x y z` or `x y z r`, with blank lines and `#` comments allowed.
+        The file; its content tells its format.
     material : Material or None, optional
         Material of all grains; by default those named in the file.
     radius : float or str, optional
         Radius [m] of all grains, for a file without radii.
     length : str or None, optional
-        Unit of length of the file, "1 nm" for example; by default 1 Å in extended XYZ (or its `length_unit`), 1 m in
-        columns and in GSD of other programs.
+        Unit of length of the file, "1 nm" for example. Default: the one that the file states; 1 Å in XYZ; 1 m in
+        columns and in LAMMPS files that state no unit. GSD of other programs needs it.
     materials : Mapping[str, Material], optional
         Materials that the file may name.
     otherwise : Material or None, optional
         Material of all grains if the file names none.
-
-    Returns
-    -------
-    Grains
-        The body.
+    frame : int, optional
+        Index of the frame; −1 is the last.
 
     Raises
     ------
     BadInput
-        If the file is missing or foreign, has lines that are not numbers (the first ten are named), grains with
-        impossible numbers, no radii, or unknown materials.
+        If the file is missing or in no such format, has lines that are not numbers (the first ten are named), grains
+        with impossible numbers, quantities without a unit, no radii or two, no such frame, or unknown materials.
     """
-    file = Path(path)
-    found = _read_gsd(file) if file.suffix == ".gsd" else _read_lines(path)
-    unit = found.unit if length is None else si(length, "m", "length", above=0.0)
-    if found.radius is None and radius is None:
-        raise BadInput(f"{path} has no radii; give a radius for all grains")
-    size = radius if found.radius is None else found.radius * unit
-    kinds = _materials(path, found, material or (otherwise if found.names is None else None), materials)
+    file = user_path(path)
+    if is_gsd(file) and (found := _read_own_gsd(file, frame)) is not None:
+        data, contacts = found
+    else:
+        opened, contacts = open_grains(path), None
+        if not -opened.frame_count <= frame < opened.frame_count:
+            raise BadInput(
+                f"{path} has {opened.frame_count} frames, from 0 to {opened.frame_count - 1}; there is no {frame}"
+            )
+        data = opened.frame(frame % opened.frame_count)
+        if data.unit is None and length is None:
+            raise BadInput(
+                f"{path} ({opened.form}) does not state its unit of length; give it: length = '1 um', for example"
+            )
+    if data.refused:
+        raise BadInput(data.refused)
+    unit = data.unit if length is None else si(length, "m", "length", above=0.0)
+    assert unit is not None
+    grains = _grains_of(path, data, unit, radius, (material, materials, otherwise))
+    box, centre = _box_of(data, unit)
+    return ReadGrains(grains, box, centre, contacts, tuple(data.notes), data.time, data.step)
+
+
+def _grains_of(
+    path: str | Path,
+    data: GrainData,
+    unit: float,
+    radius: Any,
+    choice: tuple[Material | None, Mapping[str, Material], Material | None],
+) -> Grains:
+    """Grains in SI; `choice` as `read_grains`: material, materials, otherwise.  Raises BadInput."""
+    if data.radius is None and radius is None:
+        raise BadInput(f"{path} has no radii; give a radius for all grains: radius = '0.1 um', for example")
+    if data.radius is not None and radius is not None and not data.sizes_assumed:
+        raise BadInput(f"radius: {path} has the radii of its grains; leave radius out")
+    size = radius if radius is not None else np.asarray(data.radius) * unit
+    material, materials, otherwise = choice
+    kinds = _materials(path, data, material or (otherwise if data.names is None else None), materials)
+    given = dict(data.given)
+    density = given.pop("density", None)
     try:
-        body = Grains(found.position * unit, size, kinds, moment=found.moment, own=found.own, charge=found.charge)
+        grains = Grains(data.position * unit, size, kinds, own=data.own, **(given | {"mass": None}))
+        if density is not None and "mass" not in given:
+            given["mass"] = density * (4.0 / 3.0 * np.pi) * grains.radius**3
+        if "mass" not in given:
+            return grains
+        mass = kept_masses(given["mass"], grains.mass)
+        if data.names is not None and all(name in materials for name in data.names):  # the material may be another one
+            before = Grains(data.position * unit, size, [materials[name] for name in data.names]).mass
+            mass = np.where(kept_masses(given["mass"], before) == before, grains.mass, mass)
+        ratio = np.asarray(mass) / grains.mass
+        if (far := np.flatnonzero(~((ratio > 1.0 / MASSES) & (ratio < MASSES)))).size:
+            k, name = far[0], grains.materials[grains.material[far[0]]].name
+            raise BadInput(
+                f"mass of grain {k} is {mass[k]:.3g} kg, but a sphere of {name} of its radius has "
+                f"{grains.mass[k]:.3g} kg; give masses in kg, or leave them out"
+            )
+        return Grains(data.position * unit, size, kinds, own=data.own, **(given | {"mass": mass}))
     except BadInput as error:
         raise error.at(str(path)) from None
+
+
+def kept_masses(mass: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """Masses from a file, (N,) [kg]; the nominal ones where they are equal to single precision."""
+    return np.where(np.abs(mass - nominal) <= 8.0 * SINGLE * nominal, nominal, mass)
+
+
+def _box_of(data: GrainData, unit: float) -> tuple[Box, np.ndarray | None]:
+    """The box that the file states [m], and its centre (3,)."""
+    if data.box is None:
+        return Box.open(), None
+    low, high, periodic = data.box
+    x, y, z = (float(v) * unit if on else None for v, on in zip(high - low, periodic, strict=True))
+    return Box((x, y, z)), 0.5 * (low + high) * unit
+
+
+def read_body(path: str | Path, *arguments: Any, **named: Any) -> Grains:
+    """Read a body, with the centre of mass at the origin; parameters as for `read_grains`.
+
+    Raises
+    ------
+    BadInput
+        As `read_grains`.
+    """
+    return centred(read_grains(path, *arguments, **named).grains)
+
+
+def centred(body: Grains) -> Grains:
+    """The grains, shifted so that the centre of mass is at the origin; changes them."""
     centre = np.average(body.position, axis=0, weights=body.mass)
     body.arrays.position[...] -= centre[:, None]
     return body
 
 
 def _materials(
-    path: str | Path, found: Columns, material: Material | None, known: Mapping[str, Material]
+    path: str | Path, found: GrainData, material: Material | None, known: Mapping[str, Material]
 ) -> Material | list[Material]:
     if material is not None:
         return material
@@ -91,47 +186,27 @@ def _materials(
     return [known[name] for name in found.names]
 
 
-def _read_gsd(path: Path) -> Columns:
-    """Read the last frame of a trajectory of SAND or of another program.  Raises BadInput."""
+def _read_own_gsd(path: Path, number: int) -> tuple[GrainData, tuple[np.ndarray, np.ndarray]] | None:
+    """Grains and contacts of a frame of a trajectory; None if another program wrote it.  Raises BadInput."""
     with contextlib.closing(Frames(path)) as frames:
         if not len(frames):
             raise BadInput(f"{path} holds no frame")
-        if frames.written_by_sand:
-            frame = frames[-1]
-            names = [frame.materials[k] for k in frame.material]
-            moment, own = np.asarray(frame.moment), frame.own
-            return Columns(frame.position, frame.radius, moment, names, 1.0, own, frame.charge)
-        stored = frames.stored(-1)
-        size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
-        return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)
-
-
-def _read_lines(path: str | Path) -> Columns:
-    """Read extended XYZ, or columns x y z or x y z r.  Raises BadInput."""
-    lines = read_text(path).splitlines()
-    if is_xyz(lines):
-        return read_xyz(path, lines)
-    rows: list[list[float]] = []
-    problems: list[str] = []
-    for number, line in enumerate(lines, start=1):
-        words = line.split("#", 1)[0].split()
-        if not words:
-            continue
-        try:
-            row = [float(word) for word in words]
-        except ValueError:
-            row = []
-        if len(row) not in (3, 4) or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
-            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} is not x y z or x y z r, as in all lines")
-        rows.append(row)
-        if len(problems) == NAMED or len(rows) > MOST_GRAINS:
-            break
-    if len(rows) > MOST_GRAINS:
-        problems.append(f"{path} holds more than {MOST_GRAINS:.0e} grains")
-    if problems or not rows:
-        raise BadInput(problems or f"{path} holds no grain")
-    table = np.array(rows)
-    return Columns(table[:, :3], table[:, 3] if table.shape[1] == 4 else None, None, None, 1.0)
+        if not frames.written_by_sand:
+            return None
+        frame = frames[number]
+    names = ("velocity", "spin", "moment", "charge", "mass")
+    data = GrainData(
+        frame.position,
+        frame.radius,
+        1.0,
+        {name: np.asarray(getattr(frame, name), np.float64) for name in names},
+        [frame.materials[k] for k in frame.material],
+        {name: (values, frame.own.units[name]) for name, values in frame.own.items()},
+    )
+    lengths = np.array(frame.drawn)
+    x, y, z = (length is not None for length in frame.box.lengths)
+    data.box = FileBox(-0.5 * lengths, 0.5 * lengths, (x, y, z))
+    return data, (np.asarray(frame.pair, np.int64), frame.overlap)
 
 
 def refuse_target(path: Path, *, overwrite: bool) -> None:
@@ -157,7 +232,7 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     FilesFailed
         If the file cannot be written.
     """
-    target = Path(path)
+    target = user_path(path)
     refuse_target(target, overwrite=overwrite)
     if target.suffix != ".gsd":
         replace_file(target, xyz_text(grains).encode())
@@ -177,9 +252,12 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     return target
 
 
-def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
-    """Table of the unstrained contacts of grains in open space, by column, as `TrajectoryWriter.write` takes it."""
-    pair, overlap = grains.touching(Box.open())
+def contacts_of(grains: Grains, box: Box = OPEN, gap: float = 0.0) -> dict[str, np.ndarray]:
+    """Table of the unstrained contacts of grains, by column, as `TrajectoryWriter.write` takes it.
+
+    `gap`: as in `Grains.touching`.
+    """
+    pair, overlap = grains.touching(box, gap)
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)

@@ -30,6 +30,7 @@ import contextlib
 import hashlib
 import io
 import json
+import os
 import warnings
 import zipfile
 from pathlib import Path
@@ -38,6 +39,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInput, FilesFailed
+from .checkpoint_files import META, checkpoint_files
 from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
@@ -46,7 +48,6 @@ VERSION = 10
 """Version of the file format; other versions are refused. Versions before 9 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
-_META = "meta.json"
 
 
 def _checksum(arrays: dict[str, np.ndarray]) -> str:
@@ -81,10 +82,10 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     header = {"format": "SAND checkpoint", "version": VERSION, "sha256": _checksum(arrays), **meta}
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     memory = io.BytesIO()
-    np.savez(memory, **{_META: text}, **arrays)  # type: ignore[arg-type]
+    np.savez(memory, **{META: text}, **arrays)  # type: ignore[arg-type]
     path = folder / checkpoint_name(meta["steps"])
     replace_file(path, memory.getvalue())
-    for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:
+    for old in checkpoint_files(folder)[:-KEPT]:
         with contextlib.suppress(OSError):  # Windows cannot remove an open file; the next call tries again
             old.unlink(missing_ok=True)
     return path
@@ -106,18 +107,30 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     ------
     OtherFormat
         If it has another version of the format.
+    FilesFailed
+        If the system does not let it be read: no permission, an error of the device, too many open files, no memory.
     BadInput
         If it is not a checkpoint, is damaged, or has numbers that a state cannot have.
     """
+    refuse_devices(path)
     try:
-        refuse_devices(path)
-        with zipfile.ZipFile(path) as archive:
+        content = path.read_bytes()
+    except (OSError, MemoryError) as error:
+        raise _unreadable(path, error) from error
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+            # SAND does not compress: a member larger than the file is not from SAND, and need not be unpacked to know
+            if any(one.compress_type != zipfile.ZIP_STORED or one.file_size > len(content) for one in members):
+                raise zipfile.BadZipFile
             if archive.testzip():  # before NumPy allocates arrays of sizes that may be wrong
                 raise zipfile.BadZipFile
-        with np.load(path, allow_pickle=False) as saved:
+        with np.load(io.BytesIO(content), allow_pickle=False) as saved:
             arrays = {name: saved[name] for name in saved.files}
-        meta = json.loads(arrays.pop(_META).tobytes())
+        meta = json.loads(arrays.pop(META).tobytes())
         is_dictionary = isinstance(meta, dict)
+    except MemoryError as error:
+        raise _unreadable(path, error) from error
     except Exception as error:  # numpy and zipfile raise various exceptions for broken files
         raise BadInput(f"{path} is not a readable checkpoint ({type(error).__name__})") from error
     if not is_dictionary or meta.get("format") != "SAND checkpoint" or not isinstance(meta.get("version"), int):
@@ -133,6 +146,16 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     except BadInput as error:
         raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
+
+
+def _unreadable(path: Path, error: BaseException) -> FilesFailed:
+    """The error of a file that may be whole, but cannot be read now."""
+    code = getattr(error, "errno", None)
+    reason = "not enough memory" if isinstance(error, MemoryError) else os.strerror(code) if code else str(error)
+    return FilesFailed(
+        f"cannot read {path}: {reason}; it may be whole, so it stays as it is, and no older one is taken: try again "
+        "when it can be read, or move it elsewhere to continue from the one before"
+    )
 
 
 def _name_own(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
@@ -158,10 +181,10 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
     BadInput
         If there is no intact checkpoint; no file is renamed then.
     FilesFailed
-        If a damaged one cannot be renamed.
+        If one cannot be read, though it may be whole, or a damaged one cannot be renamed.
     """
     problems: list[tuple[Path, str]] = []
-    for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
+    for path in reversed(checkpoint_files(folder)):
         try:
             arrays, meta = read_checkpoint(path)
         except OtherFormat:

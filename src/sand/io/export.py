@@ -7,93 +7,112 @@ here because ASE rounds to 8 decimals and has neither a dump nor this atom style
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
 from ..errors import BadInput, warn
-from .extended_xyz import ANGSTROM, format_rows, own_columns, xyz_frame
-from .run_folder import replace_file
-from .trajectory import Frame
+from ..paths import user_path
+from .extended_xyz import ANGSTROM, format_rows, listed, own_columns, row_form, xyz_frame
+from .frame import Frame, FrameSequence
+from .run_folder import replace_file, replacing
 
 
-def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
-    """Format a frame as extended XYZ: species, position [Å], radius [Å], velocity, moment, spin, mass, charge (SI).
+class Exported(NamedTuple):
+    """A frame with what its text needs besides."""
 
-    Then own quantities in SI, whose units are in the second line, and the cluster.
+    frame: Frame
+    cluster: np.ndarray  # (N,) label of the cluster of each grain
+    materials: list[str]  # names of the materials of all frames, which so have the same numbers in each
+
+    @property
+    def material(self) -> np.ndarray:
+        """Number of the material of each grain (N,)."""
+        own = [self.materials.index(name) for name in self.frame.materials]
+        return np.array(own, np.int64)[self.frame.material]
+
+
+def to_xyz(one: Exported) -> str:
+    """Format a frame as extended XYZ, in ångström, all else in SI.
+
+    Columns: species, position, radius, velocity, moment, spin, mass, charge, own quantities, material, identity,
+    crossings of the box, and cluster. Names of materials, and units of own quantities, are in the second line.
     """
+    frame = one.frame
     periodic = " ".join("T" if v is not None else "F" for v in frame.box.lengths)
     own, units = own_columns(frame.own)
     x, y, z = (v / ANGSTROM for v in frame.drawn)
     head = (
-        f'Lattice="{x:.10g} 0 0 0 {y:.10g} 0 0 0 {z:.10g}" Origin="{-x / 2:.10g} {-y / 2:.10g} {-z / 2:.10g}" '
+        f'Lattice="{x:.17g} 0 0 0 {y:.17g} 0 0 0 {z:.17g}" Origin="{-x / 2:.17g} {-y / 2:.17g} {-z / 2:.17g}" '
         "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:moment:R:3:spin:R:3:mass:R:1:charge:R:1"
-        f"{own}:cluster:I:1 "
-        f'Time={frame.time!r} Step={frame.step} pbc="{periodic}" length_unit=angstrom other_units=SI{units}'
+        f"{own}:material:I:1:id:I:1:images:I:3:cluster:I:1 "
+        f'Time={frame.time!r} Step={frame.step} materials="{listed(one.materials)}" pbc="{periodic}" '
+        f"length_unit=angstrom other_units=SI{units}"
     )
     columns = [frame.position / ANGSTROM, frame.radius / ANGSTROM, frame.velocity, frame.moment, frame.spin]
-    columns += [frame.mass, frame.charge, *frame.own.values(), cluster]
-    form = "%.10g " * 4 + "%.9g " * 11 + "%.17g " * len(frame.own) + "%d"
-    return xyz_frame(frame.materials, frame.material, head, columns, form)
+    columns += [frame.mass, frame.charge, *frame.own.values(), one.material, frame.id, frame.image, one.cluster]
+    return xyz_frame(one.materials, one.material, head, columns)
 
 
-def _table(columns: Sequence[np.ndarray], form: str) -> str:
-    """Format one line per grain, which begins with its number from 1 on."""
-    return "".join(f"{k} {row}\n" for k, row in enumerate(format_rows(columns, form), 1))
+def _rows(identity: np.ndarray, columns: Sequence[np.ndarray]) -> list[str]:
+    """Format a row per grain, which begins with its identity, counted from 1."""
+    columns = [identity.astype(np.int64) + 1, *columns]
+    return format_rows(columns, row_form(columns))
 
 
-def _file_names(stem: str, ending: str, steps: Sequence[int]) -> list[str]:
-    """File of each frame: with the number of its step, and "-1", "-2", … where several frames follow one step."""
-    if "{" not in ending:  # one file for all
-        return [stem + ending] * len(steps)
-    names = []
-    for k, step in enumerate(steps):
-        repeated = sum(other == step for other in steps[:k])
-        number, _, suffix = ending.format(step).rpartition(".")
-        names.append(f"{stem}{number}{f'-{repeated}' if repeated else ''}.{suffix}")
-    return names
+def _table(identity: np.ndarray, columns: Sequence[np.ndarray]) -> str:
+    """Format these rows as lines."""
+    return "".join(f"{row}\n" for row in _rows(identity, columns))
 
 
-def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
+def to_lammps_dump(one: Exported) -> str:
     """Format a frame as a snapshot of a custom dump.
 
-    Columns: id, type, position, radius, velocity, spin, moment, cluster, mass, charge, and own quantities in SI, with
-    the prefix `d_` that LAMMPS gives such numbers. The snapshot has a step number but no time, because some readers do
-    not accept `ITEM: TIME`.
+    Columns: id, type, position, radius, velocity, spin, moment, mass, charge, crossings of the box, time [s], own
+    quantities in SI with the prefix `d_` that LAMMPS gives such numbers, name of the material, and cluster. The time is
+    a column, because some readers do not accept `ITEM: TIME`.
     """
+    frame = one.frame
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     head = (
         f"ITEM: TIMESTEP\n{frame.step}\n"
         f"ITEM: NUMBER OF ATOMS\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {walls}\n{box}"
-        "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz c_cluster mass q"
-        f"{''.join(f' d_{name}' for name in frame.own)}\n"
+        "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz mass q ix iy iz v_time"
+        f"{''.join(f' d_{name}' for name in frame.own)} typelabel c_cluster\n"
     )
-    columns = [frame.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, cluster + 1]
-    columns += [frame.mass, frame.charge, *frame.own.values()]
-    return head + _table(columns, "%d" + " %.10g" * 13 + " %d %.9g %.9g" + " %.17g" * len(frame.own))
+    columns = [one.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, frame.mass]
+    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values()]
+    labels = [listed([name]).replace(" ", "%20") for name in one.materials]
+    ends = [f"{labels[kind]} {cluster}\n" for kind, cluster in zip(one.material, one.cluster + 1, strict=True)]
+    return head + "".join(f"{row} {end}" for row, end in zip(_rows(frame.id, columns), ends, strict=True))
 
 
-def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
+def to_lammps_data(one: Exported) -> str:
     """Format a frame as a data file of `atom_style hybrid sphere dipole`: grains, velocities and spins.
 
-    Columns of an atom: id type x y z diameter density q mux muy muz. There is no place for own quantities.
+    Columns of an atom: id type x y z diameter density q mux muy muz, and the crossings of the box. Materials are
+    comments in the head. There is no place for own quantities.
     """
+    frame = one.frame
     box = "".join(
         f"{-0.5 * v:.17g} {0.5 * v:.17g} {axis}lo {axis}hi\n" for v, axis in zip(frame.drawn, "xyz", strict=True)
     )
-    density = frame.mass / (4.0 / 3.0 * np.pi * frame.radius**3)
-    columns = (frame.material + 1, frame.position, 2.0 * frame.radius, density, frame.charge, frame.moment)
+    density = np.asarray(frame.mass, np.float64) / (4.0 / 3.0 * np.pi * frame.radius**3)
+    atoms = [one.material + 1, frame.position, 2.0 * frame.radius, density, frame.charge, frame.moment, frame.image]
+    walls = " ".join("p" if v is not None else "f" for v in frame.box.lengths)
     return (
-        f"SAND, step {frame.step}, {frame.time!r} s, units si\n\n{len(frame)} atoms\n"
-        f"{len(frame.materials)} atom types\n\n"
-        f"{box}\nAtoms # hybrid sphere dipole\n\n{_table(columns, '%d' + ' %.10g' * 9)}\n"
-        f"Velocities\n\n{_table((frame.velocity, frame.spin), '%.9g' + ' %.9g' * 5)}"
+        f"SAND, step {frame.step}, {frame.time!r} s, units si, boundary {walls}\n\n{len(frame)} atoms\n"
+        f"{len(one.materials)} atom types # {listed(one.materials)}\n\n"
+        f"{box}\nAtoms # hybrid sphere dipole\n\n{_table(frame.id, atoms)}\n"
+        f"Velocities\n\n{_table(frame.id, [frame.velocity, frame.spin])}"
     )
 
 
@@ -107,27 +126,42 @@ def _array(name: str, values: np.ndarray, unit: str = "") -> str:
     return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="ascii">{text}{key}</DataArray>'
 
 
-def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
+def _text_array(name: str, texts: Sequence[str]) -> str:
+    """Format a DataArray of texts: the numbers of their bytes, each text ended by 0."""
+    numbers = " ".join(str(byte) for text in texts for byte in (*text.encode(), 0))
+    return (
+        f'<DataArray type="String" Name={quoteattr(name)} NumberOfTuples="{len(texts)}" format="ascii">{numbers}'
+        "</DataArray>"
+    )
+
+
+def to_vtp(one: Exported) -> str:
     """Format a frame as VTK: grains as points, contacts as lines with overlap and force.
 
     Contacts across a periodic face have no line. Point data: radius [m], moment [A m²], velocity, spin, mass, charge,
-    material, cluster, own quantities in SI. Cell data (zero for the vertices, which come first): overlap [m], force
-    [N].
+    material, id, image (crossings of the box), cluster, own quantities in SI. Cell data (zero for the vertices, which
+    come first): overlap [m], force [N]. Field data: the time, the names of the materials, and the sides of the box [m],
+    0 where it is open.
     """
-    n = len(frame)
+    frame, n = one.frame, len(one.frame)
     offset = np.diff(frame.position[frame.pair], axis=1)[:, 0]
     inside = (np.abs(offset) < 0.5 * np.array(frame.drawn)).all(axis=1)
     lines = frame.pair[inside]
     overlap = np.concatenate([np.zeros(n), frame.overlap[inside]])
     force = np.concatenate([np.zeros((n, 3)), frame.force[inside]])
-    columns = ("radius", "moment", "velocity", "spin", "mass", "charge", "material")
-    points = [_array(name, getattr(frame, name)) for name in columns] + [_array("cluster", cluster)]
+    columns = ("radius", "moment", "velocity", "spin", "mass", "charge")
+    points = [_array(name, getattr(frame, name)) for name in columns]
+    points += [_array("material", one.material), _array("id", frame.id), _array("image", frame.image)]
+    points += [_array("cluster", one.cluster)]
     points += [_array(name, values, frame.own.units[name]) for name, values in frame.own.items()]
+    sides = np.array([0.0 if v is None else v for v in frame.box.lengths])
+    fields = _array("TimeValue", np.array([frame.time])) + _array("periodic_box", sides, "m")
+    fields += _array("step", np.array([frame.step])) + _text_array("materials", one.materials)
     vertices = _array("connectivity", np.arange(n)) + _array("offsets", np.arange(1, n + 1))
     joined = _array("connectivity", lines.ravel()) + _array("offsets", 2 * np.arange(1, len(lines) + 1))
     return (
         '<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian">\n<PolyData>\n'
-        f"<FieldData>{_array('TimeValue', np.array([frame.time]))}</FieldData>\n"
+        f"<FieldData>{fields}</FieldData>\n"
         f'<Piece NumberOfPoints="{n}" NumberOfVerts="{n}" NumberOfLines="{len(lines)}" NumberOfStrips="0" '
         'NumberOfPolys="0">\n'
         f"<PointData>{''.join(points)}</PointData>\n"
@@ -146,22 +180,54 @@ def _pvd(times: Sequence[float], paths: Sequence[Path]) -> str:
     return f"{head}{sets}</Collection>\n</VTKFile>\n"
 
 
-FORMATS: dict[str, tuple[Callable[[Frame, np.ndarray], str], str]] = {
+FORMATS: dict[str, tuple[Callable[[Exported], str], str]] = {
     "xyz": (to_xyz, ".xyz"),
     "lammps-dump": (to_lammps_dump, ".dump"),
     "lammps-data": (to_lammps_data, "-{:012d}.data"),
     "vtk": (to_vtp, "-{:012d}.vtp"),
 }
-"""Text of a frame with its cluster labels, and end of the file name; one file per step if the name has the step."""
+"""Text of a frame, and end of the file name; one file per frame if the name has the step."""
+
+
+def _files(place: Path, ending: str) -> Callable[[int], Path]:
+    """Function of the step of each frame in turn that returns its file: "-1", "-2", … where several have one step."""
+    seen: dict[int, int] = {}
+
+    def path(step: int) -> Path:
+        number, _, suffix = ending.format(step).rpartition(".")
+        repeated = seen[step] = seen.get(step, -1) + 1
+        return place.with_name(f"{place.name}{number}{f'-{repeated}' if repeated else ''}.{suffix}")
+
+    return path if "{" in ending else lambda step: place.with_name(place.name + ending)
+
+
+def _materials(frames: Sequence[Frame]) -> list[str]:
+    """Names of the materials of all frames, in the order in which they first appear."""
+    if isinstance(frames, FrameSequence):
+        return frames.material_names()
+    return list(dict.fromkeys(name for frame in frames for name in frame.materials))
+
+
+def stale_files(stem: str | Path, form: str, written: Sequence[Path]) -> list[Path]:
+    """Files of an earlier export of the same name that a later one, which wrote `written`, has not replaced."""
+    ending = FORMATS[form][1].replace("{:012d}", "[0-9]*[0-9]")
+    place, now = Path(stem), {path.name for path in written}
+    return sorted(path for path in place.parent.glob(glob.escape(place.name) + ending) if path.name not in now)
 
 
 def export_frames(
-    frames: Sequence[Frame], stem: str | Path, form: str, clusters: Callable[[int, np.ndarray], np.ndarray]
+    frames: Sequence[Frame],
+    stem: str | Path,
+    form: str,
+    clusters: Callable[[int, np.ndarray], np.ndarray],
+    chosen: slice = slice(None),
 ) -> list[Path]:
-    """Write frames for another program.
+    """Write frames for another program, one after the other: only one is in memory at a time.
 
     Parameters
     ----------
+    frames : Sequence[Frame]
+        The frames, such as those of `io.trajectory.Frames`.
     stem : str or Path
         Path without suffix; "run/pictures" gives run/pictures.xyz, or run/pictures-000000000100.vtp and so on.
     form : str
@@ -169,6 +235,8 @@ def export_frames(
     clusters : Callable
         Function of the number of grains and the contacts (C, 2) that returns cluster labels (N,), such as
         `analysis.clusters.cluster_labels`.
+    chosen : slice, optional
+        Frames to write, by default all. Materials have the same numbers whichever are chosen.
 
     Returns
     -------
@@ -180,24 +248,31 @@ def export_frames(
     BadInput
         If the format is unknown, there is no frame, or the folder does not exist.
     FilesFailed
-        If a file cannot be written.
+        If a file cannot be written; of a format with one file for all frames the old one is untouched then.
     """
     if form not in FORMATS:
         raise BadInput(f"format = {form!r}; allowed: {', '.join(FORMATS)}")
-    if not len(frames):
+    numbers = range(len(frames))[chosen]
+    if not numbers:
         raise BadInput("there is no frame to export")
-    place = Path(stem)
+    place = user_path(stem)
     if not place.parent.is_dir():
         raise BadInput(f"there is no folder {place.parent}; make it first")
-    if form == "lammps-data" and (own := frames[0].own):
-        warn(f"LAMMPS data files have no place for own quantities: {', '.join(own)} left out; lammps-dump has them")
     text_of, ending = FORMATS[form]
-    paths = [place.with_name(name) for name in _file_names(place.name, ending, [frame.step for frame in frames])]
-    texts = (text_of(frame, clusters(len(frame), frame.pair)) for frame in frames)
-    for path, group in groupby(zip(paths, texts, strict=True), itemgetter(0)):
-        replace_file(path, "".join(text for _, text in group).encode())
+    materials = _materials(frames)
+    path_of, times = _files(place, ending), dict[Path, float]()
+    each = ((path_of(frame.step), frame) for frame in (frames[k] for k in numbers))
+    for path, group in groupby(each, itemgetter(0)):
+        with replacing(path) as file:
+            for _, frame in group:
+                if form == "lammps-data" and frame.own and not times:
+                    left = ", ".join(frame.own)
+                    warn(f"LAMMPS data files have no place for own quantities: {left} left out; lammps-dump has them")
+                times[path] = frame.time
+                one = Exported(frame, clusters(len(frame), frame.pair), materials)
+                file.write(text_of(one).encode())
     if form != "vtk":
-        return list(dict.fromkeys(paths))
+        return list(times)
     index = place.with_name(f"{place.name}.pvd")
-    replace_file(index, _pvd([frame.time for frame in frames], paths).encode())
-    return [index, *paths]
+    replace_file(index, _pvd(list(times.values()), list(times)).encode())
+    return [index, *times]

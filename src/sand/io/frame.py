@@ -6,13 +6,14 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | chunk | meaning |
 |---|---|
 | configuration/step, log/time | step number; true time of the frame [s] |
-| log/scale/length | the reference radius [m] |
+| log/scale/length | the reference radius [m], the mean radius of the first frame in all frames of a file |
 | log/periodic | 1 for each periodic axis, 0 for an open one, whose length in the box serves drawing only |
 | log/lengths | side lengths of the box as drawn, to full precision [m] |
 | particles/position, diameter; configuration/box | in reference radii |
 | particles/velocity, mass, charge | m/s, kg, C |
 | particles/orientation | rotation parameters, scalar first |
-| particles/typeid, types | materials |
+| particles/typeid, types | materials; a name keeps its number in all frames of a file |
+| particles/image | how often each grain has crossed the box along each periodic axis since the start |
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
 | log/particles/position, radius | to full precision [m]; only in files of bodies |
 | bonds/group | grains in contact |
@@ -70,14 +71,17 @@ def stored_frame(
     *,
     exact: bool = False,
     at_rest: np.ndarray | None = None,
+    scale: float | None = None,
+    materials: Sequence[str] = (),
 ) -> Any:
     """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also positions and radii in float64.
 
-    `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters.
+    `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters. `scale`: reference radius [m], by
+    default the mean radius. `materials`: names that come first, also without a grain, and so keep their numbers.
     """
     import gsd.hoomd
 
-    scale = float(grains.radius.mean())
+    scale = float(grains.radius.mean()) if scale is None else scale
     frame = gsd.hoomd.Frame()
     frame.configuration.step = step
     cloud = 2.0 * np.abs(grains.position).max(axis=0) + 2.0 * grains.radius.max()
@@ -85,12 +89,14 @@ def stored_frame(
     frame.configuration.box = [*(np.array(lengths) / scale), 0.0, 0.0, 0.0]
     p = frame.particles
     p.N = len(grains)
-    p.types = [m.name.encode("ascii", "backslashreplace").decode() for m in grains.materials]
-    p.typeid = grains.material
+    own = [m.name for m in grains.materials]
+    types = list(dict.fromkeys((*materials, *own)))
+    p.types = [name.encode("unicode_escape").decode() for name in types]
+    p.typeid = np.array([types.index(name) for name in own], np.uint32)[grains.material]
     p.position = grains.position / scale
     p.diameter = 2.0 * grains.radius / scale
     p.velocity, p.mass, p.charge = grains.velocity, grains.mass, grains.charge
-    p.orientation = np.roll(grains.orientation, 1, axis=1)
+    p.orientation, p.image = np.roll(grains.orientation, 1, axis=1), grains.image
     frame.bonds.N = len(contacts["pair"])
     frame.bonds.types = ["contact"]
     frame.bonds.typeid = np.zeros(frame.bonds.N, dtype=np.uint32)
@@ -148,6 +154,24 @@ def read_stored(file: Any, number: int) -> Any:
     return stored
 
 
+def read_materials(file: Any, count: int) -> list[str]:
+    """Names of the materials of the first `count` frames of a GSD file, in the order in which they first appear.
+
+    Raises BadInput, or an exception of the reader, for a broken file.
+    """
+    names: dict[str, None] = {}
+    for number in range(count):
+        if file.file.chunk_exists(number, "particles/types"):  # absent where they are those of the first frame
+            rows = file.file.read_chunk(number, "particles/types")
+            names |= dict.fromkeys(_name(row.tobytes().split(b"\0")[0].decode()) for row in rows)
+    return list(names)
+
+
+def _name(stored: str) -> str:
+    """Name of a material as it was before `unicode_escape`, which makes it ASCII."""
+    return stored.encode().decode("unicode_escape")
+
+
 def read_identities(file: Any, number: int, count: int) -> np.ndarray:
     """Identities (N,) of the grains of a frame with N = `count` grains."""
     for name in (f"{LATE}particles/{IDENTITY}", f"log/particles/{IDENTITY}"):
@@ -171,6 +195,8 @@ def _crc32(stored: Any) -> int:
     parts = [np.asarray(part, np.float32) for part in single]
     parts += [np.asarray(part, np.uint32) for part in (p.typeid, stored.bonds.group)]
     parts += [stored.log[name] for name in sorted(stored.log) if name != "crc32"]
+    if np.any(p.image):  # earlier versions did not count crossings
+        parts.append(np.asarray(p.image, np.int32))
     for part in parts:
         # + 0 makes −0 and 0 equal, which GSD does not distinguish
         with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
@@ -182,10 +208,11 @@ class Frame:
     """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
     `material` (N,) holds indices into the names `materials`; `id` (N,) is the identity of each grain, which stays when
-    others are removed. `own` are the own quantities (N,) by name, also attributes: `frame.temperature`. `at_rest` (N,),
-    True for grains of clusters at rest, single grains included, is None without `sand.RigidClusters`. Arrays of
-    contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3),
-    and `share` (C, 4) with columns `MODES`.
+    others are removed; `image` (N, 3) counts how often it has crossed the periodic box since the start of the run, and
+    `unwrapped` (N, 3) are the positions without these jumps. `own` are the own quantities (N,) by name, also
+    attributes: `frame.temperature`. `at_rest` (N,), True for grains of clusters at rest, single grains included, is
+    None without `sand.RigidClusters`. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad]
+    (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
     """
 
     def __init__(self, stored: Any):
@@ -199,7 +226,7 @@ class Frame:
         self.position = np.array(stored.log.get("particles/position", single_precision))
         self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
-        self.charge = np.asarray(p.charge)
+        self.charge, self.image = np.asarray(p.charge), np.asarray(p.image)
         self.id = np.asarray(stored.log.get(f"particles/{IDENTITY}", np.arange(p.N)), np.uint32)
         # before own quantities had names, the only one was this temperature
         before = {"internal_temperature": "K"} if "particles/internal_temperature" in stored.log else {}
@@ -207,8 +234,7 @@ class Frame:
         self.own = OwnQuantities({name: stored.log[f"particles/{name}"] for name in units}, units)
         rest = stored.log.get(f"particles/{REST}")
         self.at_rest = None if rest is None else np.asarray(rest) == 1
-        names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
-        self.materials, self.material = names, np.asarray(p.typeid)
+        self.materials, self.material = [_name(name) for name in p.types], np.asarray(p.typeid)
         self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
         self.orientation = np.roll(np.asarray(p.orientation), -1, axis=1)
         self.pair = np.asarray(stored.bonds.group).reshape(-1, 2)
@@ -229,6 +255,12 @@ class Frame:
             raise NoSuchAttribute(f"a frame has no '{name}'; {did_you_mean(name, (*vars(self), *own))}")
         return own[name]
 
+    @property
+    def unwrapped(self) -> np.ndarray:
+        """Positions (N, 3) [m] that jump at no periodic boundary, for displacements: position + image × length."""
+        lengths = [0.0 if length is None else length for length in self.box.lengths]
+        return self.position + self.image * np.array(lengths)
+
     def __len__(self) -> int:
         """Number of grains."""
         return len(self.radius)
@@ -248,6 +280,7 @@ OF_GRAINS = (
     "mass",
     "charge",
     "material",
+    "image",
     REST,
 )
 OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
@@ -270,9 +303,9 @@ class FrameArrays(Sequence[np.ndarray]):
     """
 
     def __init__(self, frames: FrameSequence, name: str, chosen: range | None = None):
-        if not frames.has_array(name):
+        if not isinstance(name, str) or not frames.has_array(name):
             known = (*OF_GRAINS, *OF_CONTACTS, *frames.own_units)
-            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(str(name), known)}")
+            raise BadInput(f"frames have no array {shown(name)}; {did_you_mean(shown(name), known)}")
         self.frames, self.name = frames, name
         self.chosen = range(len(frames)) if chosen is None else chosen
 
@@ -338,11 +371,17 @@ class FrameSequence(Sequence[Frame]):
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
-        if not isinstance(index, (int, np.integer)):
+        if not isinstance(index, (int, np.integer)) or isinstance(index, np.timedelta64):
             raise NoSuchFrame(f"frame {shown(index)} must be a whole number, from 0 to {len(self) - 1}")
         if not -len(self) <= index < len(self):
-            raise NoSuchFrame(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+            raise NoSuchFrame(
+                f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {shown(index)}"
+            )
         return self._frame(index % len(self))
+
+    def material_names(self) -> list[str]:
+        """Names of the materials of all frames, in the order in which they first appear; reads all frames."""
+        return list(dict.fromkeys(name for frame in self for name in frame.materials))
 
     @property
     def own_units(self) -> dict[str, str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInput
+from ..paths import user_path
 from .frame import Frame, FrameSequence
 from .trajectory import Frames
 
@@ -44,7 +45,7 @@ class LiveTrajectory(FrameSequence):
     """
 
     def __init__(self, path: str | Path):
-        self.path, self.lock, self.generation = Path(path), threading.RLock(), 0
+        self.path, self.lock, self.generation = user_path(path), threading.RLock(), 0
         self._seen = self._stamp()
         frames = self._open()
         self._use(frames, _heads(frames, []))

@@ -8,13 +8,18 @@ import errno
 import io
 import json
 import os
+import re
+import secrets
+import shutil
 import stat
+import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import BadInput, FilesFailed
+from ..errors import BadInput, FilesFailed, shown, warn
+from ..paths import user_path
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
@@ -37,31 +42,16 @@ OWN_FILES = (
     "view.html",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
+CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
+"""Names of checkpoints, with the number of steps; other names are those of copies that the user keeps."""
+PLOTS = "plots"
+"""Subfolder of figures."""
+DERIVED = (".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json")
+"""Ends of the names of exports, figures and tables that are made from a run."""
+NAMED = 5
+"""Files that are named one by one in a message."""
 _NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
 """Errors by which systems report that they cannot sync a folder."""
-
-
-def checked_name(text: str, name: str) -> str:
-    """Check the name of a file or folder.
-
-    Parameters
-    ----------
-    text : str
-        The name as the user gave it.
-    name : str
-        Name of the option or setting, for the message.
-
-    Raises
-    ------
-    BadInput
-        If it is empty, or not valid on any system.
-    """
-    if not text.strip() or "\0" in text:
-        raise BadInput(f"{name} = {text!r} is not the name of a file or folder")
-    longest = max(len(os.fsencode(part)) for part in text.replace("\\", "/").split("/"))
-    if longest > 255 or len(text) > 4000:
-        raise BadInput(f"{name} = '{text[:40]}…' is too long for the name of a file or folder")
-    return text
 
 
 def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = False) -> Path:
@@ -70,18 +60,19 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     Parameters
     ----------
     overwrite : bool, optional
-        Whether the files of an earlier run may be removed; other files stay.
+        Whether the files of an earlier run may be removed; other files stay, and a warning names exports and figures.
     shared : bool, optional
         Whether the folder may hold other files.
 
     Raises
     ------
     BadInput
-        If the folder is not empty, or another process writes to it.
+        If the folder is not empty, or another process writes to it; with `overwrite` if it holds files, but none shows
+        that a run or job of SAND wrote them.
     FilesFailed
         If it cannot be created or written to.
     """
-    folder = Path(path)
+    folder = user_path(path, "folder")
     try:
         if folder.exists() and not folder.is_dir():
             raise BadInput(f"{folder} is a file; give the name of a new folder")
@@ -93,21 +84,59 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     f"folder {folder} exists and is not empty; give another one, remove it, "
                     "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
+            found = files_of_runs(folder)
+            if found and not shows_a_run(folder):
+                names = ", ".join(path.name for path in found)
+                raise BadInput(
+                    f"{folder} holds {names}, but nothing shows that SAND wrote them, so they are not replaced: give "
+                    "another folder, or remove them"
+                )
             with writing(folder):
-                names = (*OWN_FILES, "checkpoint-*.npz")
-                own = [path for name in names for end in ("", f"{DAMAGED}*") for path in folder.glob(name + end)]
+                own = [*found, *(old for path in found for old in folder.glob(f"{path.name}{DAMAGED}*"))]
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
                 for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
+            if left := _of_earlier_results(folder):
+                called = [str(path.relative_to(folder)) for path in left]
+                more = f" and {len(called) - NAMED} more" if len(called) > NAMED else ""
+                warn(
+                    f"{folder} keeps {', '.join(called[:NAMED])}{more}, which the earlier run may have left; remove "
+                    "them, or make them again from the new results"
+                )
         folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".probe"
-        probe.write_bytes(b"")
-        probe.unlink()
+        with tempfile.NamedTemporaryFile(dir=folder):
+            pass
     except FilesFailed:
         raise
     except OSError as error:
         raise FilesFailed(f"cannot write to folder {folder}: {error.strerror}") from error
     return folder
+
+
+def files_of_runs(folder: Path) -> list[Path]:
+    """Files of a folder that have names which SAND gives."""
+    return sorted(one for one in folder.iterdir() if one.name in OWN_FILES or CHECKPOINT.fullmatch(one.name))
+
+
+def shows_a_run(folder: Path) -> bool:
+    """Whether the content of a file in a folder, not only its name, shows that SAND wrote it."""
+    for name in (CASE, ONE_COLLISION):
+        if was_written_by_sand(folder / name):
+            return True
+    for path in files_of_runs(folder):
+        with contextlib.suppress(OSError), open(path, "rb") as file:
+            begin = file.read(4096)
+            if path.name == TRAJECTORY and b"SAND" in begin:  # the application in the header of GSD
+                return True
+            if CHECKPOINT.fullmatch(path.name) and begin.startswith(b"PK") and b"meta.json" in begin:
+                return True
+    return False
+
+
+def _of_earlier_results(folder: Path) -> list[Path]:
+    """Exports and pictures in a folder and in its subfolder `plots`: what was made of a run, not by the run."""
+    found = [path for place in (folder, folder / PLOTS) if place.is_dir() for path in place.iterdir()]
+    return sorted(path for path in found if path.suffix in DERIVED and path.is_file())
 
 
 def is_used(folder: Path) -> bool:
@@ -130,9 +159,10 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     FilesFailed
         If the file cannot be written; the old one is untouched then.
     """
-    temporary = path.with_name(f".{path.name}.new")
+    # a new file of a random name: one of a fixed name may be a link to a file elsewhere
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.new")
     try:
-        with open(temporary, "wb") as file:
+        with open(temporary, "xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -144,6 +174,26 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def give_own_content(path: Path) -> None:
+    """Replace a file that has several names, by a link or by hard links, with a copy of its own.
+
+    Raises
+    ------
+    FilesFailed
+        If it cannot be copied.
+    """
+    try:
+        shared = path.is_symlink() or path.stat().st_nlink > 1
+    except FileNotFoundError:
+        path.unlink(missing_ok=True)  # a link to nothing, through which a file elsewhere would be created
+        return
+    except OSError as error:
+        raise FilesFailed(f"cannot read {path}: {error.strerror}") from error
+    if shared:
+        with open(path, "rb") as old, replacing(path) as new:
+            shutil.copyfileobj(old, new)
 
 
 def append_text(path: Path, text: str) -> None:
@@ -206,7 +256,9 @@ def read_json(path: Path) -> dict[str, Any]:
         raise BadInput(f"{path} is not JSON") from None
     if not isinstance(content, dict):
         raise BadInput(f"{path} is not a summary of SAND")
-    if content.get(DIGEST, digest_of(content)) != digest_of(content):
+    # every summary has a digest: one without it was changed, too
+    without = None if path.name == SUMMARY else digest_of(content)
+    if content.get(DIGEST, without) != digest_of(content):
         raise BadInput(f"{path} is damaged: its content does not match its digest")
     return content
 
@@ -221,19 +273,22 @@ def refuse_devices(path: str | Path) -> None:
         raise BadInput(f"{path} is a device or a pipe; give an ordinary file")
 
 
-def read_text(path: str | Path, most: int | None = None) -> str:
+def read_text(path: str | Path, most: int | None = None, errors: str = "strict") -> str:
     """Read the text of a UTF-8 file, with or without a byte-order mark; lines end with "\\n".
 
     Parameters
     ----------
     most : int or None, optional
         Largest accepted size in bytes, for files of any type; by default all of an ordinary file is read.
+    errors : str, optional
+        What is done with bytes that are not text, as for `bytes.decode`.
 
     Raises
     ------
     BadInput
         If the file is missing, unreadable, too large, or not text.
     """
+    path = user_path(path, "file")
     if most is None:
         refuse_devices(path)
     try:
@@ -250,9 +305,22 @@ def read_text(path: str | Path, most: int | None = None) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise BadInput(f"{path} is not a text file in UTF-8, but one in UTF-16; save it as UTF-8")
     try:
-        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig").read()
-    except UnicodeDecodeError:
-        raise BadInput(f"{path} is not a text file") from None
+        return io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig", errors=errors).read()
+    except UnicodeDecodeError as error:
+        raise BadInput(_not_utf8(path, content, error.start)) from None
+
+
+def _not_utf8(path: str | Path, content: bytes, start: int) -> str:
+    """Message about a file that is not text in UTF-8; names the line, and the encoding if it is probably Latin-1."""
+    if b"\0" in content:
+        return f"{path} is not a text file"
+    before = content[:start]
+    number = len(before.splitlines()) + (not before or before.endswith((b"\n", b"\r")))
+    line = content[before.rfind(b"\n") + 1 :].splitlines()[0].decode("latin-1").strip()
+    return (
+        f"{path} is not UTF-8: line {number}, {shown(line)}, has byte 0x{content[start]:02x}, "
+        f"{content[start : start + 1].decode('latin-1')!r} in Latin-1; save the file as UTF-8"
+    )
 
 
 MOST_TOML = 4 * 2**20
@@ -317,7 +385,7 @@ def is_job(folder: Path, case: Path) -> bool:
     return (
         was_written_by_sand(case)
         or bool(results & names)
-        or any(name.startswith(("checkpoint-", "seed-")) for name in names)
+        or any(CHECKPOINT.fullmatch(name) or name.startswith("seed-") for name in names)
     )
 
 

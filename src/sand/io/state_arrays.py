@@ -54,6 +54,7 @@ STORED = {
     "grains/own": ArraySpec("f8", (None, "N")),
     "grains/material": ArraySpec("u4", ("N",), "any"),
     "grains/id": ArraySpec("u4", ("N",), "ascending"),
+    "grains/image": ArraySpec("i4", (3, "N"), "any", required=False),  # earlier versions did not count crossings
     "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
     **{
         f"contacts/{name}": ArraySpec("f8", (3, "C"))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
+import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInput
+from ..errors import BadInput, warn
+from .damage import DIGEST, digest_of, sealed
 from .run_folder import append_text, read_text, replace_file
 
 
@@ -22,8 +25,15 @@ def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     replace_file(path, out.getvalue().encode())
 
 
+CHECK = "check"
+"""Last column of a growing table: the CRC-32 of the text of the row before it."""
+
+
 class GrowingTable:
-    """A CSV table to which rows are appended; an incomplete last row, left by a kill, is dropped on reading.
+    """A CSV table to which rows are appended, each with a check sum in a last column.
+
+    Rows that are incomplete, as after a kill, or do not match their check sum are dropped on reading, the latter with a
+    warning.
 
     Parameters
     ----------
@@ -43,19 +53,18 @@ class GrowingTable:
     """
 
     def __init__(self, path: Path, columns: Sequence[str], *, resume: bool = False):
-        self.path, self.columns = path, list(columns)
+        self.path, self.columns = path, [*columns, CHECK]
         head = ",".join(self.columns)
         found = _lines(path, head, "does not have the columns of this job; give another folder") if resume else []
-        lines = [line for line in found if line.count(",") == head.count(",")]
-        try:
-            self.rows = [[float(part) for part in line.split(",")] for line in lines]
-        except ValueError:
-            raise BadInput(f"{path} holds something that is not a number; give another folder") from None
+        lines = [line for line in found if line == _checked(line.rpartition(",")[0])]
+        self.rows = [[float(part) for part in line.split(",")[:-1]] for line in lines]
+        _report_bad_rows(path, len(found) - len(lines))
         replace_file(path, ("\n".join([head, *lines]) + "\n").encode())
 
     def add(self, rows: Iterable[Sequence[float]]) -> None:
         """Append rows; integers are written without a decimal point.  Raises FilesFailed."""
-        append_text(self.path, "".join(",".join(_shortest(value) for value in row) + "\n" for row in rows))
+        texts = (",".join(_shortest(value) for value in row) for row in rows)
+        append_text(self.path, "".join(_checked(text) + "\n" for text in texts))
 
     def sort(self) -> None:
         """Sort the lines by their numbers, so that the file does not depend on the order of completion."""
@@ -65,7 +74,10 @@ class GrowingTable:
 
 
 class GrowingOutcomes:
-    """Outcomes of the parts of a job, one JSON object a line; an incomplete last line is dropped on reading.
+    """Outcomes of the parts of a job, one JSON object with its digest a line.
+
+    Lines that are incomplete, as after a kill, or do not match their digest are dropped on reading, the latter with a
+    warning.
 
     Parameters
     ----------
@@ -79,7 +91,7 @@ class GrowingOutcomes:
     Raises
     ------
     BadInput
-        If the file is not a list of outcomes, or belongs to another case.
+        If the file belongs to another case.
     FilesFailed
         If it cannot be written.
     """
@@ -90,22 +102,35 @@ class GrowingOutcomes:
         problem = "holds outcomes of another case; restore the case, or use another folder"
         lines = _lines(path, head, problem) if resume else []
         self.found: dict[int, dict[str, Any]] = {}
+        whole = []
         for line in lines:
-            try:
+            with contextlib.suppress(ValueError, TypeError, KeyError, RecursionError):
                 entry = json.loads(line)
-                self.found[int(entry["seed"])] = dict(entry["outcome"])
-            except (ValueError, TypeError, KeyError, RecursionError):
-                raise BadInput(f"{path} is not a list of outcomes; remove it, and they are computed again") from None
-        replace_file(path, "".join(line + "\n" for line in [head, *lines]).encode())
+                if entry[DIGEST] == digest_of(entry):
+                    self.found[int(entry["seed"])] = dict(entry["outcome"])
+                    whole.append(line)
+        _report_bad_rows(path, len(lines) - len(whole))
+        replace_file(path, "".join(line + "\n" for line in [head, *whole]).encode())
 
     def add(self, seed: int, outcome: dict[str, Any]) -> None:
         """Append one outcome; its numbers are stored to full precision.  Raises FilesFailed."""
-        append_text(self.path, json.dumps({"seed": seed, "outcome": outcome}) + "\n")
+        append_text(self.path, json.dumps(sealed({"seed": seed, "outcome": outcome})) + "\n")
+
+
+def _checked(text: str) -> str:
+    """A row with its check sum."""
+    return f"{text},{zlib.crc32(text.encode())}"
+
+
+def _report_bad_rows(path: Path, number: int) -> None:
+    if number:
+        rows = "1 row of it does" if number == 1 else f"{number} rows of it do"
+        warn(f"{path} was changed or damaged: {rows} not match the check sum, and what they held is computed again")
 
 
 def _lines(path: Path, head: str, problem: str) -> list[str]:
     """Complete lines of a file after its first one, `head`; none without a file.  Raises BadInput with `problem`."""
-    lines = read_text(path).split("\n")[:-1] if path.exists() else []
+    lines = read_text(path, errors="replace").split("\n")[:-1] if path.exists() else []
     if lines and lines[0] != head:
         raise BadInput(f"{path} {problem}")
     return lines[1:]

@@ -7,6 +7,7 @@ import ctypes
 import math
 import os
 import time as wall
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,21 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput, FilesFailed, shown, warn
 from ..grains import Grains
+from ..paths import user_path
 from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
-from .frame import Frame, FrameSequence, append_frame, code_of, read_identities, read_stored, stored_frame
+from .frame import (
+    Frame,
+    FrameSequence,
+    append_frame,
+    code_of,
+    read_identities,
+    read_materials,
+    read_stored,
+    stored_frame,
+)
+from .run_folder import give_own_content
 
 FLUSH_EVERY = 1.0
 """Wall time [s] between flushes; GSD buffers, and unflushed frames are lost if the process is killed."""
@@ -69,7 +81,11 @@ class TrajectoryWriter:
         self._waiting = self._pending = 0  # frames that wait for the next flush, and their approximate bytes
         self._entries = 0  # upper bound of the index entries
         self._flushed = wall.monotonic()
+        self._scale: float | None = None  # reference radius of the file [m]
+        self._materials: list[str] = []  # names of the materials of its frames
         try:
+            if resume_at is not None:
+                give_own_content(path)
             if resume_at is not None and path.exists():
                 try:
                     self._later, lost = gsd_index.repair_or_keep(path, resume_at, written)
@@ -79,6 +95,9 @@ class TrajectoryWriter:
                     report(lost)
             self._file = _open_file(path, resume_at is not None and path.exists())
             self._entries = len(gsd_index.read_index(path)[1])
+            if kept := len(self._file) - len(self._later):
+                self._scale = float(self._file.file.read_chunk(0, "log/scale/length")[0])
+                self._materials = read_materials(self._file, kept)
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -102,7 +121,10 @@ class TrajectoryWriter:
         FilesFailed
             If the frame cannot be written; earlier ones stay.
         """
-        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest)
+        fixed: Any = {"scale": self._scale, "materials": self._materials}
+        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest, **fixed)
+        self._scale = float(frame.log["scale/length"][0])
+        self._materials += [m.name for m in grains.materials if m.name not in self._materials]
         if self._is_stored(time, code_of(frame)):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS + len(grains.own_units)
@@ -154,6 +176,7 @@ class TrajectoryWriter:
         if self._file is not None:
             # when GSD's object is destroyed it would write once more and damage the file (see `reserve_space`): leak it
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
+            self._file.closes_at_exit.detach()
         self._abandoned = True
         with contextlib.suppress(OSError, RuntimeError, BadInput):
             gsd_index.repair(self.path, self._whole_until)
@@ -174,11 +197,24 @@ class TrajectoryWriter:
 
 def _open_file(path: Path, append: bool) -> Any:
     """Open a GSD file for appending, or create it."""
-    import gsd.hoomd
-
     if not append:
         path.touch()  # GSD creates files that other users cannot read, but keeps the mode of an existing one
-    return gsd.hoomd.open(str(path), "r+" if append else "w")
+    return _open_gsd(path, "r+" if append else "w")
+
+
+def _open_gsd(path: Path, mode: str) -> Any:
+    """Open a GSD file that is closed before the program ends, because GSD's objects cannot close it afterwards."""
+    import gsd.hoomd
+
+    file = gsd.hoomd.open(str(path), mode)
+    file.closes_at_exit = weakref.finalize(file, _close_gsd, file.file)
+    return file
+
+
+def _close_gsd(file: Any) -> None:
+    """Close a GSD file that is in use no more; on a full disk, frames that were not flushed are lost."""
+    with contextlib.suppress(OSError, RuntimeError):
+        file.close()
 
 
 class Frames(FrameSequence):
@@ -196,14 +232,12 @@ class Frames(FrameSequence):
     """
 
     def __init__(self, path: str | Path):
-        import gsd.hoomd
-
-        self.path = Path(path)
+        self.path = user_path(path)
         if not self.path.exists():
             raise BadInput(f"there is no file {path}")
         try:
             gsd_index.refuse_impossible_sizes(self.path)
-            self._file = gsd.hoomd.open(str(path), "r")
+            self._file = _open_gsd(self.path, "r")
         except BadInput:
             raise
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
@@ -229,6 +263,11 @@ class Frames(FrameSequence):
     def _frame(self, number: int) -> Frame:
         with self._reading(number):
             return Frame(read_stored(self._file, number))
+
+    def material_names(self) -> list[str]:
+        """Names of the materials of all frames, in the order in which they first appear; reads little else."""
+        with self._reading(0):
+            return read_materials(self._file, len(self))
 
     @property
     def written_by_sand(self) -> bool:

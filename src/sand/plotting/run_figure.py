@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
+from ..paths import user_path
 from .panels import (
     draw_balance,
     draw_clusters,
@@ -246,7 +247,7 @@ def save(figure: Figure, path: str | Path) -> None:
     FilesFailed
         If the file cannot be written.
     """
-    replace_file(Path(path), figure_bytes(figure))
+    replace_file(user_path(path), figure_bytes(figure))
 
 
 def show(figure: Figure) -> Figure:

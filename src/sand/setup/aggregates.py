@@ -12,7 +12,7 @@ from ..arguments import MOST_GRAINS, checked
 from ..errors import BadInput, did_you_mean, shown
 from ..grains import Grains
 from ..material import PRESETS, Material, as_material
-from ..units import si
+from ..units import dimensions, si
 from .deposit import rbd
 from .fractal import fractal
 from .growing import bcca, bpca, dla, dlca
@@ -142,7 +142,11 @@ def _sites(nx: int, ny: int | None, nz: int | None) -> np.ndarray:
 def _regular(
     grid: np.ndarray, radius: Any, material: Any, moment: Any, moments: str, magnetic: Any, rng: RandomStreams
 ) -> Grains:
-    if not isinstance(material, (str, Material)) or (isinstance(radius, str) and "(" in radius) or np.ndim(radius) > 0:
+    if (
+        not isinstance(material, (str, Material))
+        or (isinstance(radius, str) and "(" in radius)
+        or dimensions(radius) > 0
+    ):
         raise BadInput("a lattice is in equilibrium only if its grains are equal: give one radius and one material")
     r = si(radius, "m", "radius", above=0.0)
     sample = population(len(grid), r, material, rng.population)

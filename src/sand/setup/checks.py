@@ -1,16 +1,18 @@
-"""Checks of bodies read from files: excessive overlaps and disconnected grains, reported with grain indices."""
+"""Checks of grains read from files: excessive overlaps and disconnected grains, reported with grain indices."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..box import Box
-from ..errors import BadInput
-from ..grains import Grains
+from ..errors import BadInput, first_problems
+from ..grains import ROUNDED, Grains
 from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)
 """Largest initial overlap: the larger of 2 δ0 and 1e-3 of the smaller radius."""
+SAME_PLACE = 1e-6
+"""Distance of centres, in radii of the smallest grain, up to which two grains are at the same place."""
 MOST_MESSAGES = 10
 """Number of errors that are listed."""
 
@@ -20,65 +22,101 @@ def most_overlap(rest: np.ndarray | float, smaller: np.ndarray | float) -> np.nd
     return np.maximum(MOST_OVERLAP[0] * np.asarray(rest), MOST_OVERLAP[1] * np.asarray(smaller))
 
 
-def check_body(body: Grains, origin: str) -> None:
-    """Check a body for excessive overlaps and for grains that are not connected to its largest cluster.
+def at_same_place(grains: Grains, box: Box) -> list[str]:
+    """Messages about the first ten pairs of grains at the same place, between which no force has a direction."""
+    pairs = box.close_pairs(grains.position, SAME_PLACE * float(grains.radius.min()))
+    problems = [
+        f"grains {i} and {j} are at the same place; leave one of them out, or move it" for i, j in pairs[:MOST_MESSAGES]
+    ]
+    return first_problems(problems, len(pairs), "such pairs")
+
+
+def pairs_in_contact(grains: Grains, box: Box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs (C, 2) of grains of a file that are in contact, their overlaps, and those of equilibrium (C,) [m].
+
+    Gaps up to `ROUNDED` of the smaller radius count as contacts.
+    """
+    pairs, overlap = grains.touching(box, ROUNDED)
+    grain_set = grain_set_of(grains.radius, [grains.materials[k] for k in grains.material])
+    rest = grains.radius[pairs].sum(axis=1) - rest_distances(grain_set, pairs[:, 0], pairs[:, 1])
+    return pairs, overlap, rest
+
+
+def refuse_excess(grains: Grains, pairs: np.ndarray, overlap: np.ndarray, rest: np.ndarray, origin: str) -> None:
+    """Refuse pairs that overlap by more than a simulation allows at its start.
 
     Parameters
     ----------
-    body : Grains
-        The body.
+    pairs, overlap, rest : ndarray
+        As `pairs_in_contact` returns them.
     origin : str
-        Source of the body, for the message.
+        Source of the grains, for the message.
 
     Raises
     ------
     BadInput
-        One line for each of the first ten such grains or pairs.
+        One line for each of the first ten such pairs.
     """
-    pairs, overlap = body.touching(Box.open())
-    problems = _overlaps(body, pairs, overlap) or _gaps(body, pairs)
+    if same := at_same_place(grains, Box.open()):
+        raise BadInput(f"{origin}: {problem}" for problem in same)
+    most = most_overlap(rest, grains.radius[pairs].min(axis=1))
+    wrong = np.flatnonzero(overlap > most)
+    problems = [
+        f"{origin}: grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m, at most {most[k]:.3g} m is "
+        "allowed: move them apart"
+        for k in wrong[:MOST_MESSAGES]
+    ]
     if problems:
-        more = len(problems) - MOST_MESSAGES
-        listed = problems if more <= 0 else [*problems[:MOST_MESSAGES], f"… and {more} more"]
-        raise BadInput(f"{origin}: {problem}" for problem in listed)
+        raise BadInput(first_problems(problems, len(wrong), "overlapping pairs"))
 
 
-def _overlaps(body: Grains, pairs: np.ndarray, overlap: np.ndarray) -> list[str]:
-    grain_set = grain_set_of(body.radius, [body.materials[k] for k in body.material])
-    touch = body.radius[pairs].sum(axis=1)
-    rest = touch - rest_distances(grain_set, pairs[:, 0], pairs[:, 1])
-    most = most_overlap(rest, body.radius[pairs].min(axis=1))
-    return [
-        f"grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m, at most {most[k]:.3g} m is allowed: "
-        "move them apart"
-        for k in np.flatnonzero(overlap > most)
-    ]
+def refuse_pieces(grains: Grains, pairs: np.ndarray, box: Box, origin: str) -> None:
+    """Refuse grains that are not connected to the largest cluster.
+
+    Raises
+    ------
+    BadInput
+        One line for each of the first ten other clusters, with the gap between the two nearest grains.
+    """
+    label = cluster_labels(pairs, len(grains))
+    sizes = np.bincount(label)
+    others = [int(k) for k in dict.fromkeys(label.tolist()) if k != sizes.argmax()]
+    problems = []
+    for cluster in others[:MOST_MESSAGES]:
+        i, j, gap = _nearest_outside(grains, np.flatnonzero(label == cluster), box)
+        more = sizes[cluster] - 1
+        of_cluster = f" (with {more} more that it touches)" if more else ""
+        problems.append(
+            f"{origin}: grain {i}{of_cluster} has no contact with the rest of the body: a gap of about {gap:.3g} m to "
+            f"grain {j}; close it, or leave the grain out"
+        )
+    if problems:
+        raise BadInput(first_problems(problems, len(others), "such grains"))
 
 
-def _gaps(body: Grains, pairs: np.ndarray) -> list[str]:
-    """Messages about grains outside the largest cluster, with their nearest neighbour in it."""
-    from scipy.spatial import cKDTree  # slow to import, and used for bodies from files only
+def _nearest_outside(grains: Grains, inside: np.ndarray, box: Box) -> tuple[int, int, float]:
+    """Grain of a cluster, grain outside, and gap [m] of the two whose surfaces are nearest."""
+    outside = np.setdiff1d(np.arange(len(grains)), inside)
+    best = (0, 0, np.inf)
+    for i in inside.tolist():
+        apart = np.linalg.norm(box.nearest(grains.position[outside] - grains.position[i]), axis=1)
+        gap = apart - grains.radius[outside] - grains.radius[i]
+        k = int(gap.argmin())
+        if gap[k] < best[2]:
+            best = (i, int(outside[k]), float(gap[k]))
+    return best
 
-    main = np.zeros(len(body), dtype=bool)
-    main[largest_cluster(pairs, len(body))] = True
-    outside = np.flatnonzero(~main)
-    if not len(outside):
-        return []
-    distance, nearest = cKDTree(body.position[main]).query(body.position[outside])
-    neighbours = np.flatnonzero(main)[nearest]
-    return [
-        f"grain {i} has no contact with the rest of the body: a gap of about "
-        f"{max(d - body.radius[i] - body.radius[j], 0.0):.3g} m to grain {j}; close it, or leave the grain out"
-        for i, j, d in zip(outside, neighbours, distance, strict=True)
-    ]
+
+def cluster_labels(pairs: np.ndarray, count: int) -> np.ndarray:
+    """Number of the cluster of each of `count` grains, (N,)."""
+    from scipy.sparse import csr_array  # slow to import
+    from scipy.sparse.csgraph import connected_components
+
+    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def largest_cluster(pairs: np.ndarray, count: int) -> np.ndarray:
     """Indices of the largest connected cluster among the first `count` grains."""
-    from scipy.sparse import csr_array  # slow to import
-    from scipy.sparse.csgraph import connected_components
-
-    inside = pairs[(pairs < count).all(axis=1)]
-    graph = csr_array((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    label = cluster_labels(pairs[(pairs < count).all(axis=1)], count)
     return np.flatnonzero(label == np.bincount(label).argmax())

@@ -128,12 +128,10 @@ def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities:
 
 def _direction(along: Any) -> np.ndarray:
     named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    try:
-        vector = np.asarray(named.get(along, along) if isinstance(along, str) else along, dtype=np.float64)
-    except (TypeError, ValueError):
-        vector = np.zeros(0)
+    found = in_unit(named.get(along, along) if isinstance(along, str) else along, "1")
+    vector = np.zeros(0) if found is None else np.asarray(found)
     if vector.shape != (3,) or not np.linalg.norm(vector) > 0.0 or not np.isfinite(vector).all():
-        raise BadInput(f"along = {along!r} must be 'x', 'y', 'z' or three numbers, not all 0")
+        raise BadInput(f"along = {shown(along)} must be 'x', 'y', 'z' or three numbers, not all 0")
     return vector / np.linalg.norm(vector)
 
 

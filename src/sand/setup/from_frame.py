@@ -13,10 +13,8 @@ from ..errors import BadInput, did_you_mean, refuse_other
 from ..grains import Grains
 from ..material import Material
 from ..units import format_quantity
+from .overlap_fit import APART, ITERATIONS, deficit, least_shift, overlapping, scaled_box
 
-APART = 1e-9
-"""Gap, in mean radii, given to pairs without a contact that overlap because of single precision."""
-ITERATIONS = 30
 SINGLE = 6e-8
 """Relative rounding error of single precision, in which diameters and masses are stored."""
 
@@ -131,52 +129,27 @@ def restore_overlaps(
     initial, size = position / unit, radius / unit
     x, known = initial, {tuple(sorted(p)) for p in pair.tolist()}
     spurious = np.zeros((0, 2), dtype=np.int64)  # pairs without a contact that overlap because of single precision
-    scaled = Box(tuple(None if v is None else v / unit for v in box.lengths))  # type: ignore[arg-type]
+    scaled = scaled_box(box, unit)
     rounding = float(np.abs(initial).max())
     tolerance = 64.0 * np.finfo(float).eps * max(1.0, rounding)
     target = size[pair].sum(axis=1) - overlap / unit
     for _ in range(ITERATIONS):
-        touching = [p for p in _overlapping(x, size, scaled) if tuple(sorted(p)) not in known]
+        touching = [p for p in overlapping(x, size, scaled) if tuple(sorted(p)) not in known]
         known |= {tuple(sorted(p)) for p in touching}
         spurious = np.concatenate([spurious, np.array(touching, dtype=np.int64).reshape(-1, 2)])
         constrained = np.concatenate([pair, spurious])
-        deficit, n = _deficit(x, constrained, np.concatenate([target, size[spurious].sum(axis=1)]), scaled)
+        lacking, n = deficit(x, constrained, np.concatenate([target, size[spurious].sum(axis=1)]), scaled)
         free = np.arange(len(constrained)) >= len(pair)
         # pairs without a contact are separated only if they overlap, with a small gap
-        deficit = np.where(free, np.where(deficit >= 0.0, deficit + max(APART, 4.0 * tolerance), 0.0), deficit)
-        if not len(constrained) or np.abs(deficit).max() <= tolerance:
+        lacking = np.where(free, np.where(lacking >= 0.0, lacking + max(APART, 4.0 * tolerance), 0.0), lacking)
+        if not len(constrained) or np.abs(lacking).max() <= tolerance:
             break
-        use = ~free | (deficit > 0.0)
-        x = x + _least_shift(constrained[use], n[use], deficit[use], len(x))
+        use = ~free | (lacking > 0.0)
+        x = x + least_shift(constrained[use], n[use], lacking[use], len(x))
     else:
-        i, j = constrained[int(np.abs(deficit).argmax())]
+        i, j = constrained[int(np.abs(lacking).argmax())]
         raise BadInput(f"the overlap of grains {i} and {j} does not fit their positions; the frame is damaged")
     if np.abs(x - initial).max() > max(1e-3, 64.0 * SINGLE * rounding):
         raise BadInput("the overlaps of the frame do not fit its positions; it is damaged, or not from SAND")
     # positions that need no correction keep their bits
     return np.where(x == initial, position, x * unit)
-
-
-def _deficit(place: np.ndarray, pair: np.ndarray, wanted: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray]:
-    """Deficit of each pair's distance (C,), and its direction (C, 3)."""
-    apart = box.nearest(place[pair[:, 0]] - place[pair[:, 1]])
-    distance = np.linalg.norm(apart, axis=1)
-    return wanted - distance, apart / distance[:, None]
-
-
-def _overlapping(place: np.ndarray, size: np.ndarray, box: Box) -> list[tuple[int, int]]:
-    """Pairs of spheres that touch."""
-    pairs = box.close_pairs(place, 2.0 * float(size.max()))
-    apart = np.linalg.norm(box.nearest(place[pairs[:, 0]] - place[pairs[:, 1]]), axis=1)
-    return [(int(i), int(j)) for i, j in pairs[apart <= size[pairs].sum(axis=1)]]
-
-
-def _least_shift(pair: np.ndarray, n: np.ndarray, lacking: np.ndarray, count: int) -> np.ndarray:
-    """Smallest displacements (N, 3) that compensate the deficit of each distance to first order."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.linalg import lsqr
-
-    rows = np.repeat(np.arange(len(pair)), 6)
-    columns = (3 * pair[:, :, None] + np.arange(3)).reshape(-1)
-    jacobian = csr_array((np.stack([n, -n], axis=1).reshape(-1), (rows, columns)), shape=(len(pair), 3 * count))
-    return lsqr(jacobian, lacking, atol=1e-12, btol=1e-12)[0].reshape(count, 3)

@@ -16,7 +16,7 @@ from ..constants import BOLTZMANN, LIGHT
 from ..errors import BadInput, ErrorCollector, did_you_mean, shown, warn
 from ..grains import Grains
 from ..material import PRESETS, Material
-from ..units import MELTED, format_quantity, in_unit, seed_given, si, whole_number
+from ..units import MELTED, dimensions, format_quantity, in_unit, is_word, seed_given, si, whole_number
 from .from_frame import Start
 from .grain_classes import GrainClass, Members, class_from, class_numbers, joined_members, members_of
 from .moments import directions
@@ -188,8 +188,8 @@ def gas_with_contacts(
 
 def _region(box: Box, extent: Any) -> Box:
     """Region that a gas fills: the box, with `extent` along its open axes.  Raises BadInput."""
-    if isinstance(extent, (list, tuple)) or np.ndim(extent) == 1:
-        given = [None if own == "periodic" else own for own in extent]
+    if isinstance(extent, (list, tuple)) or dimensions(extent) == 1:
+        given = [None if is_word(own, "periodic") else own for own in extent]
     else:
         given = [extent if length is None else None for length in box.lengths]
     if len(given) != 3:
@@ -200,7 +200,9 @@ def _region(box: Box, extent: Any) -> Box:
             f"a gas needs a box that is periodic, or its extent along open axes, and this box is open along "
             f"{', '.join(missing)}; give extent, such as '1 um'"
         )
-    periodic = [a for a, length, own in zip("xyz", box.lengths, given, strict=True) if None not in (length, own)]
+    periodic = [
+        a for a, length, own in zip("xyz", box.lengths, given, strict=True) if not (length is None or own is None)
+    ]
     if periodic or (extent is not None and None not in box.lengths):
         along = ", ".join(periodic or "xyz")
         raise BadInput(f"extent: the box is periodic along {along}; give extent along open axes only")

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import MOST_GRAINS, checked
-from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
+from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown, warn
 from ..grains import Grains, moment_size, vector_for_all
-from ..io.run_folder import checked_name
 from ..material import PRESETS, Material, as_material
-from ..units import si, whole_number
+from ..paths import checked_name
+from ..units import dimensions, si, whole_number
 from .aggregates import KINDS, build
 from .encounters import combined, turned
-from .from_file import TEXT_SUFFIXES, body_from_file, from_trajectory, largest_body
+from .from_file import body_from_file, from_trajectory, is_own_trajectory, largest_body
 from .from_frame import StrainedContacts
 from .population import divided, drawn, fractions_of, radii_of, refuse_sum
 
@@ -61,10 +61,10 @@ class GrainClass:
     dimension, prefactor : float, optional
         Fractal dimension and prefactor, for kind "fractal".
     file : str, optional
-        Body or trajectory for kind "file", with the suffixes of `file` of a gas; of a frame the largest cluster, with
-        its contacts and their displacements. Velocities in the file are not used.
+        Body or trajectory for kind "file", in any format that `file` of [grains] may have; of a frame of a run the
+        largest cluster, with its contacts and their displacements. Velocities and spins in the file are not used.
     frame : int, optional
-        Index of the frame of a trajectory; −1, the last, by default.
+        Index of the frame; −1, the last, by default.
     length : str, optional
         Unit of the file's lengths, such as 1 nm.
 
@@ -125,7 +125,7 @@ class GrainClass:
             "radius": radius_as_given,
             "material": material_as_given,
             "moment": moment_as_given,
-            "charge": lambda v: si(v, "C", "charge") if np.ndim(v) == 0 else v,  # an array is checked by Grains
+            "charge": lambda v: si(v, "C", "charge") if dimensions(v) == 0 else v,  # an array is checked by Grains
         }
         for name, read in readers.items():
             if (value := getattr(self, name)) is not None and name not in foreign:
@@ -143,7 +143,7 @@ def radius_as_given(value: Any) -> Any:
 
 def moment_as_given(value: Any) -> Any:
     """Check a moment as `moment_size` does; it stays as it is. Raises BadInput."""
-    if np.ndim(value) == 0:  # an array is checked against the number of grains
+    if dimensions(value) == 0:  # an array is checked against the number of grains
         moment_size(value, np.ones(1))
     return value
 
@@ -250,6 +250,10 @@ def members_of(
             contacts.append(StrainedContacts(strained.pair, slide, roll, strained.twist))
     sizes = np.array([len(body) for body in bodies])
     grains = combined(bodies, [np.zeros(3)] * count, [np.zeros(3)] * count)
+    if given.charge is not None and grains.charge.any():
+        raise BadInput(
+            f"charge: {given.file} has the charges of its grains; leave charge out, or give it to other classes"
+        )
     if given.charge is not None:
         grains.arrays.charge[:] = given.charge
     for name in ("velocity", "spin"):
@@ -270,14 +274,16 @@ def _body_and_contacts(
     BadInput
         If the file cannot be read, or a key does not apply to it.
     """
-    path = Path(given.file).expanduser()
-    if path.suffix in TEXT_SUFFIXES:
-        if given.frame is not None:
-            raise BadInput(f"frame = {given.frame}: {path} is a body, without frames; leave frame out")
-        return body_from_file(path, material, given.radius, given.length, library), None
+    path = Path(given.file)
+    number = -1 if given.frame is None else given.frame
+    if not is_own_trajectory(path):
+        body = body_from_file(path, material, given.radius, given.length, library, frame=number)
+        if body.velocity.any() or body.spin.any():
+            warn(f"{path}: its velocities and spins are not used; those of a gas follow from its temperature")
+        return body, None
     if extra := [name for name in ("radius", "material", "length") if getattr(given, name) is not None]:
         raise BadInput(f"{extra[0]}: the trajectory {path} has it; leave {extra[0]} out")
-    return largest_body(from_trajectory(path, -1 if given.frame is None else given.frame, library))
+    return largest_body(from_trajectory(path, number, library))
 
 
 def _single(given: GrainClass, count: int, rng: np.random.Generator) -> Members:
@@ -335,7 +341,7 @@ def in_library(given: Any, library: Mapping[str, Material]) -> Any:
         return library[given] if given in library else as_material(given)
     if isinstance(given, Mapping):
         return {in_library(name, library): part for name, part in given.items()}
-    if isinstance(given, (Sequence, np.ndarray)):
+    if isinstance(given, (Sequence, np.ndarray)) and dimensions(given) == 1:
         return [in_library(one, library) for one in given]
     return as_material(given)
 

@@ -16,7 +16,7 @@ from ..contact.mixing import pairing_between
 from ..errors import BadInput, shown
 from ..grains import Grains, materials_of
 from ..material import Material, as_material
-from ..units import format_quantity, in_unit, seed_given, si, whole_number
+from ..units import dimensions, format_quantity, in_unit, not_a_quantity, seed_given, si, whole_number
 from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0
@@ -171,11 +171,14 @@ def radii_of(given: Any) -> Any:
     texts = isinstance(given, (list, tuple)) and any(isinstance(one, str) for one in given)
     values = [si(one, "m", f"radius of grain {k}") for k, one in enumerate(given)] if texts else in_unit(given, "m")
     if values is None:
+        if dimensions(given):
+            raise not_a_quantity(given, "m", "radius")
         raise BadInput(f"radius = {shown(given)} is not a radius or a distribution; give {FORMS}")
     if np.ndim(values) == 0:
         return si(given, "m", "radius", above=0.0)
     values = np.asarray(values)
-    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0))) if values.ndim == 1 else [0]
+    is_list = values.ndim == 1 and values.size > 0
+    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0))) if is_list else [0]
     if len(bad):
         raise BadInput(f"radius: give N numbers above 0 in m; that of grain {bad[0]} is not")
     _refuse_wide(float(values.min()), float(values.max()))

@@ -120,8 +120,9 @@ def build_engine(
     pair_gap = list_gap(grains, box) if rigid else float(grains.radius.min())
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
-    if fresh:  # grains of another simulation may have other identities
+    if fresh:  # grains of another simulation may have other identities, and have crossed its box
         wrapped.arrays.id[...] = np.arange(len(grains))
+        wrapped.arrays.image[...] = 0
     if rigid:
         neighbours = dataclasses.replace(neighbours, order="as given")
     held = driven_arrays(driven, grains)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from ..analysis.clusters import unwrapped
 from ..box import Box, as_box
 from ..contact.model import Contact
 from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
@@ -17,7 +19,9 @@ from ..grains import Grains
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
 from ..own_quantities import own_values
+from ..quantity_array import QuantityArray
 from ..schema import BY_NAME, CHANGEABLE, stored
+from ..setup.checks import at_same_place
 from ..state.arrays import SAVED_LONG_RANGE
 from ..state.state import (
     BROKEN,
@@ -38,7 +42,7 @@ from ..state.state import (
     State,
     grains_from_arrays,
 )
-from ..units import si
+from ..units import has_unit_within, si
 from .assemble import build_engine, fitting_forces
 from .changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
 from .checks import outside_box
@@ -65,7 +69,8 @@ class Change:
     Attributes
     ----------
     velocity, spin, moment : ndarray
-        (N, 3) [m/s, rad/s, A m²] in the laboratory frame, to be changed in place or assigned.
+        (N, 3) [m/s, rad/s, A m²] in the laboratory frame, to be changed in place or assigned; text and quantities with
+        a unit are converted.
     charge : ndarray
         (N,) [C].
     own : dict of ndarray
@@ -107,7 +112,7 @@ class Change:
         for name, value in fixed.items():
             object.__setattr__(self, name, value)
         for name in QUANTITIES:
-            setattr(self, name, getattr(grains, name).copy())
+            setattr(self, name, getattr(grains, name))
         self.forces, self.box = tuple(forces), box
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -118,7 +123,11 @@ class Change:
         if name not in ASSIGNED:
             known = (*ASSIGNED, *self.grains.own_units)
             raise BadInput(f"a change has no '{name}' to assign; {did_you_mean(name, known)}")
-        object.__setattr__(self, name, as_box(value) if name == "box" else value)
+        if name == "box":
+            value = as_box(value)
+        elif name in QUANTITIES:
+            value = QuantityArray(value, BY_NAME[name].unit, name)
+        object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
         """Values of an own quantity."""
@@ -159,7 +168,10 @@ class Change:
         BadInput
             At the end of the change, if there is no such grain, or no grain would remain.
         """
-        count, given = len(self.grains), np.atleast_1d(np.asarray(which))
+        count, given = len(self.grains), np.zeros(1)  # what is not an array is refused below
+        if not has_unit_within(which):
+            with contextlib.suppress(TypeError, ValueError, OverflowError, RecursionError):
+                given = np.atleast_1d(np.asarray(which))
         if given.size == 0:
             return
         if given.dtype == bool and given.shape != (count,):
@@ -234,6 +246,9 @@ class Change:
         moved, box = self.grains.copy(), Box(lengths)  # type: ignore[arg-type]
         position = scaled_positions(self.grains, self._pairs(), self.box, factors)
         moved.arrays.position[...] = box.wrap(position).T
+        # grains of clusters that lie across a boundary may come to lie on its other side
+        whole = unwrapped(self.grains.position, self._pairs(), self.box)
+        moved.arrays.image[...] += (box.image(position) - self.box.image(whole)).T
         object.__setattr__(self, "grains", moved)
         object.__setattr__(self, "_is_scaled", True)
         self.box = box
@@ -246,7 +261,9 @@ class Change:
         BadInput
             If the simulation has no force of this kind.
         """
-        (given,) = read_forces(force)
+        given, *others = read_forces(force) or (None,)
+        if given is None or others:
+            raise BadInput(f"replace: {shown(force)}; give one force, such as sand.Field('0 T')")
         names = [own.name for own in self.forces]
         if given.name not in names:
             raise BadInput(f"forces: the simulation has no '{given.name}'; {did_you_mean(given.name, names)}")
@@ -330,7 +347,9 @@ class Change:
         return grains
 
     def refuse_overlaps(self, grains: Grains, forces: Sequence[Force]) -> None:
-        """Refuse added grains, and a box, in which grains without a contact overlap by more than at a start."""
+        """Refuse added grains, and a box, in which grains overlap by more than at a start, or are at the same place."""
+        if self.regroups and (same := at_same_place(grains, self.box)):
+            raise BadInput(same)
         contact = next((force for force in forces if isinstance(force, Contact)), None)
         if contact is None or not self.regroups:
             return

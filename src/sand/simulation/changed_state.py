@@ -36,7 +36,7 @@ def joined(first: Grains, second: Grains, identity: np.ndarray) -> Grains:
     number = np.array([materials.index(own) for own in second.materials], np.uint32)
     joined_own([first.own, second.own], ["add: the grains of the simulation have", "add: the grains added have"])
     own = np.array([second.own[name] for name in first.own_units]).reshape(-1, len(second))
-    nothing = {name: np.zeros_like(getattr(second.arrays, name)) for name in ("force", "torque", "field")}
+    nothing = {name: np.zeros_like(getattr(second.arrays, name)) for name in ("force", "torque", "field", "image")}
     more = second.arrays._replace(material=number[second.arrays.material], id=identity, own=own, **nothing)
     other = copy.copy(first)
     other.arrays = GrainArrays(*(np.concatenate(both, axis=-1) for both in zip(first.arrays, more, strict=True)))

@@ -13,6 +13,7 @@ from ..forces.base import Force, LongRangeForce
 from ..forces.pair.inverse_square import Charges
 from ..forces.pair.screened_charges import ScreenedCharges
 from ..grains import Grains
+from ..setup.checks import at_same_place
 from ..units import format_quantity
 from .limits import limit_warnings
 from .solid_limits import fast_settling, grain_warnings
@@ -26,6 +27,12 @@ NEAREST = 8
 """Nearest neighbours of a grain, itself included, that are checked for overlaps."""
 OVERLAP_TOLERANCE = 1e-3
 """Overlap, in radii of the smaller grain, that counts as rounding where there is no contact law."""
+
+
+def _of_a_start(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """Errors of positions and cut-offs at a new start."""
+    outside = outside_box(grains, box)
+    return [*outside, *([] if outside else at_same_place(grains, box)), *_short_cutoffs(grains, forces, box)]
 
 
 def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
@@ -46,7 +53,7 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
     BadInput
         With all problems.
     """
-    problems = [*outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
+    problems = _of_a_start(grains, forces, box) if fresh else []
     warnings: list[str] = []
     names = {force.name for force in forces}
     if {Charges.name, ScreenedCharges.name} <= names:

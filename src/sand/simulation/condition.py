@@ -1,4 +1,4 @@
-"""Conditions that end a run: comparisons of ledger columns with numbers, or a function of the user."""
+"""Conditions that end a run: comparisons of ledger columns or the wall time with numbers, or a function of the user."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from .ledger import MOMENTA, NUMBERS
 
 EVERY, EVERY_LONG = 100, 1
 """Regular steps between two checks of a condition, and those of rigid clusters, which are up to 1000 times as long."""
+WALL = "wall"
+"""Name of the wall time of the present call of `run` [s] in a condition, beside the columns of the ledger."""
 GIVEN = "given"
 """Text of a condition that is a function of a script, in case.toml."""
 LONGEST, DEEPEST = 1000, 20
@@ -60,11 +62,11 @@ class Condition:
 
     def check(self, columns: Sequence[str]) -> None:
         """Refuse columns that the ledger lacks.  Raises BadInput."""
-        unknown = [name for name in dict.fromkeys(self.names) if name not in columns]
+        known = [*columns, WALL]
+        unknown = [name for name in dict.fromkeys(self.names) if name not in known]
         if unknown:
             raise BadInput(
-                f"stop = {shown(self.text)}: unknown quantity '{name}'; {did_you_mean(name, columns)}"
-                for name in unknown
+                f"stop = {shown(self.text)}: unknown quantity '{name}'; {did_you_mean(name, known)}" for name in unknown
             )
 
 
@@ -90,7 +92,7 @@ class OwnCondition:
 
 def unit_of(column: str) -> str:
     """SI unit of a column of the ledger."""
-    if column == "time":
+    if column in ("time", WALL):
         return "s"
     if column in ("step", *NUMBERS, AWAKE):
         return "1"

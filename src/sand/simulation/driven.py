@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -69,9 +69,10 @@ class Driven:
 
 def read_driven(value: Any) -> tuple[Driven, ...]:
     """Driven grains given as a list, one `Driven` or None.  Raises BadInput."""
-    given = (
-        [value] if isinstance(value, Driven) else list(value or ()) if isinstance(value, Iterable | None) else [value]
-    )
+    try:
+        given = [value] if isinstance(value, Driven) else [] if value is None else list(value)
+    except TypeError:
+        given = [value]
     wrong = [each for each in given if not isinstance(each, Driven)]
     if wrong:
         raise BadInput(f"driven = {shown(wrong[0])}; give sand.Driven([0, 1]), or a list of these")

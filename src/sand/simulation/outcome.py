@@ -14,7 +14,8 @@ class Outcome(Enum):
 
     FINISHED = "the requested end is reached"
     CONDITION_MET = "the condition that ends the run is met"
-    INTERRUPTED = "interrupted by a signal; a checkpoint lets the run continue"
+    INTERRUPTED = "interrupted by a signal or the wall time allowed; a checkpoint lets the run continue"
+    WALL_TIME = "the wall time of the condition is used up; a checkpoint lets the run continue"
     NOT_FINITE = "a speed or spin is no longer a finite number"
     RUNAWAY = "the energy runs away: its error exceeds half of all energy in the system; the step is too long"
     NO_STEP = "no step can be taken: the forces require one too short for the resolution of the time"
@@ -25,9 +26,11 @@ class Outcome(Enum):
     @property
     def is_physics(self) -> bool:
         """Whether the physics or the numerics stopped the run (exit code 3)."""
-        return self not in (Outcome.FINISHED, Outcome.CONDITION_MET, Outcome.INTERRUPTED)
+        return self not in (Outcome.FINISHED, Outcome.CONDITION_MET, *UNFINISHED)
 
 
+UNFINISHED = (Outcome.INTERRUPTED, Outcome.WALL_TIME)
+"""Outcomes of runs that wait to be continued."""
 OUTCOME_OF_STOP = {stop: Outcome[stop.name] for stop in Stop if stop.name in Outcome.__members__}
 
 

@@ -13,7 +13,7 @@ from ..state.state import CONTACTS, State
 NOT_COPIED = ("pair", "constants", "every_step", "side", "start", "gather_order")
 CONTACT_COLUMNS = tuple(name for name in ContactArrays._fields if name not in NOT_COPIED)
 """Arrays of contacts that a part needs and changes; pairs are numbered anew, the others follow."""
-MOVING = ("position", "velocity", "orientation", "spin", "moment")
+MOVING = ("position", "velocity", "orientation", "spin", "moment", "image")
 MOVING_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
 """Arrays of grains and of bodies that change in a step."""
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time as wall
+from collections.abc import Mapping
 from typing import Any
 
 from ..integrate.parts import Stop
 from ..integrate.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
-from .condition import EVERY, EVERY_LONG, Condition, OwnCondition
+from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
 from .cost import StepTimer
 from .ledger import COUNTED
 from .observers import call_ticks
@@ -33,11 +34,15 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
     simulation._stopped_by = ""
     if condition is not None and simulation._met == (key_of(condition), simulation.steps):
         return Outcome.CONDITION_MET
+    started = wall.monotonic()
     frames, rows, saves = _schedules(simulation)
     every = EVERY_LONG if isinstance(simulation.stepping, RigidClusters) else EVERY
     checks = Schedule(None if condition is None else Cadence("steps", every), simulation.time, simulation.steps)
     updates = UpdateSchedule(simulation)
     if condition is not None and simulation.steps == 0.0 == simulation.time and _is_met(simulation, condition):
+        return Outcome.CONDITION_MET
+    simulation._stopped_by = updates.act_again()
+    if simulation._stopped_by:
         return Outcome.CONDITION_MET
     steps_per_call, checked_at, estimate = 64, simulation.steps, RunTimeEstimate(end, last, simulation._warn)
     while True:
@@ -100,6 +105,10 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
             call_ticks(simulation.observers, simulation)
         if signals.received:
             return Outcome.INTERRUPTED
+        if condition is not None and _is_late(simulation, condition, wall.monotonic() - started):
+            return Outcome.WALL_TIME
+        if simulation.writer:
+            signals.saving.add(simulation.writer)
 
 
 def _schedules(simulation: Simulation) -> list[Schedule]:
@@ -119,16 +128,24 @@ def _schedules(simulation: Simulation) -> list[Schedule]:
 
 
 def _is_met(simulation: Simulation, condition: Condition | OwnCondition) -> bool:
-    """Whether the present regular state meets a condition."""
-    if isinstance(condition, OwnCondition):
-        holds = condition.holds(simulation)
-    else:
-        holds = condition.holds(
-            simulation._count_row() if COUNTED.issuperset(condition.names) else simulation._log_row()
-        )
+    """Whether the present regular state meets a condition, whatever the wall time."""
+    holds = _holds(simulation, condition, 0.0) if isinstance(condition, Condition) else condition.holds(simulation)
     if holds:
         simulation._met = (key_of(condition), simulation.steps)
     return holds
+
+
+def _is_late(simulation: Simulation, condition: Condition | OwnCondition, seconds: float) -> bool:
+    """Whether a condition is met because of the wall time [s] of this run; the run can then be continued."""
+    return isinstance(condition, Condition) and WALL in condition.names and _holds(simulation, condition, seconds)
+
+
+def _holds(simulation: Simulation, condition: Condition, seconds: float) -> bool:
+    """Whether a condition holds after a wall time of `seconds` [s]."""
+    row: Mapping[str, float] = {}
+    if names := set(condition.names) - {WALL}:
+        row = simulation._count_row() if COUNTED.issuperset(names) else simulation._log_row()
+    return condition.holds({**row, WALL: seconds})
 
 
 def key_of(condition: Condition | OwnCondition) -> Any:

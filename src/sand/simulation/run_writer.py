@@ -16,11 +16,13 @@ from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
 from ..io.checkpoint import write_checkpoint
+from ..io.checkpoint_files import checkpoint_files
 from ..io.damage import sealed
 from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
+from ..paths import user_path
 from ..state.state import (
     BODIES,
     CLOCK,
@@ -42,8 +44,9 @@ from ..version import __version__
 from .cadence import read_cadence
 from .displays import DISPLAYS
 from .ledger import Ledger
-from .outcome import Outcome, Result
+from .outcome import UNFINISHED, Result
 from .serialise import case_of
+from .signals import Signals
 from .stop import StopCriteria
 from .updater import described
 
@@ -80,7 +83,7 @@ class RunWriter:
     def __init__(
         self, out: str | Path, overwrite: bool = False, resumed: bool = False, written: dict[str, Any] | None = None
     ):
-        self.folder = Path(out) if resumed else make_folder(out, overwrite=overwrite)
+        self.folder = user_path(out) if resumed else make_folder(out, overwrite=overwrite)
         self._resumed = resumed
         self.draws = True  # a figure at the end of each `run`
         self._trajectory: TrajectoryWriter | None = None
@@ -91,9 +94,9 @@ class RunWriter:
         self._lock: FolderLock | None = None
         self._changed = False  # by the user or an updater since case.toml was written
         self._written = written  # the case in case.toml
-        newest = max(self.folder.glob("checkpoint-*.npz"), default=None) if resumed else None
+        kept = checkpoint_files(self.folder) if resumed else []
         # the checkpoint from which this simulation continues, or the last one that it wrote
-        self._own: tuple[str, int] | None = None if newest is None else _stamp(newest)
+        self._own: tuple[str, int] | None = _stamp(kept[-1]) if kept else None
 
     def open(self, simulation: Simulation, criteria: StopCriteria) -> None:
         """Create the files or continue them; called by each `run` with its stop criteria.
@@ -126,6 +129,7 @@ class RunWriter:
         """Open ledger and trajectory, or create them, and write a checkpoint."""
         if self._resumed:
             self._clean_up_earlier(simulation)
+        self._stop_beside_others()
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         times = simulation._frame_times
         resumed_at = (times[-1] if times else -math.inf) if self._resumed else None
@@ -145,6 +149,7 @@ class RunWriter:
 
     def release(self) -> None:
         """Release the lock of the folder; `open` takes it again."""
+        Signals.saving.discard(self)
         if self._lock is not None:
             self._lock.release()
             self._lock = None
@@ -152,14 +157,22 @@ class RunWriter:
     def _refuse_others_files(self, steps: int) -> None:
         """Raise BadInput if the folder holds files that this simulation, at step `steps`, did not write."""
         begun = self._resumed or self._trajectory is not None
-        newest = max(self.folder.glob("checkpoint-*.npz"), default=None)
-        if newest is None:
-            strange = not begun and (self.folder / files.TRAJECTORY).exists()
-        else:
-            strange = _stamp(newest) != self._own
+        kept = checkpoint_files(self.folder)
+        begun_by_others = not begun and (self.folder / files.TRAJECTORY).exists()
+        strange = _stamp(kept[-1]) != self._own if kept else begun_by_others
         if strange:
             advice = "continue its run with sand.resume" if begun else "give another folder"
             raise BadInput(f"another run has written to {self.folder} since this simulation was created; {advice}")
+
+    def _stop_beside_others(self) -> None:
+        """Raise BadInput if another process has begun to write to the folder, where the file system has no locks."""
+        kept = [_stamp(path) for path in checkpoint_files(self.folder)[-1:]]
+        taken = self._lock is not None and not self._lock.is_held
+        if taken or (self._own is not None and kept and kept[0] > self._own):
+            raise BadInput(
+                f"another process has begun to write to {self.folder}, whose file system has no locks; this run stops "
+                "and writes nothing more to it. Continue the other one when it has ended: sand resume"
+            )
 
     def _clean_up_earlier(self, simulation: Simulation) -> None:
         """Of a resumed run: keep a copy of a damaged ledger, and delete a summary of steps that are taken again."""
@@ -177,6 +190,8 @@ class RunWriter:
         """Write a row of the ledger, and a frame."""
         if self._ledger is None:
             return
+        if self._lock is not None and not self._lock.is_held:
+            self._stop_beside_others()
         self._ledger.append(row)
         if with_frame:
             self._frame(simulation)
@@ -202,6 +217,7 @@ class RunWriter:
 
         An unsound state is not written: the last good checkpoint stays.
         """
+        self._stop_beside_others()
         regular = simulation.regular_state
         assert regular.count[STAGE] == 0
         begun = wall.monotonic()
@@ -257,8 +273,9 @@ class RunWriter:
             self._trajectory.close()
         summary = summary_of(simulation, result, ledger) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
-        # no figure after an interruption: the user is waiting for the prompt
-        if self.draws and result.outcome is not Outcome.INTERRUPTED:
+        Signals.saving.discard(self)
+        # no figure after an interruption: the user is waiting for the prompt, or the wall time ends
+        if self.draws and result.outcome not in UNFINISHED:
             self.draw(simulation)
 
     def draw(self, simulation: Simulation) -> None:

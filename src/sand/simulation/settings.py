@@ -80,7 +80,10 @@ def read_forces(value: Any) -> tuple[Force, ...]:
         value = [value]
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable | None):
         raise BadInput(f"forces = {shown(value)}; give a list such as [sand.Contact()]")
-    forces = tuple(() if value is None else value)
+    try:
+        forces = tuple(() if value is None else value)
+    except TypeError:  # a scalar array or quantity, which has the method but no entries
+        raise BadInput(f"forces = {shown(value)}; give a list such as [sand.Contact()]") from None
     problems = []
     for force in forces:
         if isinstance(force, type):

@@ -33,6 +33,7 @@ from .contact_table import ContactTable
 from .cost import StepTimer
 from .displays import DISPLAYS
 from .driven import read_driven
+from .exclusive import Exclusive, exclusive
 from .ledger import Ledger, count_row, kinetic_energies, labels_in, log_row
 from .observers import Observer
 from .outcome import Outcome, Result
@@ -152,7 +153,7 @@ class Simulation(ReadOnlySettings):
         )
         written = None if restart is None else restart[1].get("case_in_file")
         self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
-        self._clock = WallClock()
+        self._clock, self._exclusive = WallClock(), Exclusive()
         self._has_begun = restart is not None
         self._clusters: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))  # engine, counts, and labels for these
         self._frame_times: list[float] = []  # [s], of all frames so far
@@ -162,6 +163,8 @@ class Simulation(ReadOnlySettings):
         self._warned: list[str] = []
         self._failure = ""  # why the simulation cannot continue
         self._updating = False  # whether an updater acts now
+        self._changing = False  # whether the block of a `change` is open
+        self._owed: tuple[int, list[int]] = (-1, [])  # step, and updaters that have still to act at it
         self._stops = False  # whether the updater that acts ends the run
         self._stopped_by = ""  # the updater that ended the last run
         self._next_id = len(grains)  # identity of the next grain that is added
@@ -216,6 +219,7 @@ class Simulation(ReadOnlySettings):
         return self._clock.parts
 
     @property
+    @exclusive
     def is_sound(self) -> bool:
         """Whether the state is finite and the energy error is below the abort threshold."""
         return not self.ledger.runs_away(self._log_row())
@@ -233,12 +237,14 @@ class Simulation(ReadOnlySettings):
         return self.state.grains
 
     @property
+    @exclusive
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
         return ContactTable(self.state, self._engine.law, self._engine._current_table(self.state))
 
     @property
+    @exclusive
     def walls(self) -> tuple[WallState, ...]:
         """The walls at `time`: position, velocity, force, impulse, work, number of contacts."""
         self._begin()
@@ -265,6 +271,7 @@ class Simulation(ReadOnlySettings):
                 choices[f"{force.name} cut-off"] = f"{length} ({reason})"
         return choices | {"neighbours": self._engine.search} | present
 
+    @exclusive
     def loads(self) -> dict[str, Any]:
         """Compute the present loads without taking a step.
 
@@ -284,6 +291,7 @@ class Simulation(ReadOnlySettings):
             "energy": {name: row[name] for name in names},
         }
 
+    @exclusive
     def at_grains(self) -> dict[str, np.ndarray]:
         """Compute flux density and energies of each grain.
 
@@ -307,6 +315,7 @@ class Simulation(ReadOnlySettings):
         energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
         return {"flux_density": flux} | energies | self._engine.energies_at_grains()
 
+    @exclusive
     @checked
     def run(self, until: Any = None, *, steps: Any = None, stop: Any = None) -> Result:
         """Run until a time, for a number of steps, or until a condition is met, whichever comes first.
@@ -323,7 +332,8 @@ class Simulation(ReadOnlySettings):
             `or` and parentheses, such as "mean_cluster_size >= 20 and time > 1 us"; or a function of the simulation
             that returns True or False and changes nothing. It is checked at the regular steps 0, 100, 200, …, or the
             ends of the r-RESPA cycles in which these lie, and so at moments that depend neither on output nor on
-            interruptions.
+            interruptions. `wall` is the wall time of this call: where a condition holds only because of it, as "wall >
+            23 h" does, the outcome is `WALL_TIME`, and the run can be resumed with the bits of an uninterrupted one.
 
         Returns
         -------
@@ -337,12 +347,14 @@ class Simulation(ReadOnlySettings):
         FilesFailed
             If a file cannot be written, for example because the disk is full; files written before stay intact.
         Interrupted
-            After Ctrl-C or SIGTERM, when the checkpoint is written.
+            After Ctrl-C, SIGTERM, SIGUSR1, SIGUSR2, SIGHUP or SIGXCPU, when the checkpoint is written.
         """
         if self._failure:
             raise BadInput(f"this simulation cannot continue: {self._failure}")
         if self._clock.runs:
             raise BadInput("this simulation runs already; an updater or observer cannot call run")
+        if self._changing:
+            raise BadInput("run within `with sim.change()` is not possible; end the block first")
         criteria = stop_criteria(until, steps, stop, self.time, self.steps, self.planned)
         end, _, condition = criteria
         if condition is not None and not isinstance(condition, OwnCondition):
@@ -411,6 +423,17 @@ class Simulation(ReadOnlySettings):
             raise BadInput(f"this simulation cannot be changed: {self._failure}")
         if self._clock.runs and not self._updating:
             raise BadInput("a simulation that runs can be changed by an updater only: Simulation(updaters=[…])")
+        if self._changing:
+            raise BadInput("a change within a change is not possible; make both in one block of `with sim.change()`")
+        with self._exclusive.held("change"):
+            self._changing = True
+            try:
+                yield from self._change()
+            finally:
+                self._changing = False
+
+    def _change(self) -> Iterator[Change]:
+        """The change that the user makes, and its effect at the end of the block."""
         self._begin()
         present = tuple(as_chosen(force, self.start, self.box) for force in self.forces)
         pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
@@ -438,6 +461,7 @@ class Simulation(ReadOnlySettings):
         if self.writer:
             self.writer.changed(self)
 
+    @exclusive
     @checked
     def view(self, path: str | Path | None = None) -> Any:
         """Show the grains in motion: a widget in a notebook with anywidget, otherwise a page in the browser.
@@ -455,11 +479,13 @@ class Simulation(ReadOnlySettings):
         self._begin()
         return DISPLAYS["view"](self, path)
 
+    @exclusive
     def figure(self) -> Any:
         """Draw the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
         self._begin()
         return DISPLAYS["figure"](self)
 
+    @exclusive
     def copy(self) -> Simulation:
         """Return an independent simulation in memory, which continues with the same bits.
 
@@ -470,8 +496,11 @@ class Simulation(ReadOnlySettings):
         for name, value in vars(self).items():
             given = None if name == "writer" else [] if name == "observers" else copy.deepcopy(value, memo)
             object.__setattr__(other, name, given)
+        other._clock.end()  # of a simulation that runs, in an observer
+        object.__setattr__(other, "_updating", False)
         return other
 
+    @exclusive
     def status(self) -> str:
         """Describe the simulation in one line: time, steps, contacts, clusters, energy error and speed."""
         self._begin()

@@ -127,11 +127,21 @@ class UpdateSchedule:
         BadInput
             If an updater returns something other than True, False or None.
         """
-        simulation, ended = self._simulation, ""
-        engine = simulation._engine
+        engine = self._simulation._engine
         due = [k for k, each in enumerate(self._schedules) if each.is_due(engine.regular_time, engine.steps)]
-        for k in due:
+        return self._call(due)
+
+    def act_again(self) -> str:
+        """Call the updaters that have not acted at this step, because one raised an exception; returns as `act`."""
+        step, owed = self._simulation._owed
+        return self._call(owed) if owed and step == self._simulation._engine.steps else ""
+
+    def _call(self, due: list[int]) -> str:
+        """Call these updaters; returns and raises as `act`."""
+        simulation, ended = self._simulation, ""
+        for number, k in enumerate(due):
             updater, simulation._stops, simulation._updating = self._updaters[k][0], False, True
+            simulation._owed = (simulation._engine.steps, due[number:])
             try:
                 found = updater.act(simulation)
             finally:
@@ -143,5 +153,6 @@ class UpdateSchedule:
             if (found or simulation._stops) and not ended:
                 ended = name_of(updater)
         if due:
+            simulation._owed = (-1, [])
             self._plan(due)
         return ended

@@ -58,7 +58,11 @@ class WallClock:
         try:
             yield
         finally:
-            self._before, self._began, self._inside = self.total, -1.0, []
+            self.end()
+
+    def end(self) -> None:
+        """End the measurement of a run; has no effect without one."""
+        self._before, self._began, self._inside = self.total, -1.0, []
 
     @contextmanager
     def measure(self, part: str) -> Iterator[None]:

@@ -259,6 +259,8 @@ class State:
             self.grow_contacts(int(self.count[CONTACTS]))
         if self.pair_list.pair.shape[1] < self.count[PAIRS]:
             self.grow_pairs(int(self.count[PAIRS]))
+        if "grains/image" not in saved:  # of a checkpoint of an earlier version, which counted no crossings
+            saved = saved | {"grains/image": np.zeros_like(self.grains.arrays.image)}
         for name in GrainArrays._fields:
             _copy_into(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "pair_list"):

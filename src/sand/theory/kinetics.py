@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import checked
 from ..constants import BOLTZMANN
 from ..errors import BadInput, did_you_mean
-from ..units import si
+from ..units import si, si_array
 from . import growth, magnetic
 
 SPEEDS = ("impact", "thermal")
@@ -61,10 +61,7 @@ class CollisionKernel:
         BadInput
             If a mass is not a number above 0.
         """
-        try:
-            first, second = np.asarray(mass1, float), np.asarray(mass2, float)
-        except (TypeError, ValueError):
-            raise BadInput("masses must be numbers, in kg") from None
+        first, second = (si_array(mass, "kg", "mass") for mass in (mass1, mass2))
         if not (first > 0.0).all() or not (second > 0.0).all():
             raise BadInput("masses must be above 0 kg")
         found = self.function(*np.broadcast_arrays(first, second))

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import BadInput, SandError, did_you_mean, shown
-from ..units import si
+from ..units import si, si_array
 from .kinetics import KernelFunction
 from .size_distribution import COMPLETED, MASS_LOST, SIZE_REACHED, SizeDistribution
 
@@ -83,7 +83,7 @@ def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
 def coagulate(
     kernel: KernelFunction,
     sizes: np.ndarray,
-    numbers: np.ndarray,
+    numbers: np.ndarray | float,
     times: np.ndarray,
     *,
     mass: Any,
@@ -267,7 +267,7 @@ class _System:
 
 def _rates(kernel: KernelFunction, masses: np.ndarray) -> tuple[np.ndarray, float]:
     """K of all pairs relative to K of two clusters of the first size, and the latter."""
-    found = np.asarray(kernel(masses[:, None], masses[None, :]), float)
+    found = si_array(kernel(masses[:, None], masses[None, :]), "m^3/s", "kernel(m1, m2)")
     if found.shape != (len(masses), len(masses)):
         raise BadInput("the kernel must give one number for each pair of masses")
     if not (np.isfinite(found) & (found >= 0.0)).all() or not found[0, 0] > 0.0:

@@ -15,6 +15,7 @@ from ..analysis.tracking import SINGLE, Lineage
 from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
+from ..paths import user_path
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
 from ..version import __version__
@@ -323,6 +324,11 @@ def _unit_vector(vector: Sequence[float]) -> list[float]:
     return [float(f"{component / size:.9g}") if size > 0.0 else 0.0 for component in vector]
 
 
+def frames_dataset(path: Path, frames: Any, field: FieldDescription | None = None) -> RunDataset:
+    """The frames of a file without a run, for the viewer."""
+    return RunDataset(ByIdentity(frames), path.stem, str(path), ledger=lambda: None, summary=dict, field=field)
+
+
 def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunDataset:
     """Open a run folder, or a trajectory written by SAND, for the viewer.
 
@@ -331,15 +337,13 @@ def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunD
     BadInput
         If there is no run, no frame yet, or the trajectory is damaged or was written by another program.
     """
-    source = Path(path)
+    source = user_path(path)
     folder = find_run_folder(source)
     if folder is None:
         if not source.is_file():
             reason = f"there is no {files.TRAJECTORY} in it" if source.is_dir() else "there is no such folder or file"
             raise BadInput(f"{path} is neither a run folder nor a trajectory: {reason}")
-        return RunDataset(
-            ByIdentity(LiveTrajectory(source)), source.stem, str(path), ledger=lambda: None, summary=dict, field=field
-        )
+        return frames_dataset(source, LiveTrajectory(source), field)
     frames = ByIdentity(LiveTrajectory(folder / files.TRAJECTORY))
     name, ledger = folder.resolve().name, LedgerReader(folder)
     return RunDataset(frames, name, str(path), ledger=ledger, summary=lambda: read_summary(folder), field=field)

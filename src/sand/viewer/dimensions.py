@@ -29,12 +29,12 @@ def cluster_dimension(frame: Any, members: np.ndarray) -> Dimension:
     Raises
     ------
     BadInput
-        If the cluster has too few grains for a fit.
+        If the cluster has too few grains for a fit, or touches its own periodic image.
     """
     is_member = np.zeros(len(frame.position), dtype=bool)
     is_member[members] = True
     pairs = np.searchsorted(members, frame.pair[is_member[frame.pair[:, 0]]])
-    return correlation_dimension(unwrapped(frame.position[members], pairs, frame.box))
+    return correlation_dimension(unwrapped(frame.position[members], pairs, frame.box, True))
 
 
 def fit_dimension(frame: Any, names: np.ndarray, grain: int) -> dict[str, Any]:

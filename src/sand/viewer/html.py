@@ -16,6 +16,7 @@ from ..analysis.fractal import FEWEST
 from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import replacing
+from ..paths import user_path
 from .dataset import RunDataset
 from .dimensions import Dimensions
 from .packets import compact_json
@@ -87,7 +88,7 @@ def write_page(dataset: RunDataset, path: str | Path, *, progress: Callable[[], 
     dataset.compact = True
     count, dimensions, stride = len(dataset), [], _dimension_stride(dataset)
     largest_clusters = Dimensions()
-    with replacing(Path(path)) as file:
+    with replacing(user_path(path)) as file:
         file.write(_head(dataset.name, head, f"<p>{LOADING}</p>").encode())
         file.write(_packet_element("sand-grains", dataset.grains()))
         for k in range(count):

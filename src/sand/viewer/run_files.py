@@ -10,6 +10,7 @@ from ..analysis.ledger_columns import LedgerColumns
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_rows
+from ..paths import user_path
 
 STALE_AFTER = 3600.0
 """Seconds without a new frame after which a run without summary is reported as possibly killed."""
@@ -28,10 +29,10 @@ def stale_note(age: float) -> str:
 
 def find_run_folder(path: str | Path) -> Path | None:
     """Folder of the run at `path`: a run folder, or the trajectory.gsd in one; None for a trajectory without a run."""
-    path = Path(path)
-    if path.is_dir():
-        return path if (path / files.TRAJECTORY).exists() else None
-    return path.parent if path.name == files.TRAJECTORY and (path.parent / files.CASE).exists() else None
+    place = user_path(path)
+    if place.is_dir():
+        return place if (place / files.TRAJECTORY).exists() else None
+    return place.parent if place.name == files.TRAJECTORY and (place.parent / files.CASE).exists() else None
 
 
 def read_summary(folder: Path) -> Mapping[str, Any] | None:

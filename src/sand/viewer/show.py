@@ -15,6 +15,7 @@ from ..errors import BadInput
 from ..io.frame import Frame, stored_frame
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import TRAJECTORY, VIEW
+from ..paths import user_path
 from ..plotting.run_figure import in_notebook
 from .browser import open_page
 from .dataset import RunDataset, run_dataset
@@ -63,7 +64,7 @@ def show_dataset(dataset: RunDataset, path: str | Path | None, folder: Path | No
         return widget(dataset)
     if path is None:
         path = (folder or Path(tempfile.mkdtemp(prefix="sand-"))) / VIEW
-    page = Path(path)
+    page = user_path(path)
     if not page.parent.is_dir():
         raise BadInput(f"there is no folder {page.parent}; create it first")
     dataset.compact = True

@@ -20,6 +20,7 @@ import numpy as np
 from ...arguments import checked
 from ...errors import BadInput, warn
 from ...units import si
+from ..executors import results_of
 from .encounters import Flight
 from .flight_driver import BOUND, FAILED, HIT
 from .flights import COLUMNS, Trajectory, count_inaccurate, fly, inaccurate_text, replay, trajectory
@@ -287,7 +288,8 @@ def _pieces(
         while tasks:
             bundle, tasks = cut(tasks, size)
             bundles.append(bundle)
-        yield from executor.map(partial(fly, setup, width=width, seed=seed), bundles)
+        work = partial(fly, setup, width=width, seed=seed)
+        yield from (rows for _, rows in results_of(executor, work, bundles))
 
 
 def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:

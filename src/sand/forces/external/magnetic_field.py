@@ -10,7 +10,7 @@ from typing import Any
 
 from ...arguments import checked
 from ...box import Box
-from ...errors import FORBID_EXTRA, BadInput, did_you_mean
+from ...errors import FORBID_EXTRA, BadInput, did_you_mean, shown
 from ...grains import Grains
 from ...numerics.vec import across, add, cross, dot, norm, scale, sub
 from ...ramps import force_at, forces_at_points, rampable, ramps_of
@@ -161,7 +161,7 @@ class Field:
         """The error message for a key that belongs to other shapes."""
         others = " or ".join(f"'{shape}'" for shape, keys in SHAPES.items() if key in keys)
         return (
-            f"field: {key} = {getattr(self, key)!r} is not used by shape = '{self.shape}'; leave it out, "
+            f"field: {key} = {shown(getattr(self, key))} is not used by shape = '{self.shape}'; leave it out, "
             f"or give shape = {others}"
         )
 

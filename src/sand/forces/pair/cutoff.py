@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
 from ...box import Box
-from ...errors import FORBID_EXTRA, BadInput, did_you_mean
+from ...errors import FORBID_EXTRA, BadInput, did_you_mean, shown
 from ...grains import Grains
 from ...units import format_quantity, is_word, si
 from .dipole_formulas import Cutoff
@@ -55,8 +55,8 @@ class CutoffForce:
 
     def __post_init__(self) -> None:
         problems = []
-        if self.cut not in CUTS:
-            problems.append(f"{self.name}: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
+        if not isinstance(self.cut, str) or self.cut not in CUTS:
+            problems.append(f"{self.name}: cut = {shown(self.cut)}; {did_you_mean(shown(self.cut), CUTS)}")
         if self.cutoff is None or is_word(self.cutoff, "none"):  # "none" is the spelling of case files
             object.__setattr__(self, "cutoff", None)
         elif not is_word(self.cutoff, "auto"):

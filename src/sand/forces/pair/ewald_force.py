@@ -109,7 +109,7 @@ class EwaldForce(CutoffForce):
 
     def _given(self, *names: str) -> list[str]:
         """Of these fields the ones that differ from their defaults."""
-        return [name for name in names if getattr(self, name) != getattr(type(self), name)]
+        return [name for name in names if shown(getattr(self, name)) != shown(getattr(type(self), name))]
 
     def of_nearest_images(self) -> EwaldForce:
         """The same force between nearest images, summed directly."""

@@ -1,0 +1,147 @@
+"""Frames of files of grains of any format, as those of a trajectory, for figures, the viewer and exports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked
+from ..errors import BadInput, warn
+from ..grains import ROUNDED
+from ..material import PRESETS, SILICA, Material, as_material
+from .bodies import contacts_of, read_grains
+from .frame import Frame, FrameSequence, stored_frame
+from .grain_files import is_gsd, open_grains
+from .trajectory import Frames
+
+
+def open_frames(path: str | Path, radius: Any = None, length: str | None = None, material: Any = None) -> FrameSequence:
+    """Open a trajectory of SAND, or a file of grains of another format.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; its content tells the format.
+    radius, length, material : optional
+        As for `io.bodies.read_grains`, for files that lack them.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing or in no known format, or a trajectory of SAND is given one of the other arguments.
+    """
+    file = Path(path)
+    if is_gsd(file) or file.suffix == ".gsd":
+        frames = Frames(file)
+        if frames.written_by_sand or not len(frames):
+            given = {"radius": radius, "length": length, "material": material}
+            if wrong := [name for name, value in given.items() if value is not None]:
+                frames.close()
+                raise BadInput(f"{wrong[0]}: the trajectory {path} has it; leave {wrong[0]} out")
+            return frames
+        frames.close()
+    return FileFrames(file, radius, length, material)
+
+
+class _Known(Mapping[str, Material]):
+    """Materials by name: presets, and for all other names the constants of silica."""
+
+    def __getitem__(self, name: str) -> Material:
+        return PRESETS[name] if name in PRESETS else SILICA.but(name=name or "unnamed")
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(PRESETS)
+
+    def __len__(self) -> int:
+        return len(PRESETS)
+
+
+class FileFrames(FrameSequence):
+    """Frames of a file of grains that is no trajectory of SAND, with the interface of `LiveTrajectory`.
+
+    Grains that touch, up to the rounding of coordinates, are in contact. Masses of grains of unknown materials are
+    those of silica, unless the file has masses; a note says so. Frames without a time are one second apart.
+
+    Parameters
+    ----------
+    path, radius, length, material
+        As `open_frames`.
+
+    Raises
+    ------
+    BadInput
+        As `io.bodies.read_grains`.
+    """
+
+    incomplete = generation = 0
+    age = 0.0
+
+    @checked
+    def __init__(self, path: Path, radius: Any = None, length: str | None = None, material: Any = None):
+        self.path, self._kept = path, dict[int, Frame]()
+        self._count = open_grains(path).frame_count
+        self._given = None if material is None else as_material(material), radius, length
+        found = self._read(0)
+        notes = list(found.notes)
+        names = [m.name for m in found.grains.materials]
+        if unknown := [name for name in names if name not in PRESETS and material is None]:
+            notes.append(
+                f"{path}: material {', '.join(unknown)} is unknown here; it is drawn with the density of silica"
+            )
+        for note in notes:
+            warn(note)
+
+    def _read(self, number: int) -> Any:
+        material, radius, length = self._given
+        return read_grains(self.path, material, radius, length, _Known(), SILICA, number)
+
+    def _frame(self, number: int) -> Frame:
+        if number not in self._kept:
+            found = self._read(number)
+            if found.centre is not None:  # boxes of SAND have their centre at the origin
+                found.grains.arrays.position[...] -= found.centre[:, None]
+            time = float(number) if found.time is None else found.time
+            contacts = contacts_of(found.grains, found.box, ROUNDED)
+            step = number if found.step is None else found.step
+            self._kept[number] = Frame(stored_frame(step, time, found.grains, found.box, contacts, exact=True))
+        return self._kept[number]
+
+    def __len__(self) -> int:
+        return self._count
+
+    def refresh(self) -> bool:
+        """Return False: the file is read once."""
+        return False
+
+    def pairs(self, index: int) -> np.ndarray:
+        """Grains in contact (C, 2) of a frame ≥ 0."""
+        return self[index].pair
+
+    def identities(self, index: int) -> np.ndarray:
+        """Identities (N,) of the grains of a frame ≥ 0."""
+        return self[index].id
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Time of each frame [s]."""
+        return np.array([frame.time for frame in self])
+
+    @cached_property
+    def steps(self) -> np.ndarray:
+        """Step of each frame."""
+        return np.array([frame.step for frame in self])
+
+    @cached_property
+    def contacts(self) -> np.ndarray:
+        """Number of contacts of each frame."""
+        return np.array([len(frame.pair) for frame in self])
+
+    def close(self) -> None:
+        """Do nothing: the file is open only while it is read."""

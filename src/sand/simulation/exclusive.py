@@ -1,0 +1,54 @@
+"""One thread at a time works with a simulation: its arrays, tables and files have no other protection."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from ..errors import BadInput
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+class Exclusive:
+    """The right of a thread to work with a simulation; its own calls may be nested."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+
+    @contextmanager
+    def held(self, what: str) -> Iterator[None]:
+        """Hold the right during the block.
+
+        Raises
+        ------
+        BadInput
+            If another thread holds it; `what` is the call that is refused.
+        """
+        if not self._lock.acquire(blocking=False):
+            raise BadInput(
+                f"another thread works with this simulation, so that {what} is not possible; call it in that thread, "
+                "such as in an observer, or wait until its call has ended"
+            )
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy of a simulation has a right of its own."""
+        return Exclusive, ()
+
+
+def exclusive(method: Method) -> Method:
+    """Decorator: hold `self._exclusive` during a method."""
+
+    @functools.wraps(method)
+    def guarded(self: Any, *given: Any, **options: Any) -> Any:
+        with self._exclusive.held(method.__name__):
+            return method(self, *given, **options)
+
+    return guarded  # type: ignore[return-value]

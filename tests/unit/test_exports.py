@@ -1,0 +1,277 @@
+"""What trajectories and exports keep: identities, numbers of materials, unit, crossings of the box, all numbers."""
+
+import re
+import tracemalloc
+import warnings
+import xml.etree.ElementTree as ElementTree
+
+import gsd.hoomd
+import numpy as np
+import pytest
+
+import sand
+from sand.analysis.clusters import cluster_labels
+from sand.box import Box
+from sand.cli.main import main
+from sand.io.bodies import contacts_of, read_body, write_body
+from sand.io.export import export_frames
+from sand.io.extended_xyz import listed
+from sand.io.trajectory import Frames, TrajectoryWriter
+
+STRANGE = ("ice; amorphous", 'type "A"', "two\nlines", "a\\b", "100 % Ünïcode\u2028", "it's")
+"""Names of materials with characters that mean something in files."""
+
+
+def named(name):
+    return sand.SILICA.but(name=name)
+
+
+def grains_at_step(k):
+    """Grains that change as in a run: the first is removed after step 0, one of another material is added in step 2."""
+    rng = np.random.default_rng(3)
+    size = rng.uniform(1e-8, 3e-8, 6)
+    vectors = {name: rng.normal(size=(6, 3)) for name in ("velocity", "spin")}
+    whole = sand.Grains(
+        rng.uniform(-2e-7, 2e-7, (6, 3)),
+        size,
+        [named("iron"), named(STRANGE[0]), named("ice"), named("ice"), named("ice"), named(STRANGE[2])],
+        moment=1e-18 * rng.normal(size=(6, 3)),
+        charge=1.6e-19 * np.arange(6),
+        mass=1e-19 * rng.uniform(1.0, 2.0, 6),
+        own={"heating": (rng.normal(size=6), "W/m^2")},
+        **vectors,
+    )
+    kept = [np.arange(5), np.arange(1, 5), np.arange(1, 6)][k]
+    grains = whole[kept]
+    grains.arrays.id[...] = kept
+    grains.arrays.image[...] = rng.integers(-3, 4, (6, 3))[kept].T + k
+    return grains
+
+
+def write(path, steps, **resumed):
+    writer = TrajectoryWriter(path, **resumed)
+    for k in steps:
+        grains = grains_at_step(k)
+        writer.write(10 * k, 1e-9 * k, grains, Box.periodic(5e-7, 6e-7, None), contacts_of(grains))
+    writer.flush()
+    writer.close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def trajectory(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("run") / "trajectory.gsd", range(3))
+
+
+def test_other_programs_see_one_unit_and_fixed_types(trajectory):
+    """The box, which does not change, has the same size in the stored unit; a type is the same material throughout."""
+    with gsd.hoomd.open(str(trajectory)) as file:
+        stored = list(file)
+    assert len({tuple(one.configuration.box[:2].tolist()) for one in stored}) == 1
+    types = [list(one.particles.types) for one in stored]
+    assert [names[: len(types[0])] for names in types] == [types[0]] * 3 and len(types[2]) == len(types[0]) + 1
+    for k, one in enumerate(stored):
+        assert one.particles.image.tolist() == grains_at_step(k).image.tolist()
+
+
+def test_frames_have_the_grains(trajectory):
+    """Names, identities, crossings and positions are those that were written, also of a material that vanished."""
+    for k, frame in enumerate(Frames(trajectory)):
+        grains = grains_at_step(k)
+        assert [frame.materials[m] for m in frame.material] == [grains.materials[m].name for m in grains.material]
+        assert (frame.id == grains.id).all() and (frame.image == grains.image).all()
+        # positions have single precision
+        jumps = grains.image * np.array([5e-7, 6e-7, 0.0])
+        assert frame.unwrapped == pytest.approx(grains.position + jumps, abs=1e-13)
+
+
+@pytest.mark.parametrize("again", [0, 1, 2])
+def test_a_continued_trajectory_is_the_same(trajectory, tmp_path, again):
+    """A run that is resumed after frame `again` writes the frames of an uninterrupted one."""
+    path = write(tmp_path / "t.gsd", range(3))
+    write(path, range(again + 1, 3), resume_at=1e-9 * again, written=[1e-9 * k for k in range(again + 1)])
+    write(tmp_path / "cut.gsd", range(again + 1))
+    write(tmp_path / "cut.gsd", range(again + 1, 3), resume_at=1e-9 * again)
+    for other in (path, tmp_path / "cut.gsd"):
+        with gsd.hoomd.open(str(trajectory)) as first, gsd.hoomd.open(str(other)) as second:
+            assert len(first) == len(second) == 3
+            for one, two in zip(first, second, strict=True):
+                assert one.log["crc32"] == two.log["crc32"] and one.log["scale/length"] == two.log["scale/length"]
+
+
+def unlisted(text):
+    from urllib.parse import unquote
+
+    return [unquote(name) for name in text.split(";")]
+
+
+def columns_of_xyz(text):
+    """Columns by name of each frame, with time, step and names of materials, as the format defines them."""
+    lines, at, frames = text.split("\n"), 0, []
+    while at < len(lines) and lines[at]:
+        count, head = int(lines[at]), lines[at + 1]
+        parts = re.search(r"Properties=(\S+)", head)[1].split(":")
+        rows, columns, c = [line.split(" ") for line in lines[at + 2 : at + 2 + count]], {}, 0
+        for name, width in zip(parts[::3], map(int, parts[2::3]), strict=True):
+            columns[name] = np.array([row[c : c + width] for row in rows]).squeeze()
+            c += width
+        assert {len(row) for row in rows} == {c}
+        columns = {name: values if name == "species" else values.astype(float) for name, values in columns.items()}
+        names = unlisted(re.search(r'materials="([^"]*)"', head)[1])
+        columns |= {"time": float(re.search(r"Time=(\S+)", head)[1]), "step": int(re.search(r"Step=(\d+)", head)[1])}
+        frames.append(columns | {"names": [names[int(k)] for k in columns["material"]], "scale": 1e-10})
+        at += 2 + count
+    return frames
+
+
+def columns_of_dump(text):
+    frames = []
+    for part in text.split("ITEM: TIMESTEP\n")[1:]:
+        head, _, body = part.partition("ITEM: ATOMS ")
+        titles, *rows = body.splitlines()
+        of = dict(zip(titles.split(), np.array([row.split() for row in rows]).T, strict=True))
+        labels = of.pop("typelabel")
+        of = {name: values.astype(float) for name, values in of.items()}
+        vectors = {"pos": "x y z", "velo": "vx vy vz", "spin": "omegax omegay omegaz", "moment": "mux muy muz"}
+        frame = {name: np.column_stack([of[c] for c in parts.split()]) for name, parts in vectors.items()}
+        frame |= {"images": np.column_stack([of[f"i{axis}"] for axis in "xyz"]), "id": of["id"] - 1}
+        frame |= {"charge": of["q"], "mass": of["mass"], "radius": of["radius"], "heating": of["d_heating"]}
+        assert (of["v_time"] == of["v_time"][0]).all() and int(head.splitlines()[2]) == len(rows)
+        frame |= {"time": of["v_time"][0], "step": int(head.split()[0]), "cluster": of["c_cluster"] - 1}
+        frames.append(frame | {"names": unlisted(";".join(labels)), "scale": 1.0, "type": of["type"]})
+    return frames
+
+
+def columns_of_data(text):
+    names = unlisted(re.search(r"\d+ atom types # (.*)", text)[1])
+    head, body = text.split("Atoms # hybrid sphere dipole\n\n")
+    atoms, moving = body.split("\nVelocities\n\n")
+    of = np.array([row.split() for row in atoms.splitlines()], float).T
+    rates = np.array([row.split() for row in moving.splitlines()], float).T
+    assert (of[0] == rates[0]).all()
+    frame = {"id": of[0] - 1, "pos": of[2:5].T, "radius": of[5] / 2, "charge": of[7], "moment": of[8:11].T}
+    frame |= {"mass": of[6] * 4 / 3 * np.pi * (of[5] / 2) ** 3, "images": of[11:].T, "velo": rates[1:4].T}
+    step, time = re.match(r"SAND, step (\d+), (\S+) s, units si, boundary p p f", head).groups()
+    frame |= {"spin": rates[4:].T, "time": float(time), "step": int(step), "scale": 1.0}
+    return frame | {"names": [names[int(k) - 1] for k in of[1]]}
+
+
+def columns_of_vtp(path):
+    def values(one):
+        width = int(one.get("NumberOfComponents", 1))
+        numbers = np.array((one.text or "").split(), float)
+        return numbers.reshape(-1, width) if width > 1 else numbers
+
+    root = ElementTree.parse(path).getroot()
+    points = {one.get("Name"): values(one) for one in root.find(".//PointData")}
+    field = {one.get("Name"): one for one in root.find(".//FieldData")}
+    names = bytes(int(byte) for byte in field["materials"].text.split()).decode().split("\0")[:-1]
+    frame = points | {"pos": values(root.find(".//Points/DataArray")), "velo": points["velocity"]}
+    frame |= {"images": points["image"], "names": [names[int(k)] for k in points["material"]], "scale": 1.0}
+    return frame | {"time": values(field["TimeValue"])[0], "step": int(values(field["step"])[0])}
+
+
+@pytest.mark.filterwarnings("ignore:LAMMPS data files have no place")
+@pytest.mark.parametrize("chosen", [slice(None), slice(1, None)])
+@pytest.mark.parametrize("form", ["xyz", "lammps-dump", "lammps-data", "vtk"])
+def test_round_trip_of_everything(trajectory, tmp_path, form, chosen):
+    """Every number of a frame is in every format exactly; lengths in ångström and densities lose their last digit.
+
+    Materials and identities have the same numbers in all frames, whichever are exported.
+    """
+    frames = Frames(trajectory)
+    paths = export_frames(frames, tmp_path / "out", form, cluster_labels, chosen)
+    if form == "xyz":
+        found = columns_of_xyz(paths[0].read_text("utf-8"))
+    elif form == "lammps-dump":
+        found = columns_of_dump(paths[0].read_text("utf-8"))
+    elif form == "lammps-data":
+        found = [columns_of_data(path.read_text("utf-8")) for path in paths]
+    else:
+        found = [columns_of_vtp(path) for path in paths[1:]]
+    wanted = {"pos": "position", "velo": "velocity", "images": "image"}
+    exact = ["velo", "moment", "spin", "charge", "id", "images", "time", "step"]
+    exact += ["mass", "heating"] if form != "lammps-data" else []
+    assert len(found) == len(frames[chosen])
+    for theirs, ours in zip(found, frames[chosen], strict=True):
+        for name in exact:
+            value = np.asarray(getattr(ours, wanted.get(name, name)))
+            # 9 digits restore a number of single precision
+            assert np.array_equal(np.asarray(theirs[name]).astype(value.dtype), value), name
+        for name in ("pos", "radius"):
+            # one rounding each of the quotient, of the product, and of the unit itself
+            value = getattr(ours, wanted.get(name, name))
+            assert theirs[name] * theirs["scale"] == pytest.approx(value, rel=4e-16, abs=0.0)
+        assert theirs["mass"] == pytest.approx(ours.mass, rel=1e-7, abs=0.0)
+        if "type" in theirs:
+            assert [frames.material_names()[int(k) - 1] for k in theirs["type"]] == theirs["names"]
+        assert theirs["names"] == [ours.materials[k] for k in ours.material]
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_names_survive(name, tmp_path):
+    """Names of materials with characters that mean something in a file come back from bodies in both formats."""
+    for file in ("b.xyz", "b.gsd"):
+        body = sand.setup.chain(2, radius="0.1 um", material=named(name))
+        write_body(tmp_path / file, body)
+        assert read_body(tmp_path / file, materials={name: named(name)}).materials[0].name == name
+
+
+def test_ordinary_names_are_written_as_they_are():
+    assert listed(["iron", "water ice", "Eis (ß)"]) == "iron;water ice;Eis (ß)"
+    assert len(listed(STRANGE).split(";")) == len(STRANGE) and listed(STRANGE).isprintable()
+
+
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
+    """The largest memory in use during an export is that of a frame and its text."""
+    grains = sand.setup.gas(300, "10 um", radius="0.1 um", material="silica", temperature="300 K", seed=1)
+
+    def peak(count):
+        path = tmp_path / f"{count}.gsd"
+        writer = TrajectoryWriter(path)
+        for k in range(count):
+            writer.write(k, 1e-9 * k, grains, Box.periodic(1e-5), contacts_of(grains))
+        writer.close()
+        frames = Frames(path)
+        export_frames(frames, tmp_path / "warm", "xyz", cluster_labels, slice(1))
+        tracemalloc.start()
+        (written,) = export_frames(frames, tmp_path / str(count), "xyz", cluster_labels)
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found, written.stat().st_size
+
+    (few, small), (many, large) = peak(3), peak(30)
+    assert large > 9 * small
+    assert many < 1.2 * few  # the list of numbers and caches of the reader are small; all texts would be 10 × few
+
+
+def test_an_overwritten_run_names_what_was_made_of_it(tmp_path):
+    """Exports and figures stay when a run is replaced, and a warning names them; without any there is none."""
+    folder = tmp_path / "run"
+    grains = sand.Grains([[0, 0, 0]], 1e-7, "silica")
+    sand.Simulation(grains, [], out=folder)
+    write(folder / "trajectory.gsd", [0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sand.Simulation(grains, [], out=folder, overwrite=True)
+    write(folder / "trajectory.gsd", [0])
+    (folder / "plots").mkdir()
+    for name in ("trajectory.xyz", "plots/size.png", "notes.txt"):
+        (folder / name).write_text("")
+    with pytest.warns(
+        UserWarning, match=r"keeps plots/size\.png, trajectory\.xyz, which the earlier run may have left"
+    ):
+        sand.Simulation(grains, [], out=folder, overwrite=True)
+    assert (folder / "trajectory.xyz").exists() and (folder / "notes.txt").exists()
+
+
+def test_files_of_a_longer_export_are_named(tmp_path, capsys):
+    """`sand export --overwrite` of fewer frames says that files of the export before stay."""
+    write(tmp_path / "trajectory.gsd", range(3))
+    words = ["export", str(tmp_path), "--to", "vtk", "--out", str(tmp_path / "a")]
+    assert main(words) == 0
+    assert main([*words, "--overwrite", "--frames", "-1"]) == 0
+    told = capsys.readouterr().err
+    assert "2 files of an earlier export stay" in told and "a-000000000000.vtp" in told
+    assert main([*words, "--overwrite"]) == 0
+    assert "earlier export" not in capsys.readouterr().err
