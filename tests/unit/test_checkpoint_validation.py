@@ -31,7 +31,8 @@ ONE_WALL = {
 """A wall with one contact."""
 BODIES = {f"bodies/{name}": array for name, array in body_arrays(4)._asdict().items() if name in SAVED_BODIES}
 BODIES["bodies/first"][:] = np.arange(4)
-WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES}
+CROSSINGS = {"grains/image": np.zeros((3, 4), np.int32)}
+WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES, **CROSSINGS}
 WITH_ORDER["count"] = ARRAYS["count"].copy()
 WITH_ORDER["count"][WALL_CONTACTS] = 1
 FAR = 2**31 - 1

@@ -12,7 +12,9 @@ import pytest
 import sand
 from sand.analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured
 from sand.analysis.tracking import SINGLE
+from sand.io.damage import sealed
 from sand.io.gsd_index import ENTRY, read_index
+from sand.io.run_folder import write_json
 from sand.io.trajectory import TrajectoryWriter
 from sand.viewer.dataset import run_dataset
 from sand.viewer.external_field import read_field
@@ -182,7 +184,7 @@ def test_a_run_that_was_killed(tmp_path):
         os.utime(path, (time.time() - age,) * 2)
         note = f"no new frame for {duration}: the run may have been killed; sand resume continues it"
         assert dataset.manifest()["note"] == note and dataset.manifest()["running"]
-    (tmp_path / "summary.json").write_text('{"steps": 0}')
+    write_json(tmp_path / "summary.json", sealed({"steps": 0}))
     dataset.refresh()
     assert dataset.manifest()["note"] is None
 

@@ -16,6 +16,7 @@ from sand.cli.main import main
 from sand.io.bodies import contacts_of, read_body, write_body
 from sand.io.export import export_frames
 from sand.io.extended_xyz import listed
+from sand.io.run_folder import write_toml
 from sand.io.trajectory import Frames, TrajectoryWriter
 
 STRANGE = ("ice; amorphous", 'type "A"', "two\nlines", "a\\b", "100 % Ünïcode\u2028", "it's")
@@ -250,10 +251,12 @@ def test_an_overwritten_run_names_what_was_made_of_it(tmp_path):
     folder = tmp_path / "run"
     grains = sand.Grains([[0, 0, 0]], 1e-7, "silica")
     sand.Simulation(grains, [], out=folder)
+    write_toml(folder / "case.toml", {}, "a run")
     write(folder / "trajectory.gsd", [0])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sand.Simulation(grains, [], out=folder, overwrite=True)
+    write_toml(folder / "case.toml", {}, "a run")
     write(folder / "trajectory.gsd", [0])
     (folder / "plots").mkdir()
     for name in ("trajectory.xyz", "plots/size.png", "notes.txt"):

@@ -124,7 +124,7 @@ def test_overwriting_a_run_that_is_open_elsewhere(tmp_path, monkeypatch):
     """Windows removes no open file: then no other file is removed either."""
     names = {"case.toml", "trajectory.gsd", "summary.json"}
     for name in names:
-        (tmp_path / name).write_text("{}", encoding="utf-8")
+        (tmp_path / name).write_text("# Written by SAND: a run\n", encoding="utf-8")
     plain = os.unlink
 
     def unlink(path, *words, **options):

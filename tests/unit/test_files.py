@@ -98,8 +98,11 @@ def test_folders_are_never_overwritten_unasked(tmp_path):
     make_folder(folder)
     (folder / "notes.txt").write_text("mine")
     (folder / "summary.json").write_text("{}")
-    with pytest.raises(sand.BadInput, match="not empty"):
-        make_folder(folder)
+    for overwrite, expected in ((False, "not empty"), (True, "nothing shows that SAND wrote")):
+        with pytest.raises(sand.BadInput, match=expected):
+            make_folder(folder, overwrite=overwrite)
+    assert (folder / "summary.json").exists()
+    write_toml(folder / "case.toml", {}, "a run")
     make_folder(folder, overwrite=True)
     assert (folder / "notes.txt").read_text() == "mine"
     assert not (folder / "summary.json").exists()

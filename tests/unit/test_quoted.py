@@ -25,6 +25,7 @@ COSTS = re.compile(
 """Times from milliseconds on, factors of speed, costs of a step, and numbers of steps.  Times of the physics of small
 grains are shorter, those below are not."""
 NO_COST = {
+    "docs/batch.md": ("waits up to ten seconds for them",),  # a setting
     "CONTRIBUTING.md": (
         "0.5 s each, half a minute in total",  # limits that tests keep, not measured
         "| 5 s each",

@@ -8,6 +8,8 @@ import pytest
 
 import sand
 from sand.cli.main import main
+from sand.io.damage import sealed
+from sand.io.run_folder import write_json
 from tests.unit.synthetic_trajectories import write_trajectory
 
 
@@ -158,7 +160,7 @@ def runs_in(folder, seeds, outcome="finished"):
         (place / "ledger.csv").write_text("\n".join([",".join(names), *lines]) + "\n")
         last = dict(zip(names, rows[1], strict=False)) | {"seed": seed, "grains": 4, "outcome": outcome}
         if seed != seeds[-1]:
-            (place / "summary.json").write_text(json.dumps(last))
+            write_json(place / "summary.json", sealed(last))
 
 
 def test_many_runs(tmp_path, monkeypatch):

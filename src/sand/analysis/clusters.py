@@ -29,7 +29,9 @@ def checked_pairs(count: int, pairs: Any) -> np.ndarray:
 def checked_labels(labels: Any) -> np.ndarray:
     """Cluster of each grain (N,) as whole numbers.  Raises BadInput for anything else."""
     found = np.asarray(labels)
-    whole = found.ndim == 1 and found.size and found.dtype.kind in "iu" and found.min() >= 0
+    if found.shape == (0,):
+        return found.astype(np.int64)
+    whole = found.ndim == 1 and found.dtype.kind in "iu" and found.min() >= 0
     if not whole or found.max() >= MOST_GRAINS:
         raise BadInput(f"labels = {shown(labels)} must be whole numbers (N,) from 0, the cluster of each grain")
     return found
@@ -101,8 +103,16 @@ def mean_cluster_size(labels: np.ndarray) -> float:
     """Mass-weighted mean cluster size S = Σ s² n_s / Σ s n_s (Dominik & Nübold 2002, Eq. 17).
 
     It is the expected size of the cluster of a randomly chosen grain.
+
+    Raises
+    ------
+    BadInput
+        If `labels` are not whole numbers from 0, or there are none.
     """
-    return mean_size(np.bincount(labels))
+    sizes = cluster_sizes(labels)
+    if not sizes.size:
+        raise BadInput("labels = [] has no grain, and no grains have no mean cluster size")
+    return mean_size(sizes)
 
 
 def mean_size(sizes: np.ndarray) -> float:
