@@ -214,9 +214,13 @@ def test_momenta_are_conserved_to_rounding():
     "seed", [4, pytest.param(5, marks=pytest.mark.validate), pytest.param(6, marks=pytest.mark.validate)]
 )
 def test_momentum_in_a_periodic_box_is_conserved_to_rounding(seed):
-    """As `test_momenta_are_conserved_to_rounding`, with 55 touches; some bodies wake before their first substep."""
+    """As `test_momenta_are_conserved_to_rounding`, with 55 touches; some bodies wake before their first substep.
+
+    The grains of a touch, damped at 0.2 of critical, lose the 10 m/s at which they meet in some 40 contact steps (25 in
+    a period): 1e-16 · 10 m/s √(55 · 2 · 40) is 5e-16 of Σ|v| = 150 m/s, little beside the steps of all grains.
+    """
     linear, _, made = changes_of_momenta(denser_gas("4 um", seed), "2 us")
-    assert made > 40 and linear < 1.4e-14
+    assert made > 40 and linear < 7e-15
 
 
 @pytest.mark.validate
