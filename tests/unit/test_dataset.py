@@ -113,7 +113,7 @@ def test_a_growing_run(tmp_path, finished_run):
     manifest = dataset.manifest(1)
     assert len(manifest["times"]) == 2 and manifest["steps"] == [10, 20]
     assert decode(dataset.frame(2))[1]["cluster"].tolist() == [1, 1, 1, SINGLE]
-    (tmp_path / "summary.json").write_text('{"steps": 20, "time": 2e-12, "outcome_text": "done"}')
+    write_json(tmp_path / "summary.json", sealed({"steps": 20, "time": 2e-12, "outcome_text": "done"}))
     assert dataset.manifest()["running"]  # unchanged until the dataset reads the files again
     dataset.refresh()
     assert dataset.manifest()["outcome"] == "done"
@@ -162,7 +162,7 @@ def test_a_run_that_ends_between_two_refreshes(tmp_path):
     def late():
         found = reader()
         append(writer, [[], []], 4, first=1)
-        (tmp_path / "summary.json").write_text('{"steps": 20, "time": 2e-12, "outcome_text": "done"}')
+        write_json(tmp_path / "summary.json", sealed({"steps": 20, "time": 2e-12, "outcome_text": "done"}))
         dataset.frames.refresh = reader
         return found
 

@@ -278,7 +278,7 @@ def grow(**changed):
         (lambda: grow(sizes=[0.5, 1.0]), "start at 1"),
         (lambda: grow(numbers=[1.0, 2.0]), "one for each size"),
         (lambda: grow(numbers="many"), "numbers = 'many' is not a quantity in 1/m"),
-            (lambda: grow(numbers=[[1.0], [1.0, 2.0]]), "numbers"),
+        (lambda: grow(numbers=[[1.0], [1.0, 2.0]]), "numbers"),
         (lambda: grow(times=[2.0, 1.0]), "times"),
         (lambda: grow(times=[float("nan")]), "finite"),
         (lambda: grow(mass="1 m"), "mass"),

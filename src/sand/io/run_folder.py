@@ -92,9 +92,8 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     "another folder, or remove them"
                 )
             with writing(folder):
-                own = [*found, *(old for path in found for old in folder.glob(f"{path.name}{DAMAGED}*"))]
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
-                for old in [folder / TRAJECTORY, *own]:
+                for old in [folder / TRAJECTORY, *found]:
                     old.unlink(missing_ok=True)
             if left := _of_earlier_results(folder):
                 called = [str(path.relative_to(folder)) for path in left]
@@ -114,8 +113,9 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
 
 
 def files_of_runs(folder: Path) -> list[Path]:
-    """Files of a folder that have names which SAND gives."""
-    return sorted(one for one in folder.iterdir() if one.name in OWN_FILES or CHECKPOINT.fullmatch(one.name))
+    """Files of a folder that have names which SAND gives, also to damaged files."""
+    names = {path: path.name.partition(DAMAGED)[0] for path in folder.iterdir()}
+    return sorted(path for path, name in names.items() if name in OWN_FILES or CHECKPOINT.fullmatch(name))
 
 
 def shows_a_run(folder: Path) -> bool:
@@ -127,6 +127,8 @@ def shows_a_run(folder: Path) -> bool:
         with contextlib.suppress(OSError), open(path, "rb") as file:
             begin = file.read(4096)
             if path.name == TRAJECTORY and b"SAND" in begin:  # the application in the header of GSD
+                return True
+            if path.name == LEDGER and begin.startswith(b"step,time,translation,rotation,"):
                 return True
             if CHECKPOINT.fullmatch(path.name) and begin.startswith(b"PK") and b"meta.json" in begin:
                 return True
