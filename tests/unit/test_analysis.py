@@ -321,6 +321,7 @@ def test_cluster_table_across_periodic_faces():
         (lambda: ensemble_dimension([5, 20], [1, 1], 1.0), "do not grow"),
         (lambda: power_law([1, 2], [1, -2]), "above 0"),
         (lambda: power_law([2, 2], [1, 2]), "two different x"),
+        (lambda: power_law([], []), "two different x"),  # a run without aggregates
     ],
 )
 def test_wrong_arguments_are_refused(call, part):

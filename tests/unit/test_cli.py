@@ -452,6 +452,25 @@ def test_info_of_a_run_that_was_killed(done, capsys):
     assert "sand resume small" in out
 
 
+@pytest.mark.parametrize(
+    ("line", "code", "part"),
+    [
+        ('until = "3 ns"', 0, "planned end  3 ns"),
+        ('stop = "clusters == 1"', 0, "ends if  clusters == 1"),
+        ('until = "3 m"', 2, "case.toml: run: until = '3 m' is not a quantity in s"),
+        ("until = [1]", 2, "case.toml: run: until = [1]"),
+        ("stop = 3", 2, "case.toml: run.stop must be text"),
+    ],
+)
+def test_info_after_the_end_was_edited(workdir, capsys, line, code, part):
+    """The end of a run may be changed in its case.toml, in the forms of a case file, before it is resumed."""
+    (workdir / "case.toml").write_text(CASE.replace('until = "20 ns"', line))
+    assert main(["info", "."]) == code
+    out, err = capsys.readouterr()
+    assert part in " ".join((out if code == 0 else err).split(" ")).replace("    ", "  ").replace("   ", "  ")
+    assert len(err.splitlines()) == (code != 0)
+
+
 @pytest.mark.parametrize("name", ["summary.json", "ledger.csv", "trajectory.gsd", "checkpoint-000000000000000.npz"])
 @pytest.mark.parametrize("content", [b"", b"{", b"{}", b"a,b\n1,2\n", b"\xff\x00"])
 def test_info_of_broken_files(workdir, capsys, name, content):

@@ -13,9 +13,10 @@ import sand
 from sand.analysis.clusters import cluster_labels
 from sand.box import Box
 from sand.cli.main import main
-from sand.io.bodies import contacts_of, read_body, write_body
+from sand.io.bodies import contacts_of, read_body, read_grains, write_body
 from sand.io.export import export_frames
 from sand.io.extended_xyz import listed
+from sand.io.file_frames import open_frames
 from sand.io.run_folder import write_toml
 from sand.io.trajectory import Frames, TrajectoryWriter
 
@@ -278,3 +279,77 @@ def test_files_of_a_longer_export_are_named(tmp_path, capsys):
     assert "2 files of an earlier export stay" in told and "a-000000000000.vtp" in told
     assert main([*words, "--overwrite"]) == 0
     assert "earlier export" not in capsys.readouterr().err
+
+
+def test_frames_within_one_step_have_different_numbers(tmp_path):
+    """`TIMESTEP` of a dump is the step; where frames share steps it is the index of the frame, whichever are chosen."""
+    grains = sand.Grains([[0, 0, 0]], 1e-7, "silica")
+    for steps, wanted in (((3, 7, 9), ["7", "9"]), ((3, 3, 4), ["1", "2"])):
+        writer = TrajectoryWriter(tmp_path / "t.gsd")
+        for k, step in enumerate(steps):
+            writer.write(step, 1e-9 * k, grains, Box.open(), contacts_of(grains))
+        writer.close()
+        (path,) = export_frames(Frames(tmp_path / "t.gsd"), tmp_path / "t", "lammps-dump", cluster_labels, slice(1, 3))
+        assert re.findall(r"ITEM: TIMESTEP\n(\d+)", path.read_text()) == wanted
+        assert [frame.time for frame in open_frames(path)] == [1e-9, 2e-9]
+        (tmp_path / "t.gsd").unlink()
+
+
+KEPT = ("velocity", "spin", "moment", "charge", "mass")
+OWN_KEPT = {"xyz": ["heating"], "lammps-dump": [], "lammps-data": []}
+"""Own quantities with their unit that SAND reads again from its exports; a LAMMPS dump has no place for the unit."""
+
+
+@pytest.mark.filterwarnings("ignore:LAMMPS data files have no place")
+@pytest.mark.parametrize("form", list(OWN_KEPT))
+@pytest.mark.parametrize("suffix", [".gsd", ".xyz"])
+def test_exports_of_a_body_are_read_again(tmp_path, form, suffix):
+    """A body, exported and read, has the numbers and materials that the table of formats says, time and step included.
+
+    Lengths in ångström, masses by density, and radii by diameter are rounded a few times in double precision.
+    """
+    body = grains_at_step(0)
+    known = {m.name: m for m in body.materials}
+    write_body(tmp_path / f"b{suffix}", body)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # unknown materials are drawn as silica
+        path, *_ = export_frames(open_frames(tmp_path / f"b{suffix}"), tmp_path / "out", form, cluster_labels)
+    found = read_grains(path, materials=known)
+    grains = found.grains
+    assert [grains.materials[k] for k in grains.material] == [body.materials[k] for k in body.material]
+    for name in ("position", "radius", *KEPT):
+        assert getattr(grains, name) == pytest.approx(getattr(body, name), rel=1e-15, abs=0.0), name
+    assert list(grains.own) == OWN_KEPT[form]
+    assert all((grains.own[name] == body.own[name]).all() for name in grains.own)
+    assert dict(grains.own.units) == {name: body.own.units[name] for name in grains.own}
+    assert (found.time, found.step) == (0.0, 0)
+    assert not any("taken in SI" in note for note in found.notes)
+    assert any("d_heating" in note for note in found.notes) == (form == "lammps-dump")
+
+
+@pytest.mark.filterwarnings("ignore:LAMMPS data files have no place")
+@pytest.mark.parametrize("form", list(OWN_KEPT))
+def test_exports_of_a_run_are_read_again(trajectory, tmp_path, form):
+    """The last frame of a run, exported and read: as of a body, with its box, time and step."""
+    frames = Frames(trajectory)
+    *_, path = export_frames(frames, tmp_path / "out", form, cluster_labels)
+    found, last = read_grains(path, materials={m.name: m for m in grains_at_step(2).materials}), frames[-1]
+    for name in ("position", "radius", *KEPT):
+        # the numbers of a frame have single precision, of which the digits are exact
+        assert getattr(found.grains, name) == pytest.approx(np.asarray(getattr(last, name), float), rel=1e-8, abs=0.0)
+    assert [found.grains.materials[k].name for k in found.grains.material] == [last.materials[k] for k in last.material]
+    assert found.box.lengths[:2] == pytest.approx(last.box.lengths[:2], rel=1e-15, abs=0.0)
+    assert found.box.lengths[2] is None
+    assert (found.time, found.step) == (last.time, last.step)
+
+
+@pytest.mark.parametrize(("units", "seconds"), [("si", 1.0), ("metal", 1e-12), ("real", 1e-15), ("micro", 1e-6)])
+def test_the_time_of_a_dump(tmp_path, units, seconds):
+    """LAMMPS writes `ITEM: TIME` before the snapshot it belongs to, in the unit of time of its style."""
+    snapshot = (
+        "ITEM: TIME\n{}\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+        "ITEM: ATOMS id x y z radius\n1 0 0 0 50\n"
+    )
+    (tmp_path / "d").write_text(f"ITEM: UNITS\n{units}\n" + snapshot.format(0.25, 1) + snapshot.format(0.5, 2))
+    times = [read_grains(tmp_path / "d", sand.SILICA, frame=k).time for k in (0, 1)]
+    assert times == pytest.approx([0.25 * seconds, 0.5 * seconds], rel=1e-15, abs=0.0)

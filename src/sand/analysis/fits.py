@@ -56,7 +56,7 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
     x, y = np.asarray(x, float), np.asarray(y, float)
     if x.shape != y.shape or x.ndim != 1 or not ((x > 0) & (y > 0) & np.isfinite(x) & np.isfinite(y)).all():
         raise BadInput("a power-law fit needs x and y of equal length, all finite and above 0")
-    if np.ptp(np.log(x)) < SAME:
+    if len(x) < 2 or np.ptp(np.log(x)) < SAME:
         raise BadInput("a power-law fit needs at least two different x")
     if groups is not None and np.shape(groups) != x.shape:
         raise BadInput(f"groups must have one entry for each of {len(x)} points, not {np.size(groups)}")

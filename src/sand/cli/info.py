@@ -98,7 +98,7 @@ def describe_folder(path: Path) -> Description:
 def _describe_run(path: Path, listed: tuple[str, str]) -> Description:
     from ..units import format_quantity
 
-    planned = files.read_toml(path / files.CASE).get("run", {})
+    until, condition = _planned_end(path / files.CASE)
     summary = _summary(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
     ledger = _ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
     last = ledger[-1] if ledger else None
@@ -115,17 +115,32 @@ def _describe_run(path: Path, listed: tuple[str, str]) -> Description:
             ("last frame", f"{format_quantity(beyond['time'], 's')} after {beyond['step']} steps"),
             ("clusters", report.clusters(beyond)),
         ]
-    if "until" in planned:
-        rows.append(("planned end", format_quantity(planned["until"], "s")))
-    if "stop" in planned:
-        rows.append(("ends if", planned["stop"]))
+    if until is not None:
+        rows.append(("planned end", format_quantity(until, "s")))
+    if condition is not None:
+        rows.append(("ends if", condition))
     rows.append(listed)
-    until = planned.get("until", 0.0)
-    ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
+    ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= (until or 0.0)
     if checkpoint_files(path) and not ended:
         rows.append(("continue with", report.resume_line(path)))
     content = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
-    return "a run", rows, content | {"planned_end": planned.get("until"), "files": report.files_of(path)}
+    return "a run", rows, content | {"planned_end": until, "files": report.files_of(path)}
+
+
+def _planned_end(case: Path) -> tuple[float | None, str | None]:
+    """Time [s] and condition that end a run, which the user may have edited, from its case file.  Raises BadInput."""
+    from ..simulation.cadence import duration
+
+    run = files.read_toml(case).get("run", {})
+    if not isinstance(run, dict):
+        raise BadInput(f"{case}: run must be a table, [run]")
+    until, condition = run.get("until"), run.get("stop")
+    if condition is not None and not isinstance(condition, str):
+        raise BadInput(f"{case}: run.stop must be text, such as 'clusters == 1'")
+    try:
+        return None if until is None else duration(until, "until"), condition
+    except BadInput as error:
+        raise error.at(f"{case}: run") from None
 
 
 def _describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: report.Rows) -> Description:

@@ -30,6 +30,7 @@ class Exported(NamedTuple):
     frame: Frame
     cluster: np.ndarray  # (N,) label of the cluster of each grain
     materials: list[str]  # names of the materials of all frames, which so have the same numbers in each
+    number: int  # number of the frame, which no other one has
 
     @property
     def material(self) -> np.ndarray:
@@ -76,13 +77,13 @@ def to_lammps_dump(one: Exported) -> str:
 
     Columns: id, type, position, radius, velocity, spin, moment, mass, charge, crossings of the box, time [s], own
     quantities in SI with the prefix `d_` that LAMMPS gives such numbers, name of the material, and cluster. The time is
-    a column, because some readers do not accept `ITEM: TIME`.
+    a column, because some readers do not accept `ITEM: TIME`. `TIMESTEP` is different in each frame, see `_numbers`.
     """
     frame = one.frame
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     head = (
-        f"ITEM: TIMESTEP\n{frame.step}\n"
+        f"ITEM: TIMESTEP\n{one.number}\n"
         f"ITEM: NUMBER OF ATOMS\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {walls}\n{box}"
         "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz mass q ix iy iz v_time"
@@ -208,6 +209,12 @@ def _materials(frames: Sequence[Frame]) -> list[str]:
     return list(dict.fromkeys(name for frame in frames for name in frame.materials))
 
 
+def _numbers(frames: Sequence[Frame]) -> list[int]:
+    """Numbers that tell frames apart: their steps, or their indices where several frames lie within one step."""
+    steps = frames.steps if isinstance(frames, FrameSequence) else [frame.step for frame in frames]
+    return [int(k) for k in steps] if len(set(steps)) == len(frames) else list(range(len(frames)))
+
+
 def stale_files(stem: str | Path, form: str, written: Sequence[Path]) -> list[Path]:
     """Files of an earlier export of the same name that a later one, which wrote `written`, has not replaced."""
     ending = FORMATS[form][1].replace("{:012d}", "[0-9]*[0-9]")
@@ -259,17 +266,17 @@ def export_frames(
     if not place.parent.is_dir():
         raise BadInput(f"there is no folder {place.parent}; make it first")
     text_of, ending = FORMATS[form]
-    materials = _materials(frames)
+    materials, names = _materials(frames), _numbers(frames)
     path_of, times = _files(place, ending), dict[Path, float]()
-    each = ((path_of(frame.step), frame) for frame in (frames[k] for k in numbers))
+    each = ((path_of(frame.step), frame, names[k]) for k, frame in ((k, frames[k]) for k in numbers))
     for path, group in groupby(each, itemgetter(0)):
         with replacing(path) as file:
-            for _, frame in group:
+            for _, frame, name in group:
                 if form == "lammps-data" and frame.own and not times:
                     left = ", ".join(frame.own)
                     warn(f"LAMMPS data files have no place for own quantities: {left} left out; lammps-dump has them")
                 times[path] = frame.time
-                one = Exported(frame, clusters(len(frame), frame.pair), materials)
+                one = Exported(frame, clusters(len(frame), frame.pair), materials, name)
                 file.write(text_of(one).encode())
     if form != "vtk":
         return list(times)

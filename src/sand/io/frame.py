@@ -15,7 +15,7 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | particles/typeid, types | materials; a name keeps its number in all frames of a file |
 | particles/image | how often each grain has crossed the box along each periodic axis since the start |
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
-| log/particles/position, radius | to full precision [m]; only in files of bodies |
+| log/particles/position, radius, velocity, mass, charge | to full precision, SI; only in files of bodies |
 | bonds/group | grains in contact |
 | log/particles/id | identity of each grain; absent if it is the index, as long as no grain was removed |
 | log/particles/NAME | an own quantity of the user, in SI |
@@ -58,6 +58,8 @@ REST = "at_rest"
 """Name of the array that says which grains belong to clusters at rest."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
+IN_FULL = ("position", "radius", "velocity", "mass", "charge")
+"""Quantities that trajectories have in single precision, and files of bodies also in double precision."""
 SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
 """Logged arrays of grains that not all frames have."""
 
@@ -74,7 +76,7 @@ def stored_frame(
     scale: float | None = None,
     materials: Sequence[str] = (),
 ) -> Any:
-    """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also positions and radii in float64.
+    """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also `IN_FULL` in float64.
 
     `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters. `scale`: reference radius [m], by
     default the mean radius. `materials`: names that come first, also without a grain, and so keep their numbers.
@@ -124,8 +126,7 @@ def stored_frame(
     if at_rest is not None:
         frame.log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
     if exact:
-        frame.log["particles/position"] = np.ascontiguousarray(grains.position)
-        frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
+        frame.log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
     frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
     return frame
 
@@ -222,11 +223,13 @@ class Frame:
         self.time = float(stored.log["time"][0])
         scale = float(stored.log["scale/length"][0])
         p = stored.particles
-        single_precision = np.asarray(p.position, dtype=np.float64) * scale
-        self.position = np.array(stored.log.get("particles/position", single_precision))
-        self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
-        self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
-        self.charge, self.image = np.asarray(p.charge), np.asarray(p.image)
+        single = {"position": np.asarray(p.position, np.float64) * scale}
+        single |= {"radius": 0.5 * np.asarray(p.diameter, np.float64) * scale}
+        single |= {"velocity": p.velocity, "mass": p.mass, "charge": p.charge}
+        self.position, self.radius, self.velocity, self.mass, self.charge = (
+            np.array(stored.log.get(f"particles/{name}", single[name])) for name in IN_FULL
+        )
+        self.image = np.asarray(p.image)
         self.id = np.asarray(stored.log.get(f"particles/{IDENTITY}", np.arange(p.N)), np.uint32)
         # before own quantities had names, the only one was this temperature
         before = {"internal_temperature": "K"} if "particles/internal_temperature" in stored.log else {}
@@ -358,6 +361,8 @@ class FrameSequence(Sequence[Frame]):
     """Frames of a file at `path`, by index or slice; subclasses define `__len__` and `_frame`."""
 
     path: Path
+    steps: Any
+    """Step of each frame (K,)."""
 
     @abstractmethod
     def _frame(self, number: int) -> Frame:

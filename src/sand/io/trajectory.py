@@ -112,7 +112,7 @@ class TrajectoryWriter:
         exact: bool = False,
         at_rest: np.ndarray | None = None,
     ) -> None:
-        """Append one frame; columns of `contacts` as in `ContactTable`; `exact`: positions and radii in float64.
+        """Append one frame; columns of `contacts` as in `ContactTable`; `exact`: `frame.IN_FULL` in float64.
 
         `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters.
 
@@ -317,6 +317,11 @@ class Frames(FrameSequence):
     def times(self) -> np.ndarray:
         """Time of each frame [s]."""
         return np.array([gsd_index.time_of(self._file, k) for k in range(len(self))])
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Step of each frame; frames that lie within one step have its number."""
+        return np.array([gsd_index.step_of(self._file, k) for k in range(len(self))], np.int64)
 
     def at(self, time: Any) -> Frame:
         """The frame nearest to a time, in seconds or as text; of two equally near ones the earlier.

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadInput
+from ..extended_xyz import unlisted
 from .data import NAMED, FileBox, GrainData, GrainFile, data_of, number
 
-CENTIMETRE, ANGSTROM, BOHR = 1e-2, 1e-10, 5.29177210903e-11
+CENTIMETRE, ANGSTROM, BOHR, FEMTOSECOND = 1e-2, 1e-10, 5.29177210903e-11, 1e-15
 STYLES = {
     "si": (1.0, 1.0, 1.0, 1.0),
     "cgs": (CENTIMETRE, CENTIMETRE, 1e-3, 3.3356409519815204e-10),
@@ -34,6 +35,10 @@ ATOMS = {
 """Columns of an atom by style."""
 IN_HYBRID = {"sphere": "diameter density", "dipole": "q mux muy muz", "charge": "q", "atomic": ""}
 """Columns that a style adds to `id type x y z` of `hybrid`; one that occurs twice is written once."""
+BY_SAND = re.compile(r"SAND, step (\d+), (\S+) s, units si")
+"""First line of a data file that SAND exported."""
+OF_SAND = {"typelabel", "v_time", "c_cluster"}
+"""Columns that show that SAND exported a dump, in SI."""
 SECTIONS = re.compile(
     r"^(Atoms|Velocities|Masses|Atom Type Labels|Bonds|Angles|Dihedrals|Impropers|Ellipsoids|Lines|Triangles|Bodies|"
     r"[A-Z][A-Za-z]* (?:Coeffs|Type Labels))\b\s*(?:#\s*(.*))?$"
@@ -85,8 +90,12 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
         if len(turn) != stated:
             raise BadInput(f"{path}: section Velocities has {len(turn)} lines, but there are {stated} atoms")
         columns |= {name: values[turn] for name, values in moving.items()}
-    data = _in_si(path, columns, _units(lines[0]), by_sand=lines[0].startswith("SAND"))
-    data.names = _labels(sections, columns["type"])
+    own = BY_SAND.match(lines[0])
+    data = _in_si(path, columns, _units(lines[0]), by_sand=own is not None)
+    listed = next((m[1] for line in head if own and (m := re.match(r"^\d+ atom types # (.*)", line))), None)
+    data.names = _labels(sections, columns["type"], listed)
+    if own:
+        data.step, data.time = int(own[1]), number(own[2])
     bounds = {m[3]: (float(m[1]), float(m[2])) for line in head if (m := BOUNDS.match(line))}
     if len(bounds) == 3:
         low, high = np.array([bounds[axis] for axis in "xyz"]).T
@@ -153,9 +162,11 @@ def _numbers(path: Any, rows: list[tuple[int, list[str], str]], names: list[str]
     return dict(zip(names, values.T, strict=True))
 
 
-def _labels(sections: dict[str, Section], kinds: np.ndarray) -> list[str] | None:
-    """Names of the materials: labels of the types, or comments behind all masses; None without these."""
-    if "Atom Type Labels" in sections:
+def _labels(sections: dict[str, Section], kinds: np.ndarray, listed: str | None) -> list[str] | None:
+    """Names of the materials: those `listed` by SAND, labels of the types, or comments behind all masses, or None."""
+    if listed is not None:
+        labels = {str(k): name for k, name in enumerate(unlisted(listed), start=1)}
+    elif "Atom Type Labels" in sections:
         labels = {words[0]: words[-1] for _, words, _ in sections["Atom Type Labels"][2]}
     else:
         labels = {words[0]: comment for _, words, comment in sections.get("Masses", (0, "", []))[2] if comment}
@@ -211,19 +222,37 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
     if short:
         raise BadInput(f"{path}, line {line}: not the {len(names)} columns {' '.join(names)}" for line in short[:NAMED])
     columns = _numbers(path, picked, kept)
-    if "id" in columns:
-        order = np.argsort(columns["id"], kind="stable")
-        columns = {name: values[order] for name, values in columns.items()}
+    order = np.argsort(columns["id"], kind="stable") if "id" in columns else np.arange(count)
+    columns = {name: values[order] for name, values in columns.items()}
     for k, axis in enumerate("xyz"):  # scaled and unwrapped coordinates
         for name, scaled in ((f"{axis}u", False), (f"{axis}s", True), (f"{axis}su", True)):
             values = columns.pop(name, None)
             if values is not None and axis not in columns:
                 columns[axis] = low[k] + values * (high[k] - low[k]) if scaled else values
-    data = _in_si(path, columns, units, by_sand=False)
+    data = _in_si(path, columns, units, by_sand=set(names) >= OF_SAND)
     data.box = FileBox(low, high, (x, y, z))
+    if "typelabel" in texts:
+        at = names.index("typelabel")
+        data.names = [unlisted(rows[k][1][at])[0] for k in order]
     words = lines[first + 1].split()
     data.step = int(words[0]) if len(words) == 1 and words[0].isdecimal() else None
+    data.time = _time(lines, first, columns, units)
     return data
+
+
+def _time(lines: list[str], first: int, columns: dict[str, np.ndarray], units: str | None) -> float | None:
+    """Time of a snapshot [s]: `ITEM: TIME`, or the column `v_time` of exports of SAND; None without these."""
+    length, speed, _, _ = STYLES.get(units or "si", (1.0, 1.0, 1.0, 1.0))
+    unit = FEMTOSECOND if units == "electron" else length / speed
+    if units == "lj":
+        return None
+    try:
+        if first >= 2 and lines[first - 2].strip() == "ITEM: TIME":
+            return number(lines[first - 1].strip()) * unit
+    except ValueError:
+        return None
+    found = columns.get("v_time", np.zeros(0))
+    return float(found[0]) * unit if len(found) and (found == found[0]).all() else None
 
 
 def _in_si(path: Any, columns: dict[str, np.ndarray], units: str | None, *, by_sand: bool) -> GrainData:
@@ -254,7 +283,7 @@ def _in_si(path: Any, columns: dict[str, np.ndarray], units: str | None, *, by_s
     elif units not in (None, *STYLES):
         data.refused.append(f"{path}: units {units} are unknown; known are {', '.join(STYLES)} and lj")
     elif units is None and (kept := [name for name in kept if not by_sand]):
-        data.notes.append(f"{path} states no style of units: {', '.join(kept)} are taken in SI")
+        data.notes.append(f"{path} states no style of units: {' and '.join(kept)} taken in SI")
     if units not in (None, "si", "lj") and np.any(data.given.get("moment", 0.0)):
         data.refused.append(f"{path}: moments are read in A m^2 from files in si units only; set mux, muy, muz to 0")
     if "mass" in data.given:
