@@ -132,7 +132,9 @@ def columns_of_dump(text):
         head, _, body = part.partition("ITEM: ATOMS ")
         titles, *rows = body.splitlines()
         of = dict(zip(titles.split(), np.array([row.split() for row in rows]).T, strict=True))
-        labels = of.pop("typelabel")
+        materials = unlisted(re.search(r"ITEM: NUMBER OF ATOMS # (.*)", head)[1])
+        symbols = [{"iron": "Fe", "ice": "O"}.get(name, "X") for name in materials]
+        assert of.pop("element").tolist() == [symbols[int(kind) - 1] for kind in of["type"]]
         of = {name: values.astype(float) for name, values in of.items()}
         vectors = {"pos": "x y z", "velo": "vx vy vz", "spin": "omegax omegay omegaz", "moment": "mux muy muz"}
         frame = {name: np.column_stack([of[c] for c in parts.split()]) for name, parts in vectors.items()}
@@ -140,7 +142,7 @@ def columns_of_dump(text):
         frame |= {"charge": of["q"], "mass": of["mass"], "radius": of["radius"], "heating": of["d_heating"]}
         assert (of["v_time"] == of["v_time"][0]).all() and int(head.splitlines()[2]) == len(rows)
         frame |= {"time": of["v_time"][0], "step": int(head.split()[0]), "cluster": of["c_cluster"] - 1}
-        frames.append(frame | {"names": unlisted(";".join(labels)), "scale": 1.0, "type": of["type"]})
+        frames.append(frame | {"names": [materials[int(k) - 1] for k in of["type"]], "scale": 1.0, "type": of["type"]})
     return frames
 
 

@@ -42,6 +42,11 @@ def unlisted(text: str) -> list[str]:
     return [re.sub("(%[0-9A-Fa-f]{2})+", unescaped, name) for name in text.split(";")]
 
 
+def symbol_of(name: str) -> str:
+    """Chemical symbol by which other programs draw grains of a material, "X" for materials of the user."""
+    return SYMBOLS.get(name, "X")
+
+
 def row_form(columns: Sequence[np.ndarray]) -> str:
     """Format of a row of the columns (N,) or (N, k), with the digits that restore their numbers exactly."""
     forms = ("%d" if c.dtype.kind in "iu" else "%.9g" if c.dtype == np.float32 else "%.17g" for c in columns)
@@ -55,7 +60,7 @@ def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
 
 def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Sequence[np.ndarray]) -> str:
     """Format a frame: number of grains, `head`, and per grain the chemical symbol of its material and the columns."""
-    symbols, form = [SYMBOLS.get(names[k], "X") for k in material], row_form(columns)
+    symbols, form = [symbol_of(names[k]) for k in material], row_form(columns)
     rows = [f"{symbol} {row}" for symbol, row in zip(symbols, format_rows(columns, form), strict=True)]
     return "\n".join([str(len(rows)), head, *rows]) + "\n"
 

@@ -37,8 +37,8 @@ IN_HYBRID = {"sphere": "diameter density", "dipole": "q mux muy muz", "charge": 
 """Columns that a style adds to `id type x y z` of `hybrid`; one that occurs twice is written once."""
 BY_SAND = re.compile(r"SAND, step (\d+), (\S+) s, units si")
 """First line of a data file that SAND exported."""
-OF_SAND = {"typelabel", "v_time", "c_cluster"}
-"""Columns that show that SAND exported a dump, in SI."""
+NUMBER = "NUMBER OF ATOMS"
+"""Item of a dump, behind which SAND lists the names of the materials in the order of their types."""
 SECTIONS = re.compile(
     r"^(Atoms|Velocities|Masses|Atom Type Labels|Bonds|Angles|Dihedrals|Impropers|Ellipsoids|Lines|Triangles|Bodies|"
     r"[A-Z][A-Za-z]* (?:Coeffs|Type Labels))\b\s*(?:#\s*(.*))?$"
@@ -199,8 +199,10 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
     items = {lines[k].strip().removeprefix("ITEM: "): k for k in range(first, end) if lines[k].startswith("ITEM: ")}
     atoms = next((name for name in items if name.startswith("ATOMS")), None)
     bounds = next((name for name in items if name.startswith("BOX BOUNDS")), None)
+    number_of = next((name for name in items if name.startswith(NUMBER)), NUMBER)
+    listed = number_of.removeprefix(f"{NUMBER} # ") if number_of != NUMBER else None
     try:
-        count = int(lines[items["NUMBER OF ATOMS"] + 1])
+        count = int(lines[items[number_of] + 1])
         low, high = np.array([[float(v) for v in lines[items[bounds or ""] + k].split()[:2]] for k in (1, 2, 3)]).T
     except (KeyError, ValueError, IndexError):
         raise BadInput(f"{path}, line {first + 1}: a snapshot without its number of atoms or its box") from None
@@ -229,11 +231,13 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
             values = columns.pop(name, None)
             if values is not None and axis not in columns:
                 columns[axis] = low[k] + values * (high[k] - low[k]) if scaled else values
-    data = _in_si(path, columns, units, by_sand=set(names) >= OF_SAND)
+    data = _in_si(path, columns, units, by_sand=listed is not None)
     data.box = FileBox(low, high, (x, y, z))
-    if "typelabel" in texts:
+    if listed is not None and "type" in columns:
+        data.names = _labels({}, columns["type"], listed)
+    elif "typelabel" in texts:
         at = names.index("typelabel")
-        data.names = [unlisted(rows[k][1][at])[0] for k in order]
+        data.names = [rows[k][1][at] for k in order]
     words = lines[first + 1].split()
     data.step = int(words[0]) if len(words) == 1 and words[0].isdecimal() else None
     data.time = _time(lines, first, columns, units)
