@@ -52,6 +52,11 @@ class Grains(SimpleNamespace):
         """Identities: the indices."""
         return np.arange(len(self))
 
+    @property
+    def image(self) -> np.ndarray:
+        """Crossings of the box: none."""
+        return np.zeros((len(self), 3), np.int32)
+
 
 def positions(k: int) -> np.ndarray:
     """Positions (12, 3) in radii, inside the box."""
