@@ -7,7 +7,6 @@ fractions of limits that depend on the index of the contact.
 from __future__ import annotations
 
 import itertools
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 import sand
 from sand.box import Box
 from sand.io import run_folder as files
+from sand.io.damage import sealed
 from sand.io.ledger_table import LedgerFile
 from sand.io.trajectory import TrajectoryWriter
 from sand.own_quantities import OwnQuantities
@@ -48,7 +48,7 @@ class Body:
         self.own = OwnQuantities(own, {"constructor": "K", "Wärmestrom": "W/m^2"})
         density = np.array([one.density for one in self.materials])[self.material]
         self.mass = density * 4.0 / 3.0 * np.pi * self.radius**3
-        self.charge = np.zeros(count)
+        self.charge, self.image = np.zeros(count), np.zeros((count, 3), np.int32)
         self.orientation = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
         way = rng.normal(size=(count, 3))
         size = np.array([200.0, 0.0])[self.material] * self.mass  # non-magnetic grains have no arrow
@@ -145,7 +145,7 @@ def write(folder: Path, moments: list[Body], box: Box, rests: list[np.ndarray] |
     writer.close()
     LedgerFile(folder / files.LEDGER, list(rows[0]), rows)
     end = {"steps": 1000 * (len(moments) - 1), "outcome_text": "reached the end"}
-    (folder / files.SUMMARY).write_text(json.dumps(end))
+    files.write_json(folder / files.SUMMARY, sealed(end))
     return folder
 
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sand.box import Box
+from sand.io.damage import sealed
 from sand.io.frame import MODES
 from sand.io.ledger_table import LedgerFile
 from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
@@ -175,7 +176,7 @@ class SmallRun:
     def end(self) -> None:
         """Write the summary."""
         self.writer.close()
-        write_json(self.folder / SUMMARY, {"outcome_text": "ended as wished", "steps": 100 * (self.count - 1)})
+        write_json(self.folder / SUMMARY, sealed({"outcome_text": "ended as wished", "steps": 100 * (self.count - 1)}))
 
 
 def written(folder: Path, frames: list[tuple[Any, np.ndarray]], box: Box | None = None) -> Path:
@@ -185,5 +186,5 @@ def written(folder: Path, frames: list[tuple[Any, np.ndarray]], box: Box | None 
     for k, (some, pair) in enumerate(frames):
         writer.write(100 * k, k * STEP, some, box or Box.open(), contacts(pair, k))
     writer.close()
-    write_json(folder / SUMMARY, {"outcome_text": "ended as wished", "steps": 100 * (len(frames) - 1)})
+    write_json(folder / SUMMARY, sealed({"outcome_text": "ended as wished", "steps": 100 * (len(frames) - 1)}))
     return folder
