@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..analysis.body_motion import BodyMotion
 from ..compiler.program import Program
 from ..compiler.stage import Stage
 from ..compiler.table import Table
@@ -19,7 +20,7 @@ from ..contact.damping import THERMAL
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
-from ..contact.measure import ENERGIES, energies_stage, wall_energies_stage
+from ..contact.measure import BODY_ROWS, ENERGIES, energies_stage, measure_bodies, wall_energies_stage
 from ..contact.model import Contact
 from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
@@ -47,7 +48,8 @@ from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
 from ..neighbours.spatial_sort import SORT_INTERVAL, inverse, reorder_grains, sort_contacts_and_pairs, spatial_order
-from ..state.arrays import OVER_ALLOCATION
+from ..state.arrays import OVER_ALLOCATION, cluster_arrays
+from ..state.spare_copy import SpareCopy
 from ..state.state import (
     BROKEN,
     CHECKED,
@@ -85,11 +87,13 @@ CONTACT = Contact.name
 """Name of the contact model among the forces."""
 ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
 """The arrays of a state that stages take, besides those of the grains."""
+OF_STATE = ("grains", *GROUPS, "clock", "count", "lost")
+"""The parts of a table that these are."""
 
 
 def _set_arrays(table: Table, present: tuple) -> None:
     """Give a table the arrays of a state."""
-    for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
+    for name, value in zip(OF_STATE, present, strict=True):
         table.set(name, value)
 
 
@@ -140,6 +144,7 @@ class Engine:
     _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
     _copy_table: Table = field(init=False)  # the table of the copy that is stepped to times of output
     _copy_present: tuple = field(init=False, default=(None,))  # arrays of the state that it has
+    _spare: SpareCopy = field(init=False, default_factory=SpareCopy)  # memory of the copy
     _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
@@ -224,9 +229,8 @@ class Engine:
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
-        self._copy_present = (None,)  # frees the arrays of the copy before
-        self._copy_table.follow(self._current_table(regular))
-        self._state = regular.copy()
+        table, (self._state, is_same) = self._current_table(regular), self._spare.of(regular)
+        self._copy_table.follow(table, OF_STATE if is_same else ())
         self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
         _set_arrays(self._copy_table, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
@@ -240,6 +244,7 @@ class Engine:
             for index in (STEPS, LONG_RANGE_SUMS, REBUILT, LISTED, REJECTED):
                 reached.count[index] = regular.count[index]
             self._output_state, self._output_time = reached, time
+        self._spare.keep(reached)
         return stop
 
     @property
@@ -483,6 +488,7 @@ class Engine:
         table.set("program", program)
         stages: list[tuple[Any, Any]] = [*self._drivers(), *program.stages.values()]
         stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+        stages.append((measure_bodies, (np.zeros((BODY_ROWS, 1)), cluster_arrays(1))))
         stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in self.long_range]
         stages += [
             (external_energies_for(outer.formula), (outer.numbers(), self.time, shares)) for outer in self.external
@@ -659,9 +665,17 @@ class Engine:
             wall_energies_stage(self.law).run(self._current_table(state), (found,))
         return found.tolist()
 
+    def body_motion(self) -> BodyMotion:
+        """Motion of each body, as `analysis.body_motion` has it."""
+        state = self.state
+        memory = cluster_arrays(len(state.grains))
+        rows = np.zeros((BODY_ROWS, len(state.grains)))
+        bodies = measure_bodies.run(self._current_table(state), (rows, memory))
+        return BodyMotion(rows[0, :bodies].astype(np.int64), *rows[1:, :bodies])
+
     def force_energies(self) -> dict[str, float]:
         """Total energy [J] of each long-range and per-grain force, by ledger column."""
-        return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
+        return {name: math.fsum(share.tolist()) for name, share in self.energies_at_grains().items()}
 
     def limiting_grains(self) -> tuple[int, ...]:
         """Indices of the grains that caused the last stop."""
