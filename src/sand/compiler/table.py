@@ -193,6 +193,8 @@ class Table:
         Address of the table.
     stages : dict[Stage, int]
         Addresses of stages without parameters that were called, for the present structures of the parts.
+    calls : dict[Stage, tuple]
+        Of stages with parameters: those of the last call, their row of words, and the addresses of stage and row.
     """
 
     def __init__(self, names: tuple[str, ...]):
@@ -201,14 +203,16 @@ class Table:
         self._structures, self._keys = dict[str, Any](), dict[str, int]()
         self._addresses = np.zeros(len(names), np.int64)
         self.address, self.stages = address_of(self._addresses), dict[Any, int]()
+        self.calls = dict[Any, tuple[Any, ...]]()
 
     def set(self, name: str, value: Any) -> None:
         """Set a part; nothing is done if it is the same object, or the same number, as before."""
         before = self._parts.get(name)
         if before is value and name in self._parts:
             return
-        if type(value) in NUMBERS and type(before) is type(value) and value == before != 0:
-            return
+        if type(value) in NUMBERS and type(before) is type(value) and value == before:
+            if value or type(value) is not float:  # 0 and −0 differ
+                return
         self._parts[name] = value
         if COMPILED and type(value) in NUMBERS and type(before) is type(value):
             self._rows[name] = np.array([value], np.float64 if type(value) is float else np.int64)
@@ -223,7 +227,7 @@ class Table:
                 key = _number_of(self.place(name))
                 if self._keys.get(name) != key:
                     self._keys[name] = key
-                    self.stages = {}
+                    self.stages, self.calls = {}, {}
             self._addresses[self.index(name)] = address_of(self._rows[name])
 
     def snapshot(self) -> Table:
@@ -245,7 +249,7 @@ class Table:
         self._structures, self._keys = dict(other._structures), dict(other._keys)
         own = [self._names[name] for name in but]
         kept = self._addresses[own]
-        self._addresses[:], self.stages = other._addresses, other.stages
+        self._addresses[:], self.stages, self.calls = other._addresses, other.stages, other.calls
         self._addresses[own] = kept
 
     def __getitem__(self, name: str) -> Any:

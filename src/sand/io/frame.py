@@ -63,6 +63,8 @@ MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
 """Logged arrays of grains that not all frames have."""
+ALIKE = ("scale/length", "periodic", "lengths")
+"""Logged arrays that are left out of frames in which they are those of the first one."""
 
 
 def stored_frame(
@@ -112,10 +114,10 @@ def stored_frame(
         "particles/spin": arrays.spin.T.copy(),
         "bonds/overlap": contacts["overlap"],
         "bonds/formed": contacts["formed"],
-        "bonds/force": contacts["force"].astype(np.float32),
+        "bonds/force": np.ascontiguousarray(contacts["force"], np.float32),
         "lengths": np.array(lengths, dtype=np.float64),
-        "bonds/slide": contacts["slide_vector"].astype(np.float32),
-        "bonds/roll": contacts["roll_vector"].astype(np.float32),
+        "bonds/slide": np.ascontiguousarray(contacts["slide_vector"], np.float32),
+        "bonds/roll": np.ascontiguousarray(contacts["roll_vector"], np.float32),
         "bonds/twist": contacts["twist"].astype(np.float32),
         "bonds/share": np.array([contacts[f"{mode}_share"] for mode in MODES], np.float32).T.copy(),
     }
@@ -182,8 +184,8 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
     """Append a frame to an open GSD file; `first`: of `first_chunks`, filled in when this is the first frame.
 
     A chunk is left out, as by gsd.hoomd, where readers find the same bytes without it: those of the first frame or, if
-    that has no such chunk, the default. GSD reads no logged array that the first frame lacks: identities and what is
-    at rest that appear later are chunks of names that begin with `LATE`.
+    that has no such chunk, the default; of logged arrays only `ALIKE`. GSD reads no logged array that the first frame
+    lacks: identities and what is at rest that appear later are chunks of names that begin with `LATE`.
     """
     is_first, write = not first, file.file.write_chunk
     for name, (value_in, dtype, default) in _DEFAULTS.items():
@@ -196,10 +198,12 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
         if is_first:
             first[name] = content
     for name, values in frame.log.items():
-        late = name in SOMETIMES and not is_first and f"log/{name}" not in first
-        write(f"{LATE if late else 'log/'}{name}", values)
-        if is_first and name in SOMETIMES:
-            first[f"log/{name}"] = b""
+        known = first.get(f"log/{name}")
+        if name in ALIKE and known == values.tobytes():
+            continue
+        write(f"{LATE if name in SOMETIMES and known is None and not is_first else 'log/'}{name}", values)
+        if is_first and name in (*ALIKE, *SOMETIMES):
+            first[f"log/{name}"] = values.tobytes()
     file.file.end_frame()
     if is_first:
         file.flush()
@@ -207,7 +211,7 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
 
 def first_chunks(file: Any) -> dict[str, bytes]:
     """Bytes of the chunks of the first frame that `append_frame` compares with; empty if there is no frame."""
-    names = [*_DEFAULTS, *(f"log/{name}" for name in SOMETIMES)]
+    names = [*_DEFAULTS, *(f"log/{name}" for name in (*ALIKE, *SOMETIMES))]
     return {name: file.file.read_chunk(0, name).tobytes() for name in names if file.file.chunk_exists(0, name)}
 
 

@@ -87,6 +87,8 @@ CONTACT = Contact.name
 """Name of the contact model among the forces."""
 ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
 """The arrays of a state that stages take, besides those of the grains."""
+ALONE = 2000
+"""Grains from which on several threads take the shorter step to a time of output."""
 OF_STATE = ("grains", *GROUPS, "clock", "count", "lost")
 """The parts of a table that these are."""
 
@@ -144,6 +146,9 @@ class Engine:
     _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
     _copy_table: Table = field(init=False)  # the table of the copy that is stepped to times of output
     _copy_present: tuple = field(init=False, default=(None,))  # arrays of the state that it has
+    _of_contacts: tuple = field(init=False, default_factory=lambda: (np.zeros(len(ENERGIES)),))  # results of a stage
+    _shares: dict[str, np.ndarray] = field(init=False, default_factory=dict)  # results of stages: energies of grains
+    _of_bodies: tuple | None = field(init=False, default=None)  # results and memory of a stage
     _spare: SpareCopy = field(init=False, default_factory=SpareCopy)  # memory of the copy
     _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
@@ -423,7 +428,7 @@ class Engine:
     def _ramped_energy(self) -> float:
         """Energy [J] of the forces with ramps."""
         assert self.ramped is not None
-        energies = [share.sum() for share in self.energies_at_grains(self.ramped.names).values()]
+        energies = [share.sum() for share in self._energies_at_grains(self.ramped.names).values()]
         return math.fsum([*energies, *(self.contact_energies() if CONTACT in self.ramped.names else ())])
 
     def _pair_loads(self, k: int) -> np.ndarray:
@@ -513,7 +518,8 @@ class Engine:
                 self._program = build_program(self._components, self.parameters, table)
                 for each in (self._table, table):
                     each.set("program", self._program)
-            if self._workers is not None and benefits_from_workers(
+            alone = shorten and len(state.grains) < ALONE  # threads start later than one step ends
+            if not alone and self._workers is not None and benefits_from_workers(
                 len(self._components.pair_forces), int(state.count[CONTACTS])
             ):
                 self._workers.start(table)
@@ -641,8 +647,16 @@ class Engine:
 
         Of all forces, or of those with these names.
         """
-        table, state = self._current_table(self.state), self.state
-        shares = {name: np.zeros(len(state.grains)) for name in self.columns()}
+        return {name: share.copy() for name, share in self._energies_at_grains(names).items()}
+
+    def _energies_at_grains(self, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
+        """As `energies_at_grains`, in arrays that the next call uses again."""
+        table, state, columns = self._current_table(self.state), self.state, self.columns()
+        if self._shares.keys() != set(columns) or any(len(share) != len(state.grains) for share in self._shares.values()):
+            self._shares = {name: np.zeros(len(state.grains)) for name in columns}
+        shares = self._shares
+        for share in shares.values():
+            share[:] = 0.0
         for force, sums, numbers in self.long_range:
             if names is None or force.name in names:
                 self._add_energies(table, sums, numbers, shares[force.column])
@@ -658,24 +672,26 @@ class Engine:
 
     def contact_energies(self) -> list[float]:
         """Energies [J] stored by the contacts, see `contact.measure.ENERGIES`."""
-        found, state = np.zeros(len(ENERGIES)), self.state
+        found, state = self._of_contacts[0], self.state
+        found[:] = 0.0
         if state.count[CONTACTS]:
-            energies_stage(self.law).run(self._current_table(state), (found,))
+            energies_stage(self.law).run(self._current_table(state), self._of_contacts)
         if state.count[WALL_CONTACTS]:
-            wall_energies_stage(self.law).run(self._current_table(state), (found,))
+            wall_energies_stage(self.law).run(self._current_table(state), self._of_contacts)
         return found.tolist()
 
     def body_motion(self) -> BodyMotion:
         """Motion of each body, as `analysis.body_motion` has it."""
-        state = self.state
-        memory = cluster_arrays(len(state.grains))
-        rows = np.zeros((BODY_ROWS, len(state.grains)))
-        bodies = measure_bodies.run(self._current_table(state), (rows, memory))
-        return BodyMotion(rows[0, :bodies].astype(np.int64), *rows[1:, :bodies])
+        state, count = self.state, len(self._state.grains)
+        if self._of_bodies is None or self._of_bodies[0].shape[1] != count:
+            self._of_bodies = np.zeros((BODY_ROWS, count)), cluster_arrays(count)
+        bodies = measure_bodies.run(self._current_table(state), self._of_bodies)
+        found = self._of_bodies[0][:, :bodies].copy()
+        return BodyMotion(found[0].astype(np.int64), *found[1:])
 
     def force_energies(self) -> dict[str, float]:
         """Total energy [J] of each long-range and per-grain force, by ledger column."""
-        return {name: math.fsum(share.tolist()) for name, share in self.energies_at_grains().items()}
+        return {name: math.fsum(share.tolist()) for name, share in self._energies_at_grains().items()}
 
     def limiting_grains(self) -> tuple[int, ...]:
         """Indices of the grains that caused the last stop."""
