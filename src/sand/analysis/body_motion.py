@@ -140,12 +140,20 @@ def body_temperatures(motion: BodyMotion, which: np.ndarray | None = None) -> Bo
     BodyTemperatures
         NaN if no body is chosen.
     """
-    chosen = np.ones(len(motion.mass), bool) if which is None else np.asarray(which, bool)
-    moving, turning = motion.translation[chosen], motion.rotation[chosen]
-    if not len(moving):
+    if which is None:
+        return temperatures_of(motion.translation, motion.rotation)
+    chosen = np.asarray(which, bool)
+    return temperatures_of(motion.translation[chosen], motion.rotation[chosen])
+
+
+def temperatures_of(translation: np.ndarray, rotation: np.ndarray) -> BodyTemperatures:
+    """As `body_temperatures`, from the energies of bodies (K,) [J]."""
+    count = len(translation)
+    if not count:
         return BodyTemperatures(np.nan, np.nan, np.nan)
+    middle = np.sort(rotation)[(count - 1) // 2 : count // 2 + 1].tolist()  # NaN, if there is any, is sorted last
     return BodyTemperatures(
-        2.0 * float(moving.mean()) / (3.0 * BOLTZMANN),
-        2.0 * float(turning.mean()) / (3.0 * BOLTZMANN),
-        float(np.median(turning)) / (MEDIAN_ENERGY * BOLTZMANN),
+        2.0 * float(translation.sum()) / (3.0 * BOLTZMANN * count),
+        2.0 * float(rotation.sum()) / (3.0 * BOLTZMANN * count),
+        sum(middle) / len(middle) / (MEDIAN_ENERGY * BOLTZMANN),
     )

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from operator import attrgetter
+from operator import attrgetter, is_
 from types import FunctionType
 from typing import Any
 
@@ -182,8 +182,11 @@ class Stage:
         if isinstance(parameters, tuple) and not parameters:
             address = table.stages.get(self) or table.stages.setdefault(self, self.address(table, parameters))
             return int(call_from_python(address, table.address, table.address, block))
-        row = np.array([*words_of(parameters), 0], np.int64)
-        return int(call_from_python(self.address(table, parameters), table.address, address_of(row), block))
+        call = table.calls.get(self)
+        if call is None or len(call[0]) != len(parameters) or not all(map(is_, call[0], parameters)):
+            row = np.array([*words_of(parameters), 0], np.int64)
+            call = table.calls[self] = parameters, row, self.address(table, parameters), address_of(row)
+        return int(call_from_python(call[2], table.address, call[3], block))
 
     @staticmethod
     def _part(name: str, table: Table, own: Any) -> tuple[Any, Any]:

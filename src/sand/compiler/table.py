@@ -5,6 +5,7 @@ Each part has a row of 64-bit words: numbers, addresses and lengths of arrays.  
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import cache
 from typing import Any
 
@@ -192,6 +193,8 @@ class Table:
         Address of the table.
     stages : dict[Stage, int]
         Addresses of stages without parameters that were called, for the present structures of the parts.
+    calls : dict[Stage, tuple]
+        Of stages with parameters: those of the last call, their row of words, and the addresses of stage and row.
     """
 
     def __init__(self, names: tuple[str, ...]):
@@ -200,16 +203,21 @@ class Table:
         self._structures, self._keys = dict[str, Any](), dict[str, int]()
         self._addresses = np.zeros(len(names), np.int64)
         self.address, self.stages = address_of(self._addresses), dict[Any, int]()
+        self.calls = dict[Any, tuple[Any, ...]]()
 
     def set(self, name: str, value: Any) -> None:
         """Set a part; nothing is done if it is the same object, or the same number, as before."""
         before = self._parts.get(name)
         if before is value and name in self._parts:
             return
-        if type(value) in NUMBERS and type(before) is type(value) and value == before != 0:
-            return
+        if type(value) in NUMBERS and type(before) is type(value) and value == before:
+            if value or type(value) is not float:  # 0 and −0 differ
+                return
         self._parts[name] = value
-        if COMPILED and _is_group_like(value, before):  # the same types: only addresses and lengths are new
+        if COMPILED and type(value) in NUMBERS and type(before) is type(value):
+            self._rows[name] = np.array([value], np.float64 if type(value) is float else np.int64)
+            self._addresses[self._names[name]] = address_of(self._rows[name])
+        elif COMPILED and _is_group_like(value, before):  # the same types: only addresses and lengths are new
             self._rows[name] = np.array(_group_words(value), np.int64)
             self._addresses[self._names[name]] = address_of(self._rows[name])
         elif COMPILED and value is not None:
@@ -219,7 +227,7 @@ class Table:
                 key = _number_of(self.place(name))
                 if self._keys.get(name) != key:
                     self._keys[name] = key
-                    self.stages = {}
+                    self.stages, self.calls = {}, {}
             self._addresses[self.index(name)] = address_of(self._rows[name])
 
     def snapshot(self) -> Table:
@@ -230,11 +238,19 @@ class Table:
         other._addresses[:] = self._addresses
         return other
 
-    def follow(self, other: Table) -> None:
-        """Take all parts of another table, whose arrays and addresses of stages are then the same."""
-        self._parts, self._rows = dict(other._parts), dict(other._rows)
+    def follow(self, other: Table, but: Collection[str] = ()) -> None:
+        """Take all parts of another table, whose arrays and addresses of stages are then the same.
+
+        This table keeps its parts with the names `but`, of the same types as those of the other one.
+        """
+        parts = {name: self._parts[name] for name in but}
+        rows = {name: self._rows[name] for name in but if name in self._rows}
+        self._parts, self._rows = other._parts | parts, other._rows | rows
         self._structures, self._keys = dict(other._structures), dict(other._keys)
-        self._addresses[:], self.stages = other._addresses, other.stages
+        own = [self._names[name] for name in but]
+        kept = self._addresses[own]
+        self._addresses[:], self.stages, self.calls = other._addresses, other.stages, other.calls
+        self._addresses[own] = kept
 
     def __getitem__(self, name: str) -> Any:
         return self._parts[name]

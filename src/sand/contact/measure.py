@@ -1,14 +1,16 @@
 """Energies, displacements and loads of contacts, measured between steps for the energy table and for output."""
 
 import functools
+import math
 
 from ..compiler.stage import Stage, stage
-from ..numerics.vec import across, add, dot, norm, scale
+from ..numerics.vec import across, add, cross, dot, load, norm, scale, sub
 from ..state.state import CONTACTS
 from .columns import column_loops
 from .damping import loads_on_grains, measured_load
 from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
+from .settling import list_cluster, rigid_motion
 from .update import pose_at
 from .wall_loops import wall_loops
 
@@ -54,6 +56,43 @@ def wall_energies_stage(law: ContactLaw) -> Stage:
         return 0
 
     return measure_wall_energies
+
+
+BODY_ROWS = 5
+"""Rows of `measure_bodies`: the fields of `analysis.body_motion.BodyMotion`."""
+
+
+@stage("the motion of bodies")
+def measure_bodies(grains, contacts, span, parameters):
+    """Fill the array parameters[0] (BODY_ROWS, N) with the motion of each body, in the order of their lowest grains.
+
+    `analysis.body_motion` has the equations. parameters[1] is memory for one cluster. Returns the number of bodies.
+    """
+    out, clusters = parameters
+    bodies = 0
+    clusters.listed[:] = 0
+    for first in range(grains.mass.size):
+        if clusters.listed[first]:
+            continue
+        size, mass, rotation, internal = 1, grains.mass[first], 0.0, 0.0
+        v, w = load(grains.velocity, first), load(grains.spin, first)
+        if contacts.start[first + 1] > contacts.start[first]:
+            size, mass = list_cluster(grains, contacts, clusters, span, first, math.inf), 0.0
+            v, w = rigid_motion(grains, clusters, size)
+        else:
+            rotation = 0.5 * grains.inertia[first] * dot(w, w)
+        for k in range(size if size > 1 else 0):
+            i = clusters.member[k]
+            mass += grains.mass[i]
+            turning = cross(w, load(clusters.offset, i))
+            rotation += 0.5 * (grains.mass[i] * dot(turning, turning) + grains.inertia[i] * dot(w, w))
+            # velocities relative to the rigid motion, so that no energies of almost equal size are subtracted
+            own_v, own_w = sub(sub(load(grains.velocity, i), v), turning), sub(load(grains.spin, i), w)
+            internal += 0.5 * (grains.mass[i] * dot(own_v, own_v) + grains.inertia[i] * dot(own_w, own_w))
+        out[0, bodies], out[1, bodies], out[2, bodies] = size, mass, 0.5 * mass * dot(v, v)
+        out[3, bodies], out[4, bodies] = rotation, internal
+        bodies += 1
+    return bodies
 
 
 CONTACT_ROWS = (

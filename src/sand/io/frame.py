@@ -37,7 +37,10 @@ import json
 import zlib
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import cache
+from operator import attrgetter
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, overload
 
 import numpy as np
@@ -62,6 +65,8 @@ IN_FULL = ("position", "radius", "velocity", "mass", "charge")
 """Quantities that trajectories have in single precision, and files of bodies also in double precision."""
 SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
 """Logged arrays of grains that not all frames have."""
+ALIKE = ("scale/length", "periodic", "lengths")
+"""Logged arrays that are left out of frames in which they are those of the first one."""
 
 
 def stored_frame(
@@ -76,72 +81,139 @@ def stored_frame(
     scale: float | None = None,
     materials: Sequence[str] = (),
 ) -> Any:
-    """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also `IN_FULL` in float64.
+    """Frame as GSD reads it, of grains and contacts (columns as in `ContactTable`); `exact`: also `IN_FULL` in float64.
 
     `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters. `scale`: reference radius [m], by
     default the mean radius. `materials`: names that come first, also without a grain, and so keep their numbers.
     """
-    import gsd.hoomd
-
-    scale = float(grains.radius.mean()) if scale is None else scale
-    frame = gsd.hoomd.Frame()
-    frame.configuration.step = step
-    cloud = 2.0 * np.abs(grains.position).max(axis=0) + 2.0 * grains.radius.max()
-    lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(box.lengths)]
-    frame.configuration.box = [*(np.array(lengths) / scale), 0.0, 0.0, 0.0]
-    p = frame.particles
-    p.N = len(grains)
-    own = [m.name for m in grains.materials]
+    arrays, own = grains.arrays, [m.name for m in grains.materials]
+    scale = float(arrays.radius.mean()) if scale is None else scale
+    lengths = box.lengths
+    if None in lengths:
+        cloud = 2.0 * np.abs(arrays.position).max(axis=1) + 2.0 * arrays.radius.max()
+        lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(lengths)]
     types = list(dict.fromkeys((*materials, *own)))
-    p.types = [name.encode("unicode_escape").decode() for name in types]
-    p.typeid = np.array([types.index(name) for name in own], np.uint32)[grains.material]
-    p.position = grains.position / scale
-    p.diameter = 2.0 * grains.radius / scale
-    p.velocity, p.mass, p.charge = grains.velocity, grains.mass, grains.charge
-    p.orientation, p.image = np.roll(grains.orientation, 1, axis=1), grains.image
-    frame.bonds.N = len(contacts["pair"])
-    frame.bonds.types = ["contact"]
-    frame.bonds.typeid = np.zeros(frame.bonds.N, dtype=np.uint32)
-    frame.bonds.group = contacts["pair"]
-    frame.log = {
+    particles = SimpleNamespace(
+        N=len(grains),
+        types=[name.encode("unicode_escape").decode() for name in types],
+        typeid=np.array([types.index(name) for name in own], np.uint32)[arrays.material],
+        position=_single(arrays.position / scale),
+        diameter=_single(2.0 * arrays.radius / scale),
+        velocity=_single(arrays.velocity),
+        mass=_single(arrays.mass),
+        charge=_single(arrays.charge),
+        orientation=_single(arrays.orientation[[3, 0, 1, 2]]),
+        image=np.ascontiguousarray(arrays.image.T, np.int32),
+    )
+    pair = np.ascontiguousarray(contacts["pair"], np.uint32)
+    log = {
         "time": np.array([time]),
         "scale/length": np.array([scale]),
         "periodic": np.array([v is not None for v in box.lengths], dtype=np.uint8),
-        "particles/moment": np.ascontiguousarray(grains.moment),
-        "particles/spin": np.ascontiguousarray(grains.spin),
+        "particles/moment": arrays.moment.T.copy(),
+        "particles/spin": arrays.spin.T.copy(),
         "bonds/overlap": contacts["overlap"],
         "bonds/formed": contacts["formed"],
-        "bonds/force": contacts["force"].astype(np.float32),
+        "bonds/force": np.ascontiguousarray(contacts["force"], np.float32),
         "lengths": np.array(lengths, dtype=np.float64),
-        "bonds/slide": contacts["slide_vector"].astype(np.float32),
-        "bonds/roll": contacts["roll_vector"].astype(np.float32),
+        "bonds/slide": np.ascontiguousarray(contacts["slide_vector"], np.float32),
+        "bonds/roll": np.ascontiguousarray(contacts["roll_vector"], np.float32),
         "bonds/twist": contacts["twist"].astype(np.float32),
-        "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
+        "bonds/share": np.array([contacts[f"{mode}_share"] for mode in MODES], np.float32).T.copy(),
     }
     if grains.own_units:
-        frame.log[OWN] = np.frombuffer(json.dumps(grains.own_units).encode(), np.uint8)
-        frame.log |= {f"particles/{name}": values.copy() for name, values in grains.own.items()}
-    if not np.array_equal(grains.id, np.arange(len(grains))):
-        frame.log[f"particles/{IDENTITY}"] = np.array(grains.id)
+        log[OWN] = np.frombuffer(json.dumps(grains.own_units).encode(), np.uint8)
+        log |= {f"particles/{name}": values.copy() for name, values in grains.own.items()}
+    if arrays.id[-1] != len(grains) - 1:  # they ascend
+        log[f"particles/{IDENTITY}"] = np.array(arrays.id)
     if at_rest is not None:
-        frame.log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
+        log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
     if exact:
-        frame.log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
-    frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
+        log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
+    frame = SimpleNamespace(
+        configuration=SimpleNamespace(
+            step=step, box=np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)
+        ),
+        particles=particles,
+        bonds=SimpleNamespace(N=len(pair), types=["contact"], typeid=np.zeros(len(pair), np.uint32), group=pair),
+        log=log,
+    )
+    log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
     return frame
 
 
-def append_frame(file: Any, frame: Any) -> None:
-    """Append a frame to an open GSD file.
+def _single(values: np.ndarray) -> np.ndarray:
+    """Numbers (N,) or vectors (width, N) as a frame has them: (N,) or (N, width), in single precision."""
+    return np.ascontiguousarray(values.T, np.float32)
 
-    GSD reads no logged array that the first frame lacks: identities and what is at rest that appear later are chunks of
-    names that begin with `LATE`.
+
+@cache
+def _letters(names: tuple[str, ...]) -> np.ndarray:
+    """Names as GSD stores them: rows of characters, filled up with zeros."""
+    width = max(map(len, names)) + 1
+    return np.array(names, (bytes, width)).view(np.int8).reshape(len(names), width)
+
+
+DEFAULTS = {
+    "configuration/step": np.array([0], np.uint64),
+    "configuration/box": np.array([1, 1, 1, 0, 0, 0], np.float32),
+    "particles/N": np.array([0], np.uint32),
+    "particles/types": np.zeros(0, np.int8),
+    "particles/typeid": np.array([0], np.uint32),
+    "particles/mass": np.array([1], np.float32),
+    "particles/charge": np.array([0], np.float32),
+    "particles/diameter": np.array([1], np.float32),
+    "particles/position": np.array([0, 0, 0], np.float32),
+    "particles/orientation": np.array([1, 0, 0, 0], np.float32),
+    "particles/velocity": np.array([0, 0, 0], np.float32),
+    "particles/image": np.array([0, 0, 0], np.int32),
+    "bonds/N": np.array([0], np.uint32),
+    "bonds/types": np.zeros(0, np.int8),
+    "bonds/typeid": np.array([0], np.uint32),
+    "bonds/group": np.array([0, 0], np.uint32),
+}
+"""Chunks of GSD's schema that frames have, with the values of one grain or contact that readers assume without them.
+
+Names of types have a default, too, but a first frame has them all the same, see `read_materials`.
+"""
+_DEFAULTS = {
+    name: (attrgetter(name.replace("/", ".")), value.dtype, value.tobytes()) for name, value in DEFAULTS.items()
+}
+
+
+def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
+    """Append a frame to an open GSD file; `first`: of `first_chunks`, filled in when this is the first frame.
+
+    A chunk is left out, as by gsd.hoomd, where readers find the same bytes without it: those of the first frame or, if
+    that has no such chunk, the default; of logged arrays only `ALIKE`. GSD reads no logged array that the first frame
+    lacks: identities and what is at rest that appear later are chunks of names that begin with `LATE`.
     """
-    if len(file):
-        for name in SOMETIMES:
-            if name in frame.log and not file.file.chunk_exists(0, f"log/{name}"):
-                file.file.write_chunk(LATE + name, frame.log.pop(name))
-    file.append(frame)
+    is_first, write = not first, file.file.write_chunk
+    for name, (value_in, dtype, default) in _DEFAULTS.items():
+        value = value_in(frame)
+        chunk = _letters(tuple(value)) if name.endswith("/types") else np.array(value, dtype, copy=None, ndmin=1)
+        content = chunk.tobytes()
+        if content == (default * (len(content) // len(default)) if default and name not in first else first.get(name)):
+            continue
+        write(name, chunk)
+        if is_first:
+            first[name] = content
+    for name, values in frame.log.items():
+        known = first.get(f"log/{name}")
+        if name in ALIKE and known == values.tobytes():
+            continue
+        write(f"{LATE if name in SOMETIMES and known is None and not is_first else 'log/'}{name}", values)
+        if is_first and name in (*ALIKE, *SOMETIMES):
+            first[f"log/{name}"] = values.tobytes()
+    file.file.end_frame()
+    if is_first:
+        file.flush()
+
+
+def first_chunks(file: Any) -> dict[str, bytes]:
+    """Bytes of the chunks of the first frame that `append_frame` compares with; empty if there is no frame."""
+    names = [*_DEFAULTS, *(f"log/{name}" for name in (*ALIKE, *SOMETIMES))]
+    return {name: file.file.read_chunk(0, name).tobytes() for name in names if file.file.chunk_exists(0, name)}
 
 
 def read_stored(file: Any, number: int) -> Any:
@@ -198,10 +270,10 @@ def _crc32(stored: Any) -> int:
     parts += [stored.log[name] for name in sorted(stored.log) if name != "crc32"]
     if np.any(p.image):  # earlier versions did not count crossings
         parts.append(np.asarray(p.image, np.int32))
-    for part in parts:
-        # + 0 makes −0 and 0 equal, which GSD does not distinguish
-        with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
-            code = zlib.crc32((np.ascontiguousarray(part) + np.zeros(1, part.dtype)).tobytes(), code)
+    with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
+        for part in parts:
+            # + 0 makes −0 and 0 equal, which GSD does not distinguish
+            code = zlib.crc32(np.ascontiguousarray(part + 0.0 if part.dtype.kind == "f" else part), code)
     return code
 
 

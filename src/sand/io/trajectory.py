@@ -26,6 +26,7 @@ from .frame import (
     FrameSequence,
     append_frame,
     code_of,
+    first_chunks,
     read_identities,
     read_materials,
     read_stored,
@@ -74,6 +75,7 @@ class TrajectoryWriter:
     ):
         self.path = path
         self._file: Any = None  # closed between runs
+        self._first: dict[str, bytes] = {}  # chunks of the first frame
         self._later: dict[float, tuple[int, int]] = {}  # frames after resume_at: index and checksum by time
         # times of the last frame, and of the last one that was flushed
         self._last = self._whole_until = -math.inf if resume_at is None else resume_at
@@ -93,7 +95,7 @@ class TrajectoryWriter:
                     lost = f"{path} cannot be repaired; it is now {set_aside(path).name}, and a new one begins"
                 if lost:
                     report(lost)
-            self._file = _open_file(path, resume_at is not None and path.exists())
+            self._open(resume_at is not None and path.exists())
             self._entries = len(gsd_index.read_index(path)[1])
             if kept := len(self._file) - len(self._later):
                 self._scale = float(self._file.file.read_chunk(0, "log/scale/length")[0])
@@ -131,13 +133,20 @@ class TrajectoryWriter:
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
             if self._file is None:
-                self._file = _open_file(self.path, True)
-            append_frame(self._file, frame)
+                self._open(True)
+            append_frame(self._file, frame, self._first)
         except OSError as error:
             raise self._abandon(error) from error
         self._last = time
         if wall.monotonic() - self._flushed > FLUSH_EVERY or self._waiting >= MOST_WAITING:
             self.flush()
+
+    def _open(self, append: bool) -> None:
+        """Open the file for appending, or create it."""
+        if not append:
+            self.path.touch()  # GSD creates files that other users cannot read, but keeps the mode of an existing one
+        self._file = _open_gsd(self.path, "r+" if append else "w")
+        self._first = first_chunks(self._file)
 
     def _is_stored(self, time: float, code: int) -> bool:
         """Whether the file has this frame already; a different frame of this time and all later ones are deleted."""
@@ -193,13 +202,6 @@ class TrajectoryWriter:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-
-def _open_file(path: Path, append: bool) -> Any:
-    """Open a GSD file for appending, or create it."""
-    if not append:
-        path.touch()  # GSD creates files that other users cannot read, but keeps the mode of an existing one
-    return _open_gsd(path, "r+" if append else "w")
 
 
 def _open_gsd(path: Path, mode: str) -> Any:

@@ -52,6 +52,17 @@ class Columns(dict[str, np.ndarray]):
         return import_optional("pandas", "to_pandas").DataFrame(self._flat())
 
 
+def measured_columns(state: State, law: ContactLaw, table: Any) -> dict[str, np.ndarray]:
+    """Columns of a `ContactTable`, without those of losses; vectors are not contiguous."""
+    used = int(state.count[CONTACTS])
+    scalars, names = len(CONTACT_ROWS), [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
+    rows = np.zeros((scalars + 3 * len(names), used))
+    contacts_stage(law).run(table, (rows,))
+    found = {"pair": state.contacts.pair[:, :used].T, "formed": state.contacts.formed[:used].copy()}
+    found |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
+    return found | {name: rows[scalars + 3 * k : scalars + 3 * k + 3].T for k, name in enumerate(names)}
+
+
 class ContactTable(Columns):
     """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
 
@@ -60,16 +71,8 @@ class ContactTable(Columns):
     """
 
     def __init__(self, state: State, law: ContactLaw, table: Any):
-        used = int(state.count[CONTACTS])
-        contacts = state.contacts
-        scalars = len(CONTACT_ROWS)
-        names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
-        rows = np.zeros((scalars + 3 * len(names), used))
-        contacts_stage(law).run(table, (rows,))
-        self["pair"], self["formed"] = contacts.pair[:, :used].T.copy(), contacts.formed[:used].copy()
-        self.update({name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)})
-        vectors = rows[scalars:].reshape(len(names), 3, used)
-        self.update({name: vectors[k].T.copy() for k, name in enumerate(names)})
+        found, contacts, used = measured_columns(state, law, table), state.contacts, int(state.count[CONTACTS])
+        self.update({name: column.copy() if column.ndim == 2 else column for name, column in found.items()})
         for k, name in enumerate(RECORDED):
             is_recorded = k < len(contacts.lost)
             self[f"lost_{name}"] = contacts.lost[k, :used].copy() if is_recorded else np.zeros(used)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from operator import add, sub
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -192,7 +193,7 @@ class StepTimer:
         self._rigid = isinstance(simulation.stepping, RigidClusters)
         self._long_range = long_range_seconds(simulation)
         # of each kind: number of steps, their wall time [s], and the rough estimate of that [s]
-        self._sums = {mode: np.zeros(3) for mode in MODES}
+        self._sums = {mode: [0.0, 0.0, 0.0] for mode in MODES}
 
     @contextmanager
     def steps(self) -> Iterator[None]:
@@ -204,14 +205,14 @@ class StepTimer:
             self._add(*before, *self._now())
         self._calls += 1
 
-    def _now(self) -> tuple[Any, int]:
+    def _now(self) -> tuple[tuple[float, ...], int]:
         """Steps, wall time [s], contact steps of awake clusters and their wall time [s]; number of contacts."""
         engine = self._simulation._engine
         counted = (engine.steps, self._simulation._clock.stepping, *engine.awake_work)
-        return np.array(counted), int(engine._state.count[CONTACTS])
+        return counted, int(engine._state.count[CONTACTS])
 
-    def _add(self, before: Any, contacts: int, after: Any, contacts_after: int) -> None:
-        steps, seconds, awake_steps, awake = after - before
+    def _add(self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int) -> None:
+        steps, seconds, awake_steps, awake = map(sub, after, before)
         if self._rigid:
             found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
         elif (contacts > 0) != (contacts_after > 0):
@@ -220,13 +221,13 @@ class StepTimer:
             found = {"contact" if contacts else "free": (steps, seconds)}
         for mode, (number, spent) in found.items():
             rough = step_seconds(self._simulation, mode, contacts, self._long_range)
-            self._sums[mode] += number, spent, number * rough
+            self._sums[mode] = [*map(add, self._sums[mode], (number, spent, number * rough))]
 
     def record(self) -> None:
         """Add the measured speeds to the table, if there were enough steps and the table can be written."""
         found = {
             mode: {"ratio": spent / rough, "seconds": spent}
-            for mode, (number, spent, rough) in ((mode, sums.tolist()) for mode, sums in self._sums.items())
+            for mode, (number, spent, rough) in self._sums.items()
             if number >= LEAST_STEPS and spent >= LEAST_SECONDS
         }
         if not found:

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..analysis.body_motion import BodyMotion
 from ..compiler.program import Program
 from ..compiler.stage import Stage
 from ..compiler.table import Table
@@ -19,7 +20,7 @@ from ..contact.damping import THERMAL
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
-from ..contact.measure import ENERGIES, energies_stage, wall_energies_stage
+from ..contact.measure import BODY_ROWS, ENERGIES, energies_stage, measure_bodies, wall_energies_stage
 from ..contact.model import Contact
 from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
@@ -47,7 +48,8 @@ from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
 from ..neighbours.spatial_sort import SORT_INTERVAL, inverse, reorder_grains, sort_contacts_and_pairs, spatial_order
-from ..state.arrays import OVER_ALLOCATION
+from ..state.arrays import OVER_ALLOCATION, cluster_arrays
+from ..state.spare_copy import SpareCopy
 from ..state.state import (
     BROKEN,
     CHECKED,
@@ -85,11 +87,15 @@ CONTACT = Contact.name
 """Name of the contact model among the forces."""
 ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
 """The arrays of a state that stages take, besides those of the grains."""
+ALONE = 2000
+"""Grains from which on several threads take the shorter step to a time of output."""
+OF_STATE = ("grains", *GROUPS, "clock", "count", "lost")
+"""The parts of a table that these are."""
 
 
 def _set_arrays(table: Table, present: tuple) -> None:
     """Give a table the arrays of a state."""
-    for name, value in zip(("grains", *GROUPS, "clock", "count", "lost"), present, strict=True):
+    for name, value in zip(OF_STATE, present, strict=True):
         table.set(name, value)
 
 
@@ -140,6 +146,10 @@ class Engine:
     _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
     _copy_table: Table = field(init=False)  # the table of the copy that is stepped to times of output
     _copy_present: tuple = field(init=False, default=(None,))  # arrays of the state that it has
+    _of_contacts: tuple = field(init=False, default_factory=lambda: (np.zeros(len(ENERGIES)),))  # results of a stage
+    _shares: dict[str, np.ndarray] = field(init=False, default_factory=dict)  # results of stages: energies of grains
+    _of_bodies: tuple | None = field(init=False, default=None)  # results and memory of a stage
+    _spare: SpareCopy = field(init=False, default_factory=SpareCopy)  # memory of the copy
     _queue: TaskQueue | None = field(init=False, default=None)  # of the last call of the driver
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
@@ -224,9 +234,8 @@ class Engine:
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
-        self._copy_present = (None,)  # frees the arrays of the copy before
-        self._copy_table.follow(self._current_table(regular))
-        self._state = regular.copy()
+        table, (self._state, is_same) = self._current_table(regular), self._spare.of(regular)
+        self._copy_table.follow(table, OF_STATE if is_same else ())
         self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
         _set_arrays(self._copy_table, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
@@ -240,6 +249,7 @@ class Engine:
             for index in (STEPS, LONG_RANGE_SUMS, REBUILT, LISTED, REJECTED):
                 reached.count[index] = regular.count[index]
             self._output_state, self._output_time = reached, time
+        self._spare.keep(reached)
         return stop
 
     @property
@@ -418,7 +428,7 @@ class Engine:
     def _ramped_energy(self) -> float:
         """Energy [J] of the forces with ramps."""
         assert self.ramped is not None
-        energies = [share.sum() for share in self.energies_at_grains(self.ramped.names).values()]
+        energies = [share.sum() for share in self._energies_at_grains(self.ramped.names).values()]
         return math.fsum([*energies, *(self.contact_energies() if CONTACT in self.ramped.names else ())])
 
     def _pair_loads(self, k: int) -> np.ndarray:
@@ -483,6 +493,7 @@ class Engine:
         table.set("program", program)
         stages: list[tuple[Any, Any]] = [*self._drivers(), *program.stages.values()]
         stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+        stages.append((measure_bodies, (np.zeros((BODY_ROWS, 1)), cluster_arrays(1))))
         stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in self.long_range]
         stages += [
             (external_energies_for(outer.formula), (outer.numbers(), self.time, shares)) for outer in self.external
@@ -507,8 +518,11 @@ class Engine:
                 self._program = build_program(self._components, self.parameters, table)
                 for each in (self._table, table):
                     each.set("program", self._program)
-            if self._workers is not None and benefits_from_workers(
-                len(self._components.pair_forces), int(state.count[CONTACTS])
+            alone = shorten and len(state.grains) < ALONE  # threads start later than one step ends
+            if (
+                not alone
+                and self._workers is not None
+                and benefits_from_workers(len(self._components.pair_forces), int(state.count[CONTACTS]))
             ):
                 self._workers.start(table)
             return Stop(self._program.run(driver, table))
@@ -635,8 +649,18 @@ class Engine:
 
         Of all forces, or of those with these names.
         """
-        table, state = self._current_table(self.state), self.state
-        shares = {name: np.zeros(len(state.grains)) for name in self.columns()}
+        return {name: share.copy() for name, share in self._energies_at_grains(names).items()}
+
+    def _energies_at_grains(self, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
+        """As `energies_at_grains`, in arrays that the next call uses again."""
+        table, state, columns = self._current_table(self.state), self.state, self.columns()
+        if self._shares.keys() != set(columns) or any(
+            len(share) != len(state.grains) for share in self._shares.values()
+        ):
+            self._shares = {name: np.zeros(len(state.grains)) for name in columns}
+        shares = self._shares
+        for share in shares.values():
+            share[:] = 0.0
         for force, sums, numbers in self.long_range:
             if names is None or force.name in names:
                 self._add_energies(table, sums, numbers, shares[force.column])
@@ -652,16 +676,26 @@ class Engine:
 
     def contact_energies(self) -> list[float]:
         """Energies [J] stored by the contacts, see `contact.measure.ENERGIES`."""
-        found, state = np.zeros(len(ENERGIES)), self.state
+        found, state = self._of_contacts[0], self.state
+        found[:] = 0.0
         if state.count[CONTACTS]:
-            energies_stage(self.law).run(self._current_table(state), (found,))
+            energies_stage(self.law).run(self._current_table(state), self._of_contacts)
         if state.count[WALL_CONTACTS]:
-            wall_energies_stage(self.law).run(self._current_table(state), (found,))
+            wall_energies_stage(self.law).run(self._current_table(state), self._of_contacts)
         return found.tolist()
+
+    def body_motion(self) -> BodyMotion:
+        """Motion of each body, as `analysis.body_motion` has it."""
+        state, count = self.state, len(self._state.grains)
+        if self._of_bodies is None or self._of_bodies[0].shape[1] != count:
+            self._of_bodies = np.zeros((BODY_ROWS, count)), cluster_arrays(count)
+        bodies = measure_bodies.run(self._current_table(state), self._of_bodies)
+        found = self._of_bodies[0][:, :bodies].copy()
+        return BodyMotion(found[0].astype(np.int64), *found[1:])
 
     def force_energies(self) -> dict[str, float]:
         """Total energy [J] of each long-range and per-grain force, by ledger column."""
-        return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
+        return {name: math.fsum(share.tolist()) for name, share in self._energies_at_grains().items()}
 
     def limiting_grains(self) -> tuple[int, ...]:
         """Indices of the grains that caused the last stop."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..analysis.body_motion import body_temperatures, motion_of
+from ..analysis.body_motion import BodyMotion, temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
@@ -45,6 +45,7 @@ def log_row(
     state: State,
     lost: Sequence[float],
     labels: np.ndarray,
+    bodies: BodyMotion,
     of_contacts: Sequence[float],
     forces: dict[str, float],
     walls: Sequence[str] = (),
@@ -57,6 +58,8 @@ def log_row(
         Losses [J] up to this time, see `Engine.losses`.
     labels : ndarray
         Cluster of each grain (N,).
+    bodies : BodyMotion
+        Motion of the bodies.
     of_contacts : Sequence[float]
         Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
     forces : dict[str, float]
@@ -64,9 +67,7 @@ def log_row(
     walls : Sequence[str], optional
         Columns of the walls, see `walls.wall_columns`.
     """
-    contacts = int(state.count[CONTACTS])
-    pairs = state.contacts.pair[:, :contacts].T
-    energies = [*map(math.fsum, kinetic_energies(state.grains)), *of_contacts]
+    energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *of_contacts]
     counts = count_row(state, labels)
     row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
@@ -75,9 +76,8 @@ def log_row(
     row |= moved
     row["total"] = math.fsum([*energies, *forces.values(), *lost, *moved.values()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
-    bodies = motion_of(state.grains, pairs, state.box, labels)
-    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal)}
-    row |= dict(zip(TEMPERATURES, body_temperatures(bodies), strict=True))
+    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
+    row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
     return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 

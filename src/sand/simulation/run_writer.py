@@ -42,6 +42,7 @@ from ..state.state import (
 )
 from ..version import __version__
 from .cadence import read_cadence
+from .contact_table import measured_columns
 from .displays import DISPLAYS
 from .ledger import Ledger
 from .outcome import UNFINISHED, Result
@@ -198,8 +199,9 @@ class RunWriter:
 
     def _frame(self, simulation: Simulation) -> None:
         assert self._trajectory is not None
-        w = simulation.state
-        self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts, at_rest=w.at_rest)
+        w, engine = simulation.state, simulation._engine
+        contacts = measured_columns(w, engine.law, engine._current_table(w))
+        self._trajectory.write(w.steps, w.time, w.grains, w.box, contacts, at_rest=w.at_rest)
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
         """Write a checkpoint if it is due by the cadence of the simulation, or if the last one is old enough."""

@@ -565,8 +565,9 @@ class Simulation(ReadOnlySettings):
 
     def _log_row(self) -> dict[str, float]:
         engine = self._engine
-        energies = engine.losses().tolist(), self._labels(), engine.contact_energies(), engine.force_energies()
-        row = log_row(self.state, *energies, wall_columns(self._walls))
+        found = engine.losses().tolist(), self._labels(), engine.body_motion()
+        energies = engine.contact_energies(), engine.force_energies()
+        row = log_row(self.state, *found, *energies, wall_columns(self._walls))
         return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
 
     def _labels(self) -> np.ndarray:

@@ -82,12 +82,13 @@ def spin_stress(density: np.ndarray, radius: np.ndarray, spin: np.ndarray) -> np
 
 
 def _spins(grains: Grains) -> str:
-    spin = np.linalg.norm(grains.spin, axis=1)
-    if not spin.any():
+    arrays, moduli = grains.arrays, [material.young_modulus for material in grains.materials]
+    spin = np.sqrt((arrays.spin**2).sum(axis=0))
+    density = arrays.mass / (4.0 / 3.0 * np.pi * arrays.radius**3)
+    stress = spin_stress(density, arrays.radius, spin)
+    if not stress.max() > IDEAL_STRENGTH * min(moduli):
         return ""
-    density = grains.mass / (4.0 / 3.0 * np.pi * grains.radius**3)
-    modulus = np.array([material.young_modulus for material in grains.materials])[grains.material]
-    stress = spin_stress(density, grains.radius, spin)
+    modulus = np.array(moduli)[arrays.material]
     worst = int(np.argmax(stress / modulus))
     strength = IDEAL_STRENGTH * float(modulus[worst])
     if not stress[worst] > strength:
@@ -113,6 +114,8 @@ def _fields(grains: Grains, forces: Sequence[Force]) -> str:
         ),
         default=0.0,
     )
+    if not outer and not grains.arrays.charge.any():
+        return ""
     own = COULOMB * grains.charge / grains.radius**2
     for field, limit, emitted in ((outer - own, ELECTRON_EMISSION, "electrons"), (outer + own, ION_EMISSION, "ions")):
         worst = int(np.argmax(field))

@@ -276,7 +276,9 @@ def wall_columns(walls: Sequence[Wall]) -> list[str]:
 
 def wall_row(state: State, columns: Sequence[str]) -> dict[str, float]:
     """Values of `columns`, those of `wall_columns`, in a state; empty without walls."""
+    if not columns:
+        return {}
     arrays = state.walls
     along = (arrays.position * arrays.normal).sum(axis=0)
     values = [float(v) for v in np.vstack([arrays.force, along]).T.ravel()]
-    return dict(zip(columns, [*values, int(state.count[WALL_CONTACTS])], strict=True)) if columns else {}
+    return dict(zip(columns, [*values, int(state.count[WALL_CONTACTS])], strict=True))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
@@ -125,6 +127,9 @@ contact does not exist."""
 
 GROUPS = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts", "bodies")
 """Groups of arrays of a state, besides its grains."""
+SINGLE = ("clock", "count", "lost", "cutoff", "order")
+"""Its other arrays."""
+IN_GROUPS, OTHERS, SHAPE = attrgetter(*GROUPS), attrgetter(*SINGLE), attrgetter("shape")
 WALL_CONTACT_ARRAYS = (
     *("pair", "pointer1", "pointer2", "twist", "formed", "constants", "lost", "damping", "force", "torque1", "flag"),
 )
@@ -182,19 +187,39 @@ class State:
             own[LARGEST_IMPACT], own[IMPACT_SPEED] = other[LARGEST_IMPACT], other[IMPACT_SPEED]
 
     def copy(self) -> State:
-        """Independent copy (snapshot)."""
-        groups = {name: getattr(self, name) for name in GROUPS}
-        single = ("clock", "count", "lost", "cutoff", "order")
-        arrays = [*self.grains.arrays, *(array for group in groups.values() for array in group)]
-        copies = iter(aligned_copies([*arrays, *(getattr(self, name) for name in single)]))
+        """Independent copy (snapshot); empty arrays, which nothing changes, are the same."""
+        copies = iter(aligned_copies([array for array in self.arrays() if array.size]))
         other = object.__new__(type(self))  # `replace` would look at the alignment of each array again
         vars(other).update(vars(self))
-        other.grains = self.grains.with_arrays(type(self.grains.arrays)(*islice(copies, len(self.grains.arrays))))
-        for name, group in groups.items():
-            setattr(other, name, type(group)(*islice(copies, len(group))))
-        for name in single:
-            setattr(other, name, next(copies))
+
+        def copied(group: Any) -> Any:
+            if not any(array.size for array in group):
+                return group
+            return type(group)(*(next(copies) if array.size else array for array in group))
+
+        other.grains = self.grains.with_arrays(copied(self.grains.arrays))
+        for name in GROUPS:
+            setattr(other, name, copied(getattr(self, name)))
+        for name in SINGLE:
+            array = getattr(self, name)
+            setattr(other, name, next(copies) if array.size else array)
         return other
+
+    def copy_to(self, other: State) -> bool:
+        """Make an earlier copy, whose arrays stay, equal to this state; False if the shapes of arrays differ."""
+        own, its = self.arrays(), other.arrays()
+        if list(map(SHAPE, own)) != list(map(SHAPE, its)):
+            return False
+        for array, copy in zip(own, its, strict=True):
+            if copy is not array:
+                copy[...] = array
+        other.box, other.uniform_contacts = self.box, self.uniform_contacts
+        vars(other.grains).update(vars(self.grains) | {"arrays": other.grains.arrays})
+        return True
+
+    def arrays(self) -> list[np.ndarray]:
+        """All arrays of the state."""
+        return [*self.grains.arrays, *chain.from_iterable(IN_GROUPS(self)), *OTHERS(self)]
 
     def _uniform_arrays(self) -> tuple[str, ...]:
         """Names of arrays with identical columns."""
