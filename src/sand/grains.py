@@ -377,7 +377,7 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
     """
     if isinstance(moment, str) and moment == "material":
         return specific * mass
-    size = None
+    size: Any = None
     for unit, factor in (("A m^2", 1.0), ("A m^2/kg", mass)):
         found = in_unit(moment, unit) if size is None else None
         if found is not None:

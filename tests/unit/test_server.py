@@ -240,7 +240,7 @@ def wait_until(holds):
 
 @pytest.mark.parametrize("text", [b"", b"GET /", b"GET / HTTP/1.1\r\nHost: a\r\n"])
 def test_slow_clients_give_way(small, text):
-    """With all connections in use by clients that do not finish a request, the one that is awaited longest is closed."""
+    """With all connections in use by clients that finish no request, the one that is awaited longest is closed."""
     slow = []
     for _ in range(2):
         slow.append(socket.create_connection(("127.0.0.1", small.port), timeout=10))
