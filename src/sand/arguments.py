@@ -33,6 +33,9 @@ MOST_SEED = 2**63 - 1
 MOST_PROCESSES = 1024
 """Largest number of processes or threads."""
 
+MOST_WHOLE = 10**300
+"""Largest whole number, which a floating-point number can hold."""
+
 T = TypeVar("T")
 _LISTS = (collections.abc.Sequence, collections.abc.Iterable, list)
 _WORDS = {2: "two", 3: "three"}
@@ -124,7 +127,9 @@ def _readers(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[
         if plain and annotation is not parameter.empty:
             allowed, numeric = _allowed_types(annotation), _is_numeric(annotation)
             if allowed or numeric:
-                readers[name] = functools.partial(_read, allowed, units.get(name, "1") if numeric else None)
+                unit = units.get(name, "1") if numeric else None
+                none_allowed = type(None) in _parts(annotation) or parameter.default is None
+                readers[name] = functools.partial(_read, allowed, unit, none_allowed, _is_one_number(annotation))
     return signature, readers
 
 
@@ -147,6 +152,12 @@ def _is_numeric(annotation: Any) -> bool:
     """Whether an argument may be a float, an array or a list of floats, but not text."""
     parts = _parts(annotation)
     return str not in parts and any(part is float or _is_array(part) or _is_list_of_floats(part) for part in parts)
+
+
+def _is_one_number(annotation: Any) -> bool:
+    """Whether an argument may be a float, but no array or list."""
+    parts = _parts(annotation)
+    return float in parts and not any(_is_array(part) or typing.get_origin(part) is not None for part in parts)
 
 
 def _is_list_of_floats(part: Any) -> bool:
@@ -233,18 +244,25 @@ def _public_name(cls: type) -> str:
     return f"sand.setup.{cls.__name__}" if package[:2] == ["sand", "setup"] else shown(cls)
 
 
-def _read(allowed: list[_TypeCheck], unit: str | None, value: Any, name: str) -> Any:
+def _read(
+    allowed: list[_TypeCheck], unit: str | None, none_allowed: bool, one_number: bool, value: Any, name: str
+) -> Any:
     """The value, converted to an array if only an array is allowed. Raises BadInput if it has none of the types.
 
-    Quantities are converted to the SI unit `unit`; None leaves them to the function.
+    Quantities are converted to the SI unit `unit`; None leaves them to the function. `none_allowed`: None is a value
+    of the argument, `one_number`: arrays are not.
     """
-    if unit is not None and not isinstance(value, float) and value is not None:
+    if isinstance(value, int) and abs(value) > MOST_WHOLE:
+        raise BadInput(f"{name} = {shown(value)} is a whole number beyond the range of the computation")
+    if unit is not None and not isinstance(value, float) and not (value is None and none_allowed):
         from .units import has_unit_within, in_unit, not_a_quantity  # imports numpy
 
         if not allowed or (has_unit_within(value) and not isinstance(value, str)):
             converted = in_unit(value, unit)
             if converted is None:
                 raise not_a_quantity(value, unit, name)
+            if one_number and not isinstance(converted, float):
+                raise BadInput(f"{name} = {shown(value)} must be one number")
             value = tuple(converted) if isinstance(value, tuple) else converted
     if any(check.words == "a path" for check in allowed) and isinstance(value, (str, Path)):
         value = type(value)(checked_name(str(value), name))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -11,6 +12,8 @@ from typing import Any
 
 LONGEST = 80
 """Characters of a value that a message shows."""
+LONGEST_WORD, LONGEST_LINE = 300, 1500
+"""Characters of a word, which may be the path of a file, and of a line of a message; the middle of longer ones is cut."""
 
 
 class SandError(Exception):
@@ -29,7 +32,7 @@ class BadInput(SandError, ValueError):
     def __init__(self, problems: str | Iterable[str]):
         given = [problems] if isinstance(problems, str) else list(problems)
         # line breaks in the user's values are shown escaped, so that each error stays on one line
-        self.problems: list[str] = ["\\n".join(problem.splitlines()) for problem in given]
+        self.problems: list[str] = [_shortened("\\n".join(problem.splitlines())) for problem in given]
         super().__init__("\n".join(self.problems))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -39,6 +42,18 @@ class BadInput(SandError, ValueError):
     def at(self, where: str) -> BadInput:
         """The same errors, each with a location in front, for example `iron-gas.toml: grains.radius`."""
         return BadInput(f"{where}: {problem}" for problem in self.problems)
+
+
+def _shortened(line: str) -> str:
+    """The line without the middle of very long words, such as a name of thousands of characters, and of itself."""
+    if len(line) <= LONGEST_WORD:
+        return line
+    words = re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda found: _without_middle(found[0], LONGEST_WORD), line)
+    return _without_middle(words, LONGEST_LINE)
+
+
+def _without_middle(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most // 2]}…{text[-most // 2 + 1 :]}"
 
 
 class NoSuchKey(BadInput, KeyError):
@@ -109,8 +124,9 @@ def first_problems(problems: Sequence[str], total: int, kind: str) -> list[str]:
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
     """Advice for a misspelt word: the nearest allowed one, or the list of all."""
-    near = difflib.get_close_matches(word, allowed, n=1)
-    return f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(allowed)}"
+    names = [str(name) for name in allowed]  # keys of the user's dictionary may be anything
+    near = difflib.get_close_matches(word[:LONGEST], names, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(names)}"
 
 
 def shown(value: Any) -> str:
@@ -128,10 +144,10 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
-def refuse_other(frame: Any, *names: str) -> None:
-    """Raise BadInput if `frame` lacks one of these attributes."""
-    if not all(hasattr(frame, name) for name in names):
-        raise BadInput(f"frame = {shown(frame)}; give a frame, such as sand.open(DIR).frames[-1]")
+def refuse_other(frame: Any, *names: str, called: str = "frame") -> None:
+    """Raise BadInput if `frame`, the argument of this name, lacks one of these attributes."""
+    if isinstance(frame, type) or not all(hasattr(frame, name) for name in names):
+        raise BadInput(f"{called} = {shown(frame)}; give a frame, such as sand.open(DIR).frames[-1]")
 
 
 def import_optional(package: str, purpose: str) -> Any:

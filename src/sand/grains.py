@@ -373,16 +373,17 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
     Raises
     ------
     BadInput
-        If the unit or the number of values is wrong, or a value is negative or not finite.
+        If the unit or the number of values is wrong, or a value is negative, not finite, or nonsense (`LARGEST`).
     """
     if isinstance(moment, str) and moment == "material":
         return specific * mass
-    size = in_unit(moment, "A m^2")
-    if size is None:
-        per_mass = in_unit(moment, "A m^2/kg")
-        if per_mass is not None and (reason := too_large(float(np.max(per_mass)), "A m^2/kg")):
-            raise BadInput(f"moment = {shown(moment)} is {reason}")
-        size = None if per_mass is None else per_mass * mass
+    size: Any = None
+    for unit, factor in (("A m^2", 1.0), ("A m^2/kg", mass)):
+        found = in_unit(moment, unit) if size is None else None
+        if found is not None:
+            if np.size(found) and (reason := too_large(float(np.max(found)), unit)):
+                raise BadInput(f"moment = {shown(moment)} is {reason}")
+            size = found * factor
     fits = size is not None and np.shape(size) in ((), mass.shape)
     if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
         raise BadInput(

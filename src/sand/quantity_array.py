@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 
 from .errors import BadInput
-from .units import si_array
+from .units import has_unit_within, si_array
+
+
+WRITERS = {
+    np.copyto: (1, "src"),
+    np.put: (2, "v"),
+    np.place: (2, "vals"),
+    np.putmask: (2, "values"),
+    np.fill_diagonal: (1, "val"),
+}
+"""Functions of NumPy that write into their first argument: position and name of the argument that they write."""
 
 
 class QuantityArray(np.ndarray):
@@ -46,12 +56,40 @@ class QuantityArray(np.ndarray):
 
     def __setitem__(self, index: Any, value: Any) -> None:
         """Assign values in SI, text or quantities.  Raises BadInput."""
-        if self.unit_of_entries is not None:
-            value = si_array(value, self.unit_of_entries, self.name)
+        numbers = self._in_si(value)
         try:
-            super().__setitem__(index, value)
+            super().__setitem__(index, numbers)
         except ValueError as error:  # of NumPy, about the shape
             raise BadInput(f"{self.name}: {error}") from None
+
+    def _in_si(self, value: Any) -> Any:
+        """What is written into the array, as numbers.  Raises BadInput."""
+        return value if self.unit_of_entries is None else si_array(value, self.unit_of_entries, self.name)
+
+    def fill(self, value: Any) -> None:
+        """Assign a value to all entries, as `array[...] = value`.  Raises BadInput."""
+        self[...] = value
+
+    def put(self, indices: Any, values: Any, mode: Any = "raise") -> None:
+        """Assign values in SI, text or quantities to entries of the flattened array.  Raises BadInput."""
+        super().put(indices, self._in_si(values), mode)
+
+    def __iadd__(self, other: Any) -> Any:  # type: ignore[misc]
+        """Add numbers in SI, text or quantities.  Raises BadInput."""
+        return super().__iadd__(self._in_si(other) if has_unit_within(other) else other)
+
+    def __isub__(self, other: Any) -> Any:  # type: ignore[misc]
+        """Subtract numbers in SI, text or quantities.  Raises BadInput."""
+        return super().__isub__(self._in_si(other) if has_unit_within(other) else other)
+
+    def __array_function__(self, function: Any, types: Any, args: Any, named: Any) -> Any:
+        """Convert what a function of NumPy writes into this array.  Raises BadInput."""
+        if function in WRITERS and (args or named) and next(iter((*args, *named.values()))) is self:
+            at, name = WRITERS[function]
+            args = tuple(self._in_si(one) if k == at else one for k, one in enumerate(args))
+            named = {key: self._in_si(one) if key == name else one for key, one in named.items()}
+            types = [type(self)]
+        return super().__array_function__(function, types, args, named)
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         """Return the result of arithmetic as a plain array, but in-place arithmetic as this one."""

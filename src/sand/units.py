@@ -28,6 +28,11 @@ LARGEST = {
     "kg/m^3": (1e18, "more than the density of nuclei"),
     "m/s^2": (1e13, "more than the gravity of neutron stars"),
     "T": (1e12, "more than the fields of neutron stars"),
+    "A m^2": (1e24, "more than the moment of the Earth"),
+    "C": (1e6, "more than the charge of the Earth"),
+    "Pa": (1e36, "more than the stiffness of neutron stars"),
+    "J/m^3": (1e36, "more than the stiffness of neutron stars"),
+    "J/m^2": (1e18, "more than the surface tension of nuclei"),
     "A m^2/kg": (1e4, "more than the moments of all electrons of matter"),
 }
 """Largest magnitude accepted in each unit, and what it exceeds: larger numbers are mistakes of unit or exponent."""

@@ -76,6 +76,30 @@ def test_moments_depend_neither_on_output_nor_on_interruptions(tmp_path):
     assert again.ledger.drift < 1e-3 and again.ledger.rows[-1] == whole.ledger.rows[-1]
 
 
+class Expands(sand.Updater):
+    """Scales the box."""
+
+    every = "0.3 ns"
+
+    def act(self, simulation):
+        with simulation.change() as change:
+            change.scale_box(1.02)
+
+
+@pytest.mark.compiled("dipoles")
+def test_choices_after_an_interruption(tmp_path):
+    """A run that goes on after an interruption states the choices of one without: those of its last change."""
+    whole, pieces = warm_gas(updaters=[Expands()]), warm_gas(updaters=[Expands()], out=tmp_path / "run")
+    before = whole.choices
+    whole.run(until="1 ns")
+    pieces.run(until="0.5 ns")
+    again = sand.resume(tmp_path / "run", updaters=[Expands()])
+    assert again.choices == pieces.choices
+    again.run(until="1 ns")
+    assert again.choices == whole.choices != before
+    assert sand.open(tmp_path / "run").summary["choices"] == whole.choices
+
+
 @pytest.mark.compiled("dipoles")
 def test_an_updater_ends_a_run_as_a_condition(tmp_path):
     """The outcome is CONDITION_MET with the name of the updater, at a multiple of 100 steps; the run can go on."""

@@ -311,3 +311,21 @@ def test_an_index_of_a_list_is_named():
     for seeds, key_path in (([-1, 2], "grow.seeds.0"), ([2, -1], "grow.seeds.1")):
         with pytest.raises(sand.BadInput, match=key_path):
             validate(GrowSection, {"seeds": seeds}, "c", table="grow")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"run": {"until": "1 us", **{f"key{k}": k for k in range(5000)}}},
+        {"forces": {f"key{k}": {} for k in range(5000)}},
+        {"grains": {"number": 2, "radius": "1 um", "material": [f"name{k}" for k in range(5000)]}},
+        {"walls": [{"point": [0, 0, 0], "normal": [0, 0, 1], "material": f"name{k}"} for k in range(500)]},
+    ],
+)
+def test_the_first_of_many_mistakes_are_described(content):
+    """The first hundred of each kind, as each description takes milliseconds; the others are counted."""
+    whole = {"run": {"until": "1 us"}, "grains": {"number": 2, "radius": "1 um"}}
+    with pytest.raises(BadInput) as caught:
+        check_case(whole | content, "case")
+    assert 100 < len(caught.value.problems) < 220
+    assert sum("more errors" in problem for problem in caught.value.problems) == 1

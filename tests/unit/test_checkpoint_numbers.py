@@ -1,5 +1,7 @@
 """Complete checkpoint archives with changed numbers or with embedded code are refused."""
 
+import copy
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -86,3 +88,35 @@ def test_code_in_a_checkpoint_is_not_run(tmp_path):
         read_checkpoint(path)
     assert len(caught.value.problems) == 1
     assert not trace.exists()
+
+
+def compress(path):
+    """64 MiB of zeros, compressed."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.npy", "w") as member:
+        for _ in range(64):
+            member.write(bytes(2**20))
+
+
+def share_bytes(path):
+    """64 members of 1 MiB that are the same bytes of the file."""
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a.npy", bytes(2**20))
+        for k in range(63):
+            again = copy.copy(archive.filelist[0])
+            again.filename = f"{k}.npy"
+            archive.filelist.append(again)
+
+
+@pytest.mark.parametrize("change", [compress, share_bytes])
+def test_a_small_file_that_unpacks_to_a_large_one_is_refused(tmp_path, change):
+    """Members larger than the file are not from SAND, which does not compress; nothing of them is unpacked."""
+    path = written(tmp_path, 1)
+    change(path)
+    with zipfile.ZipFile(path) as archive:
+        assert sum(one.file_size for one in archive.infolist()) == 2**26 > 10 * path.stat().st_size
+    tracemalloc.start()
+    with pytest.raises(sand.BadInput, match="is not a readable checkpoint"):
+        read_checkpoint(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2**23

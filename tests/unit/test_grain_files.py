@@ -117,6 +117,13 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("4\n0 0 0 1\n5 0 0 1\n", "'4' is not the number of grains; there are 2 lines"),
         ("0 0 0 1\n****** 0 0 1\n", "line 2"),
         ("x y z r mass\n0 0 0 1e-7 28\n", "mass of grain 0 is 28 kg, but a sphere of silica"),
+        *(
+            (
+                f'1\nProperties=species:S:1:pos:R:3:radius:R:1:material:I:1 materials="iron;ice"\nX 0 0 0 900 {k}\n',
+                "'material' has no index into",
+            )
+            for k in (-1, 2, "ice")
+        ),
         ("x,y,z,r,heat [parsec/x]\n0,0,0,1,2\n", "own: heat"),
         (
             "LAMMPS\n\n1 atoms\n\nAtoms\n\n1 1 1 1 0 0 0\n",

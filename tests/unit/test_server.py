@@ -4,6 +4,7 @@ import http.client
 import inspect
 import json
 import socket
+import threading
 import time
 
 import pytest
@@ -220,24 +221,73 @@ def test_slow_clients_do_not_block_others(server, capfd):
     assert output.out == output.err == ""
 
 
-def test_the_number_of_connections_is_limited(server, monkeypatch):
-    """With all connections in use another is closed; when they end, requests are answered again."""
+@pytest.fixture
+def small(server, monkeypatch):
+    """A server that takes two connections at a time."""
     monkeypatch.setattr(servers, "MAX_CONNECTIONS", 2)
-    small = Server(server.dataset)
-    small.start()
-    silent = []
+    one = Server(server.dataset)
+    one.start()
+    yield one
+    one.stop()
+
+
+def wait_until(holds):
+    deadline = time.monotonic() + 10.0
+    while not holds() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert holds()
+
+
+@pytest.mark.parametrize("text", [b"", b"GET /", b"GET / HTTP/1.1\r\nHost: a\r\n"])
+def test_slow_clients_give_way(small, text):
+    """With all connections in use by clients that finish no request, the one that is awaited longest is closed."""
+    slow = []
     for _ in range(2):
-        silent.append(socket.create_connection(("127.0.0.1", small.port)))
-        silent[-1].sendall(b"GET /")
+        slow.append(socket.create_connection(("127.0.0.1", small.port), timeout=10))
+        slow[-1].sendall(text)
+        wait_until(lambda: len(small._awaited) == len(slow))
+    assert ask(small, "frame/1")[0] == 200
+    assert slow[0].recv(100) == b""
+    slow[1].sendall(b"\r\n\r\n")
+    assert slow[1].recv(100) != b"" or not text
+    for line in slow:
+        line.close()
+
+
+def test_the_number_of_connections_is_limited(small, monkeypatch):
+    """While all connections compute answers another is closed; when they end, requests are answered again."""
+    may_answer = threading.Event()
+    monkeypatch.setattr(small.dataset, "answer", lambda *_: may_answer.wait(10.0) and b"")
+    head = f"GET /{small.token}/manifest HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
+    busy = [socket.create_connection(("127.0.0.1", small.port), timeout=10) for _ in range(2)]
+    for line in busy:
+        line.sendall(head)
+    wait_until(lambda: small._free_connections._value == 0 and not small._awaited)
     with pytest.raises((http.client.HTTPException, ConnectionError)):
         ask(small, "manifest")
-    for line in silent:
+    may_answer.set()
+    assert [line.recv(15) for line in busy] == [b"HTTP/1.1 200 OK"] * 2
+    for line in busy:
         line.close()
-    deadline = time.monotonic() + 10.0
-    while small._free_connections._value < 2 and time.monotonic() < deadline:
-        time.sleep(0.01)
     assert ask(small, "frame/1")[0] == 200
-    small.stop()
+
+
+@pytest.mark.parametrize(
+    "header", ["Content-Length: {}", "Transfer-Encoding: chunked", "Content-Length : {}", "Content-Length: 0, {}"]
+)
+def test_a_request_in_a_body_is_not_answered(server, header):
+    """A request with a body is refused, and the connection closed, so that nothing in the body is taken for another."""
+    hidden = f"GET /{server.token}/manifest HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    first = hidden[:-2] + header.format(len(hidden)) + "\r\n\r\n"
+    answers = raw(server, (first + hidden).encode())
+    assert answers.count(b"HTTP/1.1") == 1 and b" 400 " in answers.splitlines()[0]
+    assert b"Connection: close" in answers and server.token.encode() not in answers
+
+
+def test_several_requests_on_one_connection(server):
+    """Requests without a body are answered one after the other, also with a length of 0."""
+    one = f"GET /{server.token}/manifest HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n"
+    assert raw(server, (one + one).encode()).count(b"HTTP/1.1 200 OK") == 2
 
 
 def test_an_unreadable_frame(server, monkeypatch):

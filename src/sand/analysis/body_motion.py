@@ -12,6 +12,7 @@ import numpy as np
 from ..arguments import checked
 from ..box import Box
 from ..constants import BOLTZMANN
+from ..errors import refuse_other
 from .clusters import cluster_labels, in_one_piece
 
 __all__ = ["MEDIAN_ENERGY", "BodyMotion", "BodyTemperatures", "body_motion", "body_temperatures"]
@@ -59,6 +60,7 @@ def body_motion(grains: Any, pairs: np.ndarray, box: Box) -> BodyMotion:
     BodyMotion
         Of each body, (K,).
     """
+    refuse_other(grains, "position", "velocity", "spin", "mass", called="grains")
     return motion_of(grains, pairs, box, cluster_labels(len(grains.position), pairs))
 
 

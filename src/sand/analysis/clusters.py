@@ -177,8 +177,8 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
     box : Box
         Boundary conditions.
     """
-    ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    labels = cluster_labels(len(position), ends)
+    ends = checked_pairs(len(position), pairs)
+    labels = labels_of(len(position), ends)
     whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
     found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
     found[labels[ends[_closes_through_boundary(whole, ends, box), 0]]] = True

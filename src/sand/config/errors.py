@@ -36,9 +36,10 @@ def validate(model: type[Model], content: Any, name: str, problems: Iterable[str
     Raises
     ------
     BadInput
-        All errors, one line each, the first `MOST_ERRORS` of this model.
+        All errors, one line each, the first `MOST_ERRORS` of `problems` and of this model.
     """
-    found, case = list(problems), None
+    given = list(problems)
+    found, case = first_problems(given[:MOST_ERRORS], len(given), "errors"), None
     try:
         case = model.model_validate(content)
     except ValidationError as error:

@@ -120,8 +120,9 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
-            # SAND does not compress: a member larger than the file is not from SAND, and need not be unpacked to know
-            if any(one.compress_type != zipfile.ZIP_STORED or one.file_size > len(content) for one in members):
+            # SAND does not compress: members that exceed the file are not from SAND, and need not be unpacked to know
+            size = sum(one.file_size for one in members)
+            if size > len(content) or any(one.compress_type != zipfile.ZIP_STORED for one in members):
                 raise zipfile.BadZipFile
             if archive.testzip():  # before NumPy allocates arrays of sizes that may be wrong
                 raise zipfile.BadZipFile

@@ -11,7 +11,7 @@ from ..arguments import checked
 from ..box import Box
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..grains import Grains
-from ..material import Material
+from ..material import Material, as_material
 from ..units import format_quantity
 from .overlap_fit import APART, ITERATIONS, deficit, least_shift, overlapping, scaled_box
 
@@ -71,6 +71,8 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
             f"the frame has grains of the unknown material '{unknown[0]}'; define it in "
             f"[materials.{unknown[0]}]; {did_you_mean(unknown[0], list(materials))}"
         )
+    for name in dict.fromkeys(frame.materials):
+        as_material(materials[name])
     for name in ("position", "velocity", "spin", "moment", "overlap"):
         if not np.isfinite(getattr(frame, name)).all():
             raise BadInput(f"step {frame.step}: {name} has values that are not finite; use an earlier frame")

@@ -151,7 +151,7 @@ def gas_with_contacts(
     BadInput
         If an argument is invalid, or the box is too full for random positions.
     """
-    space = as_box(box)
+    space, classes = as_box(box), list(classes)
     region = _region(space, extent)
     if spins not in SPINS:
         raise BadInput(f"spins = {spins!r}; {did_you_mean(spins, list(SPINS))}")

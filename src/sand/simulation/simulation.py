@@ -173,6 +173,7 @@ class Simulation(ReadOnlySettings):
             self._engine.load_state(arrays, meta.get("output_time"))
             self.temperature, self._clock = meta["temperature"], WallClock(meta["wall_seconds"], meta.get("wall_times"))
             self._choices_at_start, self._warned = meta.get("choices", {}), list(meta.get("warnings", []))
+            self.origin = self._choices_at_start.get("start", "")
             self._next_id = int(meta.get("next_id", len(grains)))
             self._chosen = Chosen(*meta["chosen_cadence"]) if meta.get("chosen_cadence") else None
             check_updaters(updaters, self.updaters, meta.get("updaters", []))
@@ -455,6 +456,7 @@ class Simulation(ReadOnlySettings):
             object.__setattr__(self, name, value)
         for text in truncation_warnings(self.grains, forces, change.box):
             self._warn(text, text.partition(",")[0])
+        self._choices_at_start = {}  # chosen anew
         if change.regroups:  # the description of the grains in a case file no longer holds
             self.recipe = None
         engine.regular_state.lost[OUTSIDE] += before - self._log_row()["total"]

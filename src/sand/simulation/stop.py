@@ -51,7 +51,7 @@ def stop_criteria(
         If there is no criterion, `until` lies in the past, `steps` is not a positive integer, or the condition cannot
         be read.
     """
-    if callable(until):
+    if callable(until) and not isinstance(until, type):
         if stop is not None:
             raise BadInput("until and stop are both conditions; give one, or a time as until")
         until, stop = None, until
@@ -63,7 +63,8 @@ def stop_criteria(
         end, last, stop = planned
         if stop == GIVEN:
             raise BadInput("the condition that ends this run is a function of a script: run(until=function), or a time")
-    condition = None if stop is None else OwnCondition(stop) if callable(stop) else read_condition(stop)
+    is_function = callable(stop) and not isinstance(stop, type)
+    condition = None if stop is None else OwnCondition(stop) if is_function else read_condition(stop)
     if end == last == math.inf and condition is None:
         raise BadInput("run needs an end: until='5 us', steps=1000 or stop='clusters == 1'")
     if steps is not None and last > MOST_STEPS:

@@ -47,7 +47,7 @@ def aggregate_moment(moment: Any, grains: Any, exponent: float = REMANENCE) -> f
     grains : float
         N ≥ 1.
     exponent : float, optional
-        γ; 0.5 for random orientations, 0.63 in the paper, 1 for parallel moments.
+        γ from 0 to 1; 0.5 for random orientations, 0.63 in the paper, 1 for parallel moments.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def aggregate_moment(moment: Any, grains: Any, exponent: float = REMANENCE) -> f
         If a parameter is out of range.
     """
     return si(moment, "A m^2", "moment", least=0.0) * si(grains, "1", "grains", least=1.0) ** si(
-        exponent, "1", "exponent"
+        exponent, "1", "exponent", least=0.0, most=1.0
     )
 
 

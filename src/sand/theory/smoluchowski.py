@@ -59,7 +59,7 @@ def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
     largest : float
         > 1, e.g. 1e9.
     per_decade : float, optional
-        Sizes per factor of ten, ≥ 4, so that the ratio is below 2.
+        Sizes per factor of ten, ≥ 4, so that the ratio is below 2, and ≤ 3000.
 
     Returns
     -------
@@ -71,7 +71,8 @@ def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
     BadInput
         If a parameter is out of range, or there are more than 3000 sizes.
     """
-    top, each = si(largest, "1", "largest", above=1.0), si(per_decade, "1", "per_decade", least=4.0)
+    top = si(largest, "1", "largest", above=1.0)
+    each = si(per_decade, "1", "per_decade", least=4.0, most=float(MAX_SIZES))
     ratio = 10.0 ** (1.0 / each)
     first = np.arange(1.0, min(np.ceil(1.0 / (ratio - 1.0)), np.ceil(top)) + 1.0)
     more = max(int(np.ceil(each * np.log10(top / first[-1]) - 1e-9)), 0)

@@ -2,15 +2,18 @@
 
 Every address begins with a secret token, which keeps out other users of the machine and other pages in the browser. The
 `Host` header must name this machine, which defeats DNS rebinding. No file name is ever made from an address. The length
-of addresses, the number of connections and the time a client may be silent are limited.
+of addresses, the number of connections and the time a client may be silent are limited; when all connections are in
+use, a new one takes the place of that whose client is awaited longest. Requests with a body are refused.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hmac
 import os
 import re
 import secrets
+import socket
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
@@ -28,7 +31,9 @@ HOSTS = (LOOPBACK, "localhost")
 MAX_ADDRESS = 512
 """Maximum number of characters of an address."""
 MAX_CONNECTIONS = 64
-"""Further connections are closed at once."""
+"""Connections at a time."""
+CLOSING_TIME = 1.0
+"""Longest time [s] until a connection that gives way to a new one has ended."""
 CLIENT_TIMEOUT = 30.0
 """Seconds after which the connection of a silent client is closed."""
 HEADERS = {
@@ -79,6 +84,8 @@ class Server(ThreadingHTTPServer):
         script, styles = read_bundle()
         self.dataset, self.token = dataset, secrets.token_urlsafe(24)
         self._free_connections = threading.BoundedSemaphore(MAX_CONNECTIONS)
+        self._awaited: dict[socket.socket, None] = {}  # connections whose client is awaited, the longest first
+        self._lock = threading.Lock()
         self._files = {
             "": ("text/html; charset=utf-8", served_page(dataset.name)),
             "grainview.js": ("text/javascript; charset=utf-8", script),
@@ -111,11 +118,35 @@ class Server(ThreadingHTTPServer):
         self.server_close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection in a thread of its own, up to MAX_CONNECTIONS at a time."""
-        if self._free_connections.acquire(blocking=False):
+        """Serve a connection in a thread of its own, up to MAX_CONNECTIONS at a time.
+
+        If all are in use, the one that has waited longest for its client gives way, so that slow clients lock nobody
+        out; the new one is closed if no client is awaited.
+        """
+        free = self._free_connections.acquire(blocking=False)
+        if not free and self._close_slowest():
+            free = self._free_connections.acquire(timeout=CLOSING_TIME)
+        if free:
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
+
+    def _close_slowest(self) -> bool:
+        """Close the connection whose client has been awaited longest; returns whether there is one."""
+        with self._lock:
+            slowest = next(iter(self._awaited), None)
+            if slowest is not None:
+                del self._awaited[slowest]
+                with contextlib.suppress(OSError):
+                    slowest.shutdown(socket.SHUT_RDWR)
+        return slowest is not None
+
+    def await_client(self, connection: socket.socket, awaited: bool) -> None:
+        """Note that a connection waits from now on for its client, to send a request or to take an answer, or not."""
+        with self._lock:
+            self._awaited.pop(connection, None)
+            if awaited:
+                self._awaited[connection] = None
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Serve a connection and count it as free again."""
@@ -156,14 +187,27 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "SAND", ""
 
+    def handle_one_request(self) -> None:
+        """Wait for a request and answer it."""
+        self.server.await_client(self.connection, True)
+        try:
+            super().handle_one_request()
+        finally:
+            self.server.await_client(self.connection, False)
+
     def do_GET(self) -> None:
+        self.server.await_client(self.connection, False)
         try:
             status, (content_type, content) = 200, self.server.respond(self._checked_address())
         except Exception as error:
             internal = (500, f"internal error ({type(error).__name__}: {error})")
             status, message = error.args if isinstance(error, HTTPError) else internal
             content_type, content = JSON, compact_json({"error": message}).encode()
+            self.close_connection = True  # what follows may be the body of a refused request
+        self.server.await_client(self.connection, True)
         self.send_response(status)
+        if self.close_connection:
+            self.send_header("Connection", "close")
         for name, value in {**HEADERS, "Content-Type": content_type, "Content-Length": str(len(content))}.items():
             self.send_header(name, value)
         self.end_headers()
@@ -173,7 +217,10 @@ class _Handler(BaseHTTPRequestHandler):
     do_HEAD = do_GET  # noqa: N815, a name of http.server
 
     def _checked_address(self) -> str:
-        """Address below the token, with its query; HTTPError if length, host or token are wrong."""
+        """Address below the token, with its query; HTTPError if it has a body, or length, host or token are wrong."""
+        sizes = self.headers.get_all("Content-Length", [])
+        if any(size != "0" for size in sizes) or "Transfer-Encoding" in self.headers or self.headers.defects:
+            raise HTTPError(400, "requests to this server have no body, and no malformed headers")
         if len(self.path) > MAX_ADDRESS:
             raise HTTPError(414, f"the address is longer than {MAX_ADDRESS} characters")
         hosts = self.headers.get_all("Host", [])
