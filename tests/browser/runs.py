@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,12 @@ class Body:
         size = np.array([200.0, 0.0])[self.material] * self.mass  # non-magnetic grains have no arrow
         self.moment = way / np.linalg.norm(way, axis=1)[:, None] * size[:, None]
         self.velocity, self.spin = 3.0 * rng.normal(size=(count, 3)), 1e8 * rng.normal(size=(count, 3))
+
+    @property
+    def arrays(self) -> SimpleNamespace:
+        """Components first, as in a state."""
+        names = ("position", "radius", "mass", "material", "velocity", "spin", "charge", "orientation", "moment", "image")
+        return SimpleNamespace(**{name: getattr(self, name).T for name in names}, id=self.id)
 
     @property
     def own_units(self) -> dict[str, str]:

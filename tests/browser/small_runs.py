@@ -54,9 +54,10 @@ class Grains(SimpleNamespace):
         return np.arange(len(self))
 
     @property
-    def image(self) -> np.ndarray:
-        """Crossings of the box: none."""
-        return np.zeros((len(self), 3), np.int32)
+    def arrays(self) -> SimpleNamespace:
+        """Components first, as in a state; no grain has crossed the box."""
+        columns = {name: np.asarray(values).T for name, values in vars(self).items() if name != "materials"}
+        return SimpleNamespace(**columns, id=self.id, image=np.zeros((3, len(self)), np.int32))
 
 
 def positions(k: int) -> np.ndarray:
