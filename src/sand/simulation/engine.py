@@ -269,7 +269,7 @@ class Engine:
 
     @property
     def awake_work(self) -> tuple[int, float]:
-        """Contact steps within steps of bodies, and the wall time [s] of all work on awake clusters."""
+        """Contact steps within steps of bodies, and the processor time [s] of all work on awake clusters."""
         return 0, 0.0
 
     def _sort_in_space(self) -> None:

@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..box import Box
-from ..compiler.progress import compilation_seconds
 from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
@@ -99,15 +98,15 @@ Kind = TypeVar("Kind", bound=Engine)
 
 
 def timed(method: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Count the wall time of a method, compilation excepted, as work on awake clusters."""
+    """Count the processor time of a method as work on awake clusters."""
 
     @wraps(method)
     def call(self: Any) -> Any:
-        began = time.perf_counter() - compilation_seconds()
+        began = time.thread_time()
         try:
             return method(self)
         finally:
-            self._awake_seconds += time.perf_counter() - compilation_seconds() - began
+            self._awake_seconds += time.thread_time() - began
 
     return call
 
@@ -135,7 +134,7 @@ class RigidEngine(Engine):
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
-    _awake_seconds: float = field(init=False, default=0.0)  # wall time of the work on awake clusters [s]
+    _awake_seconds: float = field(init=False, default=0.0)  # processor time of the work on awake clusters [s]
 
     def __post_init__(self) -> None:
         super().__post_init__()
