@@ -163,10 +163,10 @@ def test_contact_steps_of_rigid_clusters_follow_the_touches():
 
 
 def test_the_fastest_of_many_thermal_grains():
-    """Of 300 spheres with three Maxwell components √(kT/I) the fastest has, in the median of 4000 draws, the spin stated.
+    """Of 200 spheres with three Maxwell components √(kT/I) the fastest has the spin stated, in the median of draws.
 
-    The median of the largest x = I ω²/2kT has the tail ln 2/300, the formula 1/301: x, about 7 with a tail ∝ √x e^(−x),
-    differs by 0.37/0.93, the spin by 2.9 %; the median of the draws has an error of 0.3 %.
+    The median of the largest x = I ω²/2kT has the tail ln 2/200, the formula 1/201: x, about 6.5 with a tail
+    ∝ √x e^(−x), differs by 0.37/0.92, the spin by 3.1 %; the median of 4000 draws has an error of 0.2 %.
     """
     gas = thermal(200, 1e-5, 100.0)
     sim = sand.Simulation(gas, [sand.Contact()], box=1e-5)
@@ -192,8 +192,8 @@ def test_heavy_bodies_do_not_turn_as_fast():
 def test_the_spin_of_touches_is_that_of_the_approach():
     """⟨L²⟩/2I of captured dipoles: kinetic energies x kT with x from Γ(4/3), b² uniform up to σ/π, L = m̄ v b.
 
-    The rate of captures at energy E is σ v f ∝ E^(−2/3) E e^(−E/kT).  With 10⁵ draws the mean has an error of 0.3 %, and
-    (2x)^(1/3) has the mean 1.274 beside 2^(1/3) = 1.260 in the formula.
+    The rate of captures at energy E is σ v f ∝ E^(−2/3) E e^(−E/kT).  With 10⁵ draws the mean has an error of 0.2 %,
+    and (2x)^(1/3) has the mean 1.274 beside 2^(1/3) = 1.260 in the formula; the spin is the root of it.
     """
     side, kelvin = 1.5e-6, 100.0
     mass = float(thermal(1, side, kelvin).mass[0])

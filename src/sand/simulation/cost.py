@@ -31,8 +31,8 @@ from .cadence import FRAMES, number_in, read_cadence
 from .expected_steps import expected_steps
 
 LEAST_STEPS, LEAST_OUTPUTS, LEAST_SECONDS, REPLACES = 500, 20, 0.1, 0.1
-"""Fewest steps, and outputs, and least time [s], of a measured cost; it replaces one that was measured for ten times its
-time or less."""
+"""Fewest steps, and outputs, and least time [s], of a measured cost; it replaces one that was measured for up to ten
+times its time."""
 PER_STEP, PER_GRAIN, PER_CONTACT = 1e-6, 15e-9, 60e-9
 """Rough wall times [s] of a step: of each step, for each grain, and for each contact."""
 PER_CYCLE_STEP, PER_CYCLE_GRAIN, CYCLE = 2.5e-6, 100e-9, 6.0
@@ -106,7 +106,7 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
         return Cost(step.span, None, None, None, {}, memory, "", "")
     found = expected_steps(simulation, end, last_step, may_end_earlier=condition is not None)
     speeds, measured = _speeds(kind_of(simulation))
-    grains, sums = len(simulation.start), long_range_seconds(simulation)
+    sums = long_range_seconds(simulation)
     stepping = math.fsum(
         getattr(found, mode) * step_seconds(simulation, mode, found.contacts, sums) * speeds[mode] for mode in MODES
     )

@@ -166,8 +166,8 @@ def body_step(simulation: Simulation, bodies: Bodies, span: float) -> float:
 def fastest_spin(simulation: Simulation, bodies: Bodies, span: float) -> float:
     """Largest spin [1/s] of all bodies in a run of a length [s].
 
-    Bodies begin with their spins, which a gas replaces by thermal ones within a stopping time.  A touch leaves a cluster
-    with the angular momentum of the approach; as long as a gas does not slow it, it stays.
+    Bodies begin with their spins, which a gas replaces by thermal ones within a stopping time.  A touch leaves a
+    cluster with the angular momentum of the approach; as long as a gas does not slow it, it stays.
     """
     decay, gas = simulation._engine.parameters.flight_limits.friction_rate, simulation._engine.parameters.gas.gas
     touches = bodies.number * merged(span / coagulation_time(simulation, bodies))
