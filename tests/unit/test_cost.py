@@ -1,5 +1,6 @@
 """Expected cost of a run: steps, wall time, memory and compilation, and the table that runs write."""
 
+import csv
 import json
 import math
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.constants import BOLTZMANN, COULOMB, MAGNETIC
+from sand.experiments.templates import TEMPLATES
 from sand.simulation import coagulation, cost
 from sand.simulation import expected_steps as steps
 from sand.simulation.cadence import number_in, read_cadence
@@ -246,6 +248,17 @@ def test_a_gas_replaces_the_spins_and_slows_those_of_touches():
     assert 0.0 < slowed < fastest, "without noise nothing turns but clusters after their touch"
 
 
+def test_the_table_of_estimates_has_every_case():
+    """Each example and template has a row; one beyond a factor of 3 says so, unless an upper bound is too long."""
+    with (EXAMPLES.parent / "benchmarks" / "estimates.csv").open(encoding="utf-8") as file:
+        table = {row["case"]: row for row in csv.DictReader(file)}
+    assert table.keys() == {path.stem for path in EXAMPLES.glob("*.toml")} | {f"template-{name}" for name in TEMPLATES}
+    for row in table.values():
+        ratios = [float(row[name]) for name in ("ratio first", "ratio after") if row[name]]
+        low, high = min(ratios) < 1.0 / 3.0, max(ratios) > 3.0 and row["miss"] != "at most"
+        assert (row["miss"] == "MISSED") == (low or high), row["case"]
+
+
 @pytest.mark.compiled("small")  # two examples build aggregates
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.toml")))
 def test_every_example_has_an_estimate(name, capsys):
@@ -330,7 +343,8 @@ def test_outputs_are_recorded_and_used(table):
     assert timed(sim, [], [1.0] * 19) == {} == timed(sim, [], [0.004] * 20) == timed(sim, [], [1.0] * 30, writer=False)
     before = cost.expected_cost(sim, 1e-6, math.inf)
     found = timed(sim, [], [0.05] * 30)
-    assert found == {"output": {"ratio": pytest.approx(0.05 / rough, rel=1e-9, abs=0.0), "seconds": pytest.approx(1.5)}}
+    known = {"ratio": 0.05 / rough, "seconds": 1.5}
+    assert found == {"output": pytest.approx(known, rel=1e-9, abs=0.0)}
     after = cost.expected_cost(sim, 1e-6, math.inf)
     assert after.parts["output"] == pytest.approx(0.05 / rough * before.parts["output"], rel=1e-9, abs=0.0)
     assert {**after.parts, "output": 0.0} == {**before.parts, "output": 0.0} and after.measured == ""
