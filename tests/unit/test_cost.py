@@ -17,7 +17,7 @@ from sand.simulation import expected_steps as steps
 from sand.simulation.cadence import number_in, read_cadence
 from sand.state.state import CONTACTS
 from sand.theory.contact import contact
-from sand.theory.kinetics import brownian
+from sand.theory.kinetics import brownian, capture
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -87,7 +87,7 @@ def thermal(count, side, kelvin, **options):
 
 
 def test_the_time_of_coagulation_is_that_of_the_kernels():
-    """τ = 2/(K n): K of the ballistic kernel of two grains, and of magnetic capture with c = 0.5, at kT."""
+    """τ = 2/(K n): K of the ballistic kernel of two grains, and ⟨σv⟩ of magnetic capture with c = 0.5, at kT."""
     side, kelvin = 1.5e-6, 100.0
     gas = thermal(100, side, kelvin)
     mass, density = float(gas.mass[0]), 100 / side**3
@@ -99,11 +99,14 @@ def test_the_time_of_coagulation_is_that_of_the_kernels():
         thermal(100, side, kelvin, moment=[moment, 0, 0]), [sand.Contact(), sand.Dipoles()], box=side
     )
     found = coagulation.coagulation_time(magnets, coagulation.bodies_of(magnets))
-    # σ of Eq. 14 at m̄v² = kT, with α for the largest attraction 2kμ²/r³, and the mean relative speed
-    alpha = 2.0 * MAGNETIC * moment**2
-    area = 0.5 * 3.0 * math.pi * (alpha / (BOLTZMANN * kelvin)) ** (2.0 / 3.0)
-    speed = math.sqrt(8.0 * BOLTZMANN * kelvin / (math.pi * 0.5 * mass))
-    assert found == pytest.approx(2.0 / (area * speed * density), rel=1e-6, abs=0.0)
+    # σ of Eq. 14, averaged over the relative speeds of 10⁵ draws: σv ∝ v^(−1/3) has a relative error of 0.1 %
+    alpha, reduced = 2.0 * MAGNETIC * moment**2, 0.5 * mass
+    drawn = np.random.default_rng(2).normal(size=(100_000, 3)) * math.sqrt(BOLTZMANN * kelvin / reduced)
+    speed = np.linalg.norm(drawn, axis=1)
+    rate = 0.5 * 3.0 * math.pi * (alpha / (reduced * speed**2)) ** (2.0 / 3.0) * speed
+    assert found == pytest.approx(2.0 / (float(rate.mean()) * density), rel=0.005, abs=0.0)
+    theory = capture(1e-8, mass, moment, kelvin, speed="thermal", c=0.5)
+    assert found == pytest.approx(2.0 / (theory(mass, mass) * density), rel=1e-6, abs=0.0)
 
 
 def test_charges_focus_bodies():
@@ -301,7 +304,7 @@ def timed(sim, pieces, outputs=(), writer=True):
     state, engine, now = type("State", (), {"count": np.zeros(40, np.int64)})(), sim._engine, [0.0]
 
     class Engine:
-        steps, awake_work, _state, parameters, long_range = 0, (0, 0.0), state, engine.parameters, engine.long_range
+        steps, awake_work, _state, parameters, long_range = 0, (0, 0, 0.0), state, engine.parameters, engine.long_range
 
     class Counted:
         _engine, _clock, start = Engine(), sim._clock, sim.start
@@ -348,6 +351,19 @@ def test_outputs_are_recorded_and_used(table):
     after = cost.expected_cost(sim, 1e-6, math.inf)
     assert after.parts["output"] == pytest.approx(0.05 / rough * before.parts["output"], rel=1e-9, abs=0.0)
     assert {**after.parts, "output": 0.0} == {**before.parts, "output": 0.0} and after.measured == ""
+
+
+def test_substeps_are_no_contact_steps(monkeypatch):
+    """Of 0.5 s for 10⁵ contact steps and 2000 substeps, 0.3 s and 0.1 s are expected: the ratio is 1.25."""
+    sim = simulation()
+    timer = cost.StepTimer(sim)
+    timer._rigid, timer._calls, work = True, 1, iter([(0, 0, 0.0), (100_000, 2000, 0.5)])
+    monkeypatch.setattr(type(sim._engine), "awake_work", property(lambda _: next(work)))
+    with timer.steps():
+        pass
+    timer.record()
+    (known,) = cost._read().values()
+    assert known == {"awake": pytest.approx({"ratio": 1.25, "seconds": 0.5}, rel=1e-9, abs=0.0)}
 
 
 def test_calls_that_compile_do_not_count(monkeypatch):

@@ -2,8 +2,8 @@
 
 Bodies collide as in the coagulation equation with a constant kernel K: their number is N(t) = N₀/(1 + t/τ), with
 τ = 2V/(K N₀) in a volume V (Smoluchowski 1916), and the first of N₀ bodies touch after about τ/N₀.  K = σ ⟨v⟩, with the
-mean relative speed ⟨v⟩ = √(16⟨v²⟩/3π) of a Maxwell distribution and the largest of the cross-sections π (r₁ + r₂)²,
-focused by charges, and of magnetic capture.
+mean relative speed ⟨v⟩ = √(8/π) s, s = √(k_B T/m̄), of a Maxwell distribution and the cross-section π (r₁ + r₂)²,
+focused by charges; or K = ⟨σv⟩ of magnetic capture, σ ∝ v^(−4/3), if that is larger.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from ..forces.gas.model import Gas
 
 CAPTURE = 0.5
 """c of the magnetic cross-section (Eq. 14) of grains with random moments and spins."""
+MEAN_SPEED, MEAN_CAPTURE = math.sqrt(8.0 / math.pi), 2.0 ** (-1.0 / 6.0) * math.gamma(4.0 / 3.0) / math.gamma(1.5)
+"""⟨v⟩/s of a Maxwell distribution, and ⟨σv⟩/(σ(s) s) of magnetic capture."""
 
 Simulation = Any
 """`sand.Simulation`."""
@@ -64,8 +66,9 @@ def coagulation_time(simulation: Simulation, bodies: Bodies) -> float:
     energy, mass = thermal_energy(simulation, bodies), float(bodies.mass.mean())
     if energy <= 0.0:
         return math.inf
-    area = cross_section(simulation, bodies, energy)
-    return 2.0 * volume / (area * math.sqrt(16.0 * energy / (math.pi * mass)) * bodies.number)
+    touching, captured = cross_sections(simulation, bodies, energy)
+    kernel = max(MEAN_SPEED * touching, MEAN_CAPTURE * captured) * math.sqrt(2.0 * energy / mass)
+    return 2.0 * volume / (kernel * bodies.number)
 
 
 def volume_of(simulation: Simulation) -> float:
@@ -82,14 +85,14 @@ def thermal_energy(simulation: Simulation, bodies: Bodies) -> float:
     return max(energy, _attraction(simulation, bodies) * bodies.number / volume_of(simulation))
 
 
-def cross_section(simulation: Simulation, bodies: Bodies, energy: float) -> float:
-    """σ [m²] for a touch of two mean bodies, at the relative energy E = m̄ v² [J], with m̄ the reduced mass."""
+def cross_sections(simulation: Simulation, bodies: Bodies, energy: float) -> tuple[float, float]:
+    """σ [m²] of two mean bodies at m̄ v² = E [J], m̄ the reduced mass: without, and by, magnetic capture."""
     names, touching = {force.name for force in simulation.forces}, 2.0 * float(bodies.radius.mean())
     area = math.pi * touching**2
     if "charges" in names:
         area *= max(1.0, _focusing(bodies.charge, touching, energy))
     attraction = _attraction(simulation, bodies)
-    return max(area, CAPTURE * 3.0 * math.pi * (attraction / energy) ** (2.0 / 3.0))
+    return area, CAPTURE * 3.0 * math.pi * (attraction / energy) ** (2.0 / 3.0)
 
 
 def _attraction(simulation: Simulation, bodies: Bodies) -> float:

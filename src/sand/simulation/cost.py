@@ -39,9 +39,11 @@ PER_CYCLE_STEP, PER_CYCLE_GRAIN, CYCLE = 2.5e-6, 100e-9, 6.0
 """Wall times [s] that r-RESPA adds to a step with contacts, and steps in which each long-range force is summed once."""
 PER_PAIR, PER_EWALD_PAIR, PER_WAVE = 2e-9, 5e-9, 3.5e-9
 """Wall times [s] of a long-range sum for each grain and pair, and for each grain and wave vector."""
-PER_BODY_STEP, PER_BODY_GRAIN, PER_BODY_IN_GAS, PER_AWAKE_STEP = 1e-6, 0.1e-6, 0.17e-6, 3e-6
-"""Wall times [s] of a step of bodies, for each grain and with the friction and noise of a gas, and of a contact step of
-awake clusters."""
+PER_BODY_STEP, PER_BODY_GRAIN, PER_BODY_IN_GAS = 1e-6, 0.1e-6, 0.17e-6
+"""Wall times [s] of a step of bodies, and for each grain without and with the friction and noise of a gas."""
+PER_AWAKE_STEP, PER_SUBSTEP = 3e-6, 50e-6
+"""Wall times [s] of a contact step of awake clusters, and of a substep of quick bodies.  How many substeps a run takes
+is not known before, but those that it took say nothing about the speed of contact steps."""
 PER_OUTPUT, PER_OUTPUT_GRAIN = 2e-3, 2.7e-6
 """Wall times [s] of a frame and its row, and of each grain in it."""
 START, FIGURE = 1.0, 1.5
@@ -210,15 +212,13 @@ class StepTimer:
     ----------
     simulation : Simulation
         The simulation.
-    clock : callable or None, optional
-        Time [s]; None: that of the processor, as another program or a pause of the process would count otherwise. With
-        several threads, of which this one waits for others, it is the wall time.
+    clock : callable, optional
+        Time [s]: processor time of this thread, as wall time would count other programs and pauses of the process.
+        Of several threads that share a step this one waits for the others, on its core while no program needs it.
     """
 
-    def __init__(self, simulation: Simulation, clock: Callable[[], float] | None = None):
-        shared = threads() > 1 and uses_task_queue(len(simulation.start))
-        self._clock = clock or (time.perf_counter if shared else time.thread_time)
-        self._simulation, self._calls = simulation, 0
+    def __init__(self, simulation: Simulation, clock: Callable[[], float] = time.thread_time):
+        self._simulation, self._clock, self._calls = simulation, clock, 0
         self._rigid = isinstance(simulation.stepping, RigidClusters)
         self._kind, self._long_range = kind_of(simulation), long_range_seconds(simulation)
         self._rough_output = output_seconds(simulation)
@@ -258,15 +258,16 @@ class StepTimer:
         self.record()
 
     def _now(self) -> tuple[Any, int]:
-        """Steps, time [s], contact steps of awake clusters and their time [s]; number of contacts."""
+        """Steps, time [s], contact steps, substeps and the time [s] of both; number of contacts."""
         engine = self._simulation._engine
         counted = (engine.steps, self._clock(), *engine.awake_work)
         return np.array(counted), int(engine._state.count[CONTACTS])
 
     def _add(self, before: Any, contacts: int, after: Any, contacts_after: int) -> None:
-        steps, seconds, awake_steps, awake = after - before
+        steps, seconds, awake_steps, substeps, awake = after - before
         if self._rigid:
             found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
+            self._sums["awake"][2] += substeps * PER_SUBSTEP
         elif (contacts > 0) != (contacts_after > 0):
             return
         else:

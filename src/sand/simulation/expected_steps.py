@@ -22,7 +22,7 @@ from .coagulation import (
     Bodies,
     bodies_of,
     coagulation_time,
-    cross_section,
+    cross_sections,
     mean_merged,
     merged,
     thermal_energy,
@@ -203,5 +203,6 @@ def touch_spin(simulation: Simulation, bodies: Bodies, number: float) -> float:
     if energy <= 0.0 or number <= 0.0:
         return 0.0
     mass, radius = float(bodies.mass.mean()), float(bodies.radius.mean())
-    square = 0.5 * mass * 2.0 * energy * cross_section(simulation, bodies, 2.0 * energy) / (2.0 * math.pi)
+    area = max(cross_sections(simulation, bodies, 2.0 * energy))
+    square = 0.5 * mass * 2.0 * energy * area / (2.0 * math.pi)
     return math.sqrt(square * math.log1p(number)) / (2.8 * mass * radius**2)

@@ -59,6 +59,7 @@ from ..state.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
+    SUBSTEPS,
     TIME,
     WOKEN,
     State,
@@ -142,9 +143,10 @@ class RigidEngine(Engine):
             self._inner_workers = self.inner._workers
 
     @property
-    def awake_work(self) -> tuple[int, float]:
+    def awake_work(self) -> tuple[int, int, float]:
         """As `Engine.awake_work`."""
-        return int(self._state.count[CONTACT_STEPS]), self._awake_seconds
+        count = self._state.count
+        return int(count[CONTACT_STEPS]), int(count[SUBSTEPS]), self._awake_seconds
 
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
