@@ -276,24 +276,32 @@ def test_a_measured_speed_scales_the_estimate(table):
     rough = cost.expected_cost(sim, end, math.inf)
     kind = cost.kind_of(sim)
     assert kind == "contact jkr; all pairs; verlet; 1 thread" and rough.measured == ""
-    table.write_text(json.dumps({kind: {"contact": {"ratio": 3.0, "seconds": 9.0}}}))
+    write(table, {kind: {"contact": {"ratio": 3.0, "seconds": 9.0}}})
     known = cost.expected_cost(sim, end, math.inf)
     assert known.measured == "as in a run of this kind on this machine" and known.steps == rough.steps
     assert known.parts["stepping"] == pytest.approx(3.0 * rough.parts["stepping"], rel=1e-9, abs=0.0)
     others = {"bodies": {"ratio": 2.0, "seconds": 9.0}, "awake": {"ratio": 2.0, "seconds": 9.0}}
-    table.write_text(json.dumps({"others": others, "odd": {"free": {"ratio": 6514.0, "seconds": 59.0}}}))
+    write(table, {"others": others, "odd": {"free": {"ratio": 6514.0, "seconds": 59.0}}})
     other = cost.expected_cost(sim, end, math.inf)
     assert other.measured == "as in other runs on this machine"
     # the median of 1, 2, 2 and 6514: one run that was disturbed says nothing about the machine
     assert other.parts["stepping"] == pytest.approx(2.0 * rough.parts["stepping"], rel=1e-9, abs=0.0)
     assert {**other.parts, "stepping": 0.0} == {**rough.parts, "stepping": 0.0}
     for damaged in (
-        '{"a": 3}',
-        '{"a": {"contact": {"ratio": 0.0, "seconds": 1.0}}}',
-        '{"a": {"b": {"ratio": 1, "seconds": 1}}}',
+        {"a": 3},
+        {"a": {"contact": {"ratio": 0.0, "seconds": 1.0}}},
+        {"a": {"b": {"ratio": 1, "seconds": 1}}},
+        [],
     ):
-        table.write_text(damaged)
+        write(table, damaged)
         assert cost.expected_cost(sim, end, math.inf) == rough  # a damaged table is empty
+    write(table, {kind: {"contact": {"ratio": 3.0, "seconds": 9.0}}}, units=[1e-6])
+    assert cost.expected_cost(sim, end, math.inf) == rough, "ratios to the rough costs of another version"
+
+
+def write(table, kinds, units=cost.UNITS):
+    """Write a table of measured costs."""
+    table.write_text(json.dumps({"units": units, "kinds": kinds}))
 
 
 def timed(sim, pieces, outputs=(), writer=True):

@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from operator import add, sub
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,6 +49,8 @@ PER_OUTPUT, PER_OUTPUT_GRAIN = 2e-3, 2.7e-6
 """Wall times [s] of a frame and its row, and of each grain in it."""
 START, FIGURE = 1.0, 1.5
 """Wall times [s] of the start of a run, with imports and compiled code from the disk, and of the figure at its end."""
+UNITS = [value for name, value in sorted(globals().items()) if name.startswith("PER_")] + [CYCLE, FIGURE]
+"""What measured costs are ratios to: the table holds these numbers, and counts as empty if they were others."""
 PROCESS_BYTES = 3.5e8
 """Memory of Python, libraries, compiled code and the figure, measured on Linux."""
 COPIES = 3
@@ -223,7 +226,7 @@ class StepTimer:
         self._kind, self._long_range = kind_of(simulation), long_range_seconds(simulation)
         self._rough_output = output_seconds(simulation)
         # of each kind of step, and of outputs and figures: number, their time [s], and the rough estimate of that [s]
-        self._sums = {mode: np.zeros(3) for mode in (*MODES, OUTPUT, DRAWING)}
+        self._sums = {mode: [0.0, 0.0, 0.0] for mode in (*MODES, OUTPUT, DRAWING)}
         self._recorded = 0.0  # time of what was measured when it was last recorded [s]
 
     @property
@@ -247,41 +250,44 @@ class StepTimer:
         before, compiled = self._clock(), compilation_seconds()
         yield
         if self._simulation.writer and compilation_seconds() == compiled:
-            self._sums[OUTPUT] += number, self._clock() - before, number * self._rough_output
+            self._count(OUTPUT, number, self._clock() - before, number * self._rough_output)
 
     @contextmanager
     def figure(self) -> Iterator[None]:
         """Measure a block that draws the figure, and record it."""
         before = self._clock()
         yield
-        self._sums[DRAWING] = np.array((1.0, self._clock() - before, FIGURE))
+        self._sums[DRAWING] = [1.0, self._clock() - before, FIGURE]
         self.record()
 
-    def _now(self) -> tuple[Any, int]:
+    def _now(self) -> tuple[tuple[float, ...], int]:
         """Steps, time [s], contact steps, substeps and the time [s] of both; number of contacts."""
         engine = self._simulation._engine
         counted = (engine.steps, self._clock(), *engine.awake_work)
-        return np.array(counted), int(engine._state.count[CONTACTS])
+        return counted, int(engine._state.count[CONTACTS])
 
-    def _add(self, before: Any, contacts: int, after: Any, contacts_after: int) -> None:
-        steps, seconds, awake_steps, substeps, awake = after - before
+    def _add(self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int) -> None:
+        steps, seconds, awake_steps, substeps, awake = map(sub, after, before)
         if self._rigid:
             found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
-            self._sums["awake"][2] += substeps * PER_SUBSTEP
+            self._count("awake", 0, 0.0, substeps * PER_SUBSTEP)
         elif (contacts > 0) != (contacts_after > 0):
             return
         else:
             found = {"contact" if contacts else "free": (steps, seconds)}
         for mode, (number, spent) in found.items():
             rough = step_seconds(self._simulation, mode, contacts, self._long_range)
-            self._sums[mode] += number, spent, number * rough
+            self._count(mode, number, spent, number * rough)
+
+    def _count(self, mode: str, number: float, seconds: float, rough: float) -> None:
+        self._sums[mode] = [*map(add, self._sums[mode], (number, seconds, rough))]
 
     def record(self) -> None:
         """Add what was measured to the table, if it was enough and the table can be written."""
         least = dict.fromkeys(MODES, LEAST_STEPS) | {OUTPUT: LEAST_OUTPUTS, DRAWING: 1}
         found = {
             mode: {"ratio": spent / rough, "seconds": spent}
-            for mode, (number, spent, rough) in ((mode, sums.tolist()) for mode, sums in self._sums.items())
+            for mode, (number, spent, rough) in self._sums.items()
             if number >= least[mode] and spent >= LEAST_SECONDS
         }
         spent = math.fsum(one["seconds"] for one in found.values())
@@ -292,7 +298,7 @@ class StepTimer:
         known |= {
             mode: one for mode, one in found.items() if one["seconds"] > REPLACES * known.get(mode, one)["seconds"]
         }
-        write_record(_path(), table)
+        write_record(_path(), {"units": UNITS, "kinds": table})
 
 
 def _path() -> Path:
@@ -300,11 +306,12 @@ def _path() -> Path:
 
 
 def _read() -> dict[str, dict[str, dict[str, float]]]:
-    """The table, by kind of simulation and kind of step; an unreadable or damaged one counts as empty."""
+    """The table, by kind of simulation and kind of step; one that is damaged or of other units counts as empty."""
     try:
+        content = read_record(_path())
         table = {
             str(kind): {mode: {key: float(one[key]) for key in ("ratio", "seconds")} for mode, one in found.items()}
-            for kind, found in read_record(_path()).items()
+            for kind, found in (content["kinds"] if content["units"] == UNITS else {}).items()
         }
     except (ValueError, TypeError, KeyError, AttributeError):
         return {}
