@@ -2,13 +2,15 @@
 
 The number of steps follows from the state at the start and the kinetics of touches (`expected_steps`), never from
 earlier runs, which may have been in another state.  A step has a rough cost by its kind, and by the numbers of grains,
-contacts and pairs.  Runs record their speed in units of this rough cost in a table beside the cache of compiled code.
+contacts and pairs.  Runs record what steps, outputs and the figure took in units of these rough costs, in a table
+beside the cache of compiled code (`StepTimer`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from operator import add, sub
 from pathlib import Path
@@ -18,6 +20,7 @@ import numpy as np
 
 from ..compiler.cache import read_record, write_record
 from ..compiler.jit import cache_folder
+from ..compiler.progress import compilation_seconds
 from ..contact.model import Contact
 from ..forces.pair.ewald_force import EwaldForce
 from ..integrate.rigid_clusters import RigidClusters
@@ -28,27 +31,34 @@ from ..threads import threads
 from .cadence import FRAMES, number_in, read_cadence
 from .expected_steps import expected_steps
 
-LEAST_STEPS, LEAST_SECONDS, REPLACES = 500, 0.1, 0.1
-"""Fewest steps, and least wall time [s], of a measured speed; it replaces one that was measured for ten times its time
-or less."""
+LEAST_STEPS, LEAST_OUTPUTS, LEAST_SECONDS, REPLACES = 500, 20, 0.1, 0.1
+"""Fewest steps, and outputs, and least time [s], of a measured cost; it replaces one that was measured for up to ten
+times its time."""
 PER_STEP, PER_GRAIN, PER_CONTACT = 1e-6, 15e-9, 60e-9
 """Rough wall times [s] of a step: of each step, for each grain, and for each contact."""
 PER_CYCLE_STEP, PER_CYCLE_GRAIN, CYCLE = 2.5e-6, 100e-9, 6.0
 """Wall times [s] that r-RESPA adds to a step with contacts, and steps in which each long-range force is summed once."""
 PER_PAIR, PER_EWALD_PAIR, PER_WAVE = 2e-9, 5e-9, 3.5e-9
 """Wall times [s] of a long-range sum for each grain and pair, and for each grain and wave vector."""
-PER_BODY_STEP, PER_AWAKE_STEP = 10e-6, 3e-6
-"""Wall times [s] of a step of bodies, and of a contact step of awake clusters."""
+PER_BODY_STEP, PER_BODY_GRAIN, PER_BODY_IN_GAS = 1e-6, 0.1e-6, 0.17e-6
+"""Wall times [s] of a step of bodies, and for each grain without and with the friction and noise of a gas."""
+PER_AWAKE_STEP, PER_SUBSTEP = 3e-6, 50e-6
+"""Wall times [s] of a contact step of awake clusters, and of a substep of quick bodies.  How many substeps a run takes
+is not known before, but those that it took say nothing about the speed of contact steps."""
 PER_OUTPUT, PER_OUTPUT_GRAIN = 2e-3, 2.7e-6
 """Wall times [s] of a frame and its row, and of each grain in it."""
 START, FIGURE = 1.0, 1.5
 """Wall times [s] of the start of a run, with imports and compiled code from the disk, and of the figure at its end."""
+UNITS = [value for name, value in sorted(globals().items()) if name.startswith("PER_")] + [CYCLE, FIGURE]
+"""What measured costs are ratios to: the table holds these numbers, and counts as empty if they were others."""
 PROCESS_BYTES = 3.5e8
 """Memory of Python, libraries, compiled code and the figure, measured on Linux."""
 COPIES = 3
 """Copies of the arrays of a state: the present state, one at the time of an output, and what is written."""
 MODES = ("free", "contact", "bodies", "awake")
 """Kinds of steps: without and with contacts, of bodies, and contact steps of awake clusters within these."""
+OUTPUT, DRAWING = "output", "figure"
+"""Further entries of the table, of what is no step."""
 
 Simulation = Any
 """`sand.Simulation`, which imports this module."""
@@ -101,13 +111,13 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
         return Cost(step.span, None, None, None, {}, memory, "", "")
     found = expected_steps(simulation, end, last_step, may_end_earlier=condition is not None)
     speeds, measured = _speeds(kind_of(simulation))
-    grains, sums = len(simulation.start), long_range_seconds(simulation)
+    sums = long_range_seconds(simulation)
     stepping = math.fsum(
         getattr(found, mode) * step_seconds(simulation, mode, found.contacts, sums) * speeds[mode] for mode in MODES
     )
     span = min(end, found.span)
-    output = outputs(simulation, span, found.total) * (PER_OUTPUT + PER_OUTPUT_GRAIN * grains)
-    parts = {"stepping": stepping, "output": output, "start": START + FIGURE}
+    output = outputs(simulation, span, found.total) * output_seconds(simulation) * speeds[OUTPUT]
+    parts = {"stepping": stepping, "output": output, "start": (START + FIGURE) * speeds[DRAWING]}
     rigid = isinstance(simulation.stepping, RigidClusters)
     return Cost(
         span / found.total,
@@ -127,11 +137,17 @@ def step_seconds(simulation: Simulation, mode: str, contacts: float, sums: float
     if mode == "awake":
         return PER_AWAKE_STEP
     if mode == "bodies":
-        return PER_BODY_STEP + PER_GRAIN * grains + sums
+        in_gas = simulation._engine.parameters.gas.gas.on
+        return PER_BODY_STEP + (PER_BODY_GRAIN + (PER_BODY_IN_GAS if in_gas else 0.0)) * grains + sums
     own = PER_STEP + PER_GRAIN * grains + PER_CONTACT * contacts
     if mode == "free" or not sums or respa.max_steps == 1:
         return own + sums
     return own + PER_CYCLE_STEP + PER_CYCLE_GRAIN * grains + sums / min(CYCLE, respa.max_steps)
+
+
+def output_seconds(simulation: Simulation) -> float:
+    """Rough wall time [s] of a frame and its row."""
+    return PER_OUTPUT + PER_OUTPUT_GRAIN * len(simulation.start)
 
 
 def long_range_seconds(simulation: Simulation) -> float:
@@ -154,13 +170,20 @@ def outputs(simulation: Simulation, span: float, steps: float) -> float:
 
 
 def _speeds(kind: str) -> tuple[dict[str, float], str]:
-    """Wall times in units of the rough ones, by kind of step, and from which runs they are known."""
+    """Wall times in units of the rough ones, by kind of step and for outputs and figures, and from which runs they are.
+
+    A kind of step that was not measured has the speed of the machine: the median of all measured ratios and of 1, the
+    rough estimate, so that one odd record changes little.
+    """
     table = _read()
     known = table.get(kind, {})
-    every = [one["ratio"] for runs in table.values() for one in runs.values()]
-    machine = math.exp(math.fsum(map(math.log, every)) / len(every)) if every else 1.0
+    every = [one["ratio"] for runs in table.values() for mode, one in runs.items() if mode in MODES]
+    machine = math.exp(float(np.median([0.0, *map(math.log, every)])))
     speeds = {mode: known[mode]["ratio"] if mode in known else machine for mode in MODES}
-    if known:
+    for part in (OUTPUT, DRAWING):  # these hardly depend on the forces
+        others = [runs[part]["ratio"] for runs in table.values() if part in runs]
+        speeds[part] = known[part]["ratio"] if part in known else float(np.median(others)) if others else 1.0
+    if known.keys() & set(MODES):
         return speeds, "as in a run of this kind on this machine"
     return speeds, "as in other runs on this machine" if every else ""
 
@@ -182,62 +205,100 @@ def _bytes(simulation: Simulation, pairs: float) -> float:
 
 
 class StepTimer:
-    """Measures the steps of one call of `run`: not output, compilation or loading of code, nor the first call.
+    """Measures steps and outputs of the runs of a simulation: not compilation, nor the first call of the driver.
 
-    The first call of the driver fills tables and starts threads.  Steps with and without contacts are told apart, as
-    are those of bodies and of awake clusters: the speed of one kind says nothing about another.
+    The first call fills tables and starts threads; one in which code was compiled or loaded does not count either.
+    Steps with and without contacts are told apart, as are those of bodies and of awake clusters: the speed of one kind
+    says nothing about another.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        The simulation.
+    clock : callable, optional
+        Time [s]: processor time of this thread, as wall time would count other programs and pauses of the process.
+        Of several threads that share a step this one waits for the others, on its core while no program needs it.
     """
 
-    def __init__(self, simulation: Simulation):
-        self._simulation, self._calls = simulation, 0
+    def __init__(self, simulation: Simulation, clock: Callable[[], float] = time.thread_time):
+        self._simulation, self._clock, self._calls = simulation, clock, 0
         self._rigid = isinstance(simulation.stepping, RigidClusters)
-        self._long_range = long_range_seconds(simulation)
-        # of each kind: number of steps, their wall time [s], and the rough estimate of that [s]
-        self._sums = {mode: [0.0, 0.0, 0.0] for mode in MODES}
+        self._kind, self._long_range = kind_of(simulation), long_range_seconds(simulation)
+        self._rough_output = output_seconds(simulation)
+        # of each kind of step, and of outputs and figures: number, their time [s], and the rough estimate of that [s]
+        self._sums = {mode: [0.0, 0.0, 0.0] for mode in (*MODES, OUTPUT, DRAWING)}
+        self._recorded = 0.0  # time of what was measured when it was last recorded [s]
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the simulation is still of the same kind."""
+        return self._kind == kind_of(self._simulation)
 
     @contextmanager
     def steps(self) -> Iterator[None]:
         """Measure a block in which the engine takes steps."""
-        before = self._now()
+        before, compiled = self._now(), compilation_seconds()
         with self._simulation._clock.measure("stepping"):
             yield
-        if self._calls:
+        if self._calls and compilation_seconds() == compiled:
             self._add(*before, *self._now())
         self._calls += 1
 
+    @contextmanager
+    def output(self, number: int = 1) -> Iterator[None]:
+        """Measure a block that writes an output to files, or prepares or follows one with `number` 0."""
+        before, compiled = self._clock(), compilation_seconds()
+        yield
+        if self._simulation.writer and compilation_seconds() == compiled:
+            self._count(OUTPUT, number, self._clock() - before, number * self._rough_output)
+
+    @contextmanager
+    def figure(self) -> Iterator[None]:
+        """Measure a block that draws the figure, and record it."""
+        before = self._clock()
+        yield
+        self._sums[DRAWING] = [1.0, self._clock() - before, FIGURE]
+        self.record()
+
     def _now(self) -> tuple[tuple[float, ...], int]:
-        """Steps, wall time [s], contact steps of awake clusters and their wall time [s]; number of contacts."""
+        """Steps, time [s], contact steps, substeps and the time [s] of both; number of contacts."""
         engine = self._simulation._engine
-        counted = (engine.steps, self._simulation._clock.stepping, *engine.awake_work)
+        counted = (engine.steps, self._clock(), *engine.awake_work)
         return counted, int(engine._state.count[CONTACTS])
 
     def _add(self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int) -> None:
-        steps, seconds, awake_steps, awake = map(sub, after, before)
+        steps, seconds, awake_steps, substeps, awake = map(sub, after, before)
         if self._rigid:
             found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
+            self._count("awake", 0, 0.0, substeps * PER_SUBSTEP)
         elif (contacts > 0) != (contacts_after > 0):
             return
         else:
             found = {"contact" if contacts else "free": (steps, seconds)}
         for mode, (number, spent) in found.items():
             rough = step_seconds(self._simulation, mode, contacts, self._long_range)
-            self._sums[mode] = [*map(add, self._sums[mode], (number, spent, number * rough))]
+            self._count(mode, number, spent, number * rough)
+
+    def _count(self, mode: str, number: float, seconds: float, rough: float) -> None:
+        self._sums[mode] = [*map(add, self._sums[mode], (number, seconds, rough))]
 
     def record(self) -> None:
-        """Add the measured speeds to the table, if there were enough steps and the table can be written."""
+        """Add what was measured to the table, if it was enough and the table can be written."""
+        least = dict.fromkeys(MODES, LEAST_STEPS) | {OUTPUT: LEAST_OUTPUTS, DRAWING: 1}
         found = {
             mode: {"ratio": spent / rough, "seconds": spent}
             for mode, (number, spent, rough) in self._sums.items()
-            if number >= LEAST_STEPS and spent >= LEAST_SECONDS
+            if number >= least[mode] and spent >= LEAST_SECONDS
         }
-        if not found:
+        spent = math.fsum(one["seconds"] for one in found.values())
+        if spent < 2.0 * self._recorded or not found:  # many short runs of one simulation write it only sometimes
             return
-        table = _read()
-        known = table.setdefault(kind_of(self._simulation), {})
+        self._recorded, table = spent, _read()
+        known = table.setdefault(self._kind, {})
         known |= {
             mode: one for mode, one in found.items() if one["seconds"] > REPLACES * known.get(mode, one)["seconds"]
         }
-        write_record(_path(), table)
+        write_record(_path(), {"units": UNITS, "kinds": table})
 
 
 def _path() -> Path:
@@ -245,15 +306,18 @@ def _path() -> Path:
 
 
 def _read() -> dict[str, dict[str, dict[str, float]]]:
-    """The table, by kind of simulation and kind of step; an unreadable or damaged one counts as empty."""
+    """The table, by kind of simulation and kind of step; one that is damaged or of other units counts as empty."""
     try:
+        content = read_record(_path())
         table = {
             str(kind): {mode: {key: float(one[key]) for key in ("ratio", "seconds")} for mode, one in found.items()}
-            for kind, found in read_record(_path()).items()
+            for kind, found in (content["kinds"] if content["units"] == UNITS else {}).items()
         }
     except (ValueError, TypeError, KeyError, AttributeError):
         return {}
     whole = all(
-        mode in MODES and 0.0 < one["ratio"] < math.inf for runs in table.values() for mode, one in runs.items()
+        mode in (*MODES, OUTPUT, DRAWING) and 0.0 < one["ratio"] < math.inf
+        for runs in table.values()
+        for mode, one in runs.items()
     )
     return table if whole else {}

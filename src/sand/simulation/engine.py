@@ -278,9 +278,9 @@ class Engine:
         return self._state.clock
 
     @property
-    def awake_work(self) -> tuple[int, float]:
-        """Contact steps within steps of bodies, and the wall time [s] of all work on awake clusters."""
-        return 0, 0.0
+    def awake_work(self) -> tuple[int, int, float]:
+        """Contact steps and substeps within steps of bodies, and the processor time [s] of all work on these."""
+        return 0, 0, 0.0
 
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""

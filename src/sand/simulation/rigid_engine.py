@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..box import Box
-from ..compiler.progress import compilation_seconds
 from ..compiler.stage import Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
@@ -60,6 +59,7 @@ from ..state.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
+    SUBSTEPS,
     TIME,
     WOKEN,
     State,
@@ -99,15 +99,15 @@ Kind = TypeVar("Kind", bound=Engine)
 
 
 def timed(method: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Count the wall time of a method, compilation excepted, as work on awake clusters."""
+    """Count the processor time of a method as work on awake clusters."""
 
     @wraps(method)
     def call(self: Any) -> Any:
-        began = time.perf_counter() - compilation_seconds()
+        began = time.thread_time()
         try:
             return method(self)
         finally:
-            self._awake_seconds += time.perf_counter() - compilation_seconds() - began
+            self._awake_seconds += time.thread_time() - began
 
     return call
 
@@ -135,7 +135,7 @@ class RigidEngine(Engine):
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
-    _awake_seconds: float = field(init=False, default=0.0)  # wall time of the work on awake clusters [s]
+    _awake_seconds: float = field(init=False, default=0.0)  # processor time of the work on awake clusters [s]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -143,9 +143,10 @@ class RigidEngine(Engine):
             self._inner_workers = self.inner._workers
 
     @property
-    def awake_work(self) -> tuple[int, float]:
+    def awake_work(self) -> tuple[int, int, float]:
         """As `Engine.awake_work`."""
-        return int(self._state.count[CONTACT_STEPS]), self._awake_seconds
+        count = self._state.count
+        return int(count[CONTACT_STEPS]), int(count[SUBSTEPS]), self._awake_seconds
 
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""

@@ -65,7 +65,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
         reached = simulation.time
         if stop is Stop.TIME_REACHED and simulation.steps < step:  # before the first step that would pass this time
             if goal == shown:
-                with simulation._clock.measure("output"):
+                with simulation._clock.measure("output"), timer.output(0):
                     stop = simulation._engine.go_to(goal, min(step, simulation.steps + 1) if updates.is_near else step)
             else:
                 stop = Stop.NONE
@@ -89,7 +89,8 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
         with_frame = done or met or frames.is_due(simulation.time, simulation.steps)
         output = with_frame or rows.is_due(simulation.time, simulation.steps)
         if output:
-            simulation._record_output(with_frame)
+            with timer.output():
+                simulation._record_output(with_frame)
             rows.advance(simulation.time, simulation.steps)
         if with_frame:
             frames.advance(simulation.time, simulation.steps)
@@ -99,7 +100,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
         due = saves.is_due(reached, simulation.steps)
         if due:
             saves.advance(reached, simulation.steps)
-        with simulation._clock.measure("output"):
+        with simulation._clock.measure("output"), timer.output(0):
             if simulation.writer:
                 simulation.writer.tick(simulation, output, due)
             call_ticks(simulation.observers, simulation)

@@ -283,7 +283,8 @@ class RunWriter:
     def draw(self, simulation: Simulation) -> None:
         """Draw the figure of the run so far."""
         if simulation.ledger.rows:
-            DISPLAYS["save figure"](simulation, self.folder / files.FIGURE)
+            with simulation._timer.figure():
+                DISPLAYS["save figure"](simulation, self.folder / files.FIGURE)
 
 
 def _stamp(path: Path) -> tuple[str, int]:

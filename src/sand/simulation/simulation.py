@@ -154,6 +154,7 @@ class Simulation(ReadOnlySettings):
         written = None if restart is None else restart[1].get("case_in_file")
         self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
         self._clock, self._exclusive = WallClock(), Exclusive()
+        self._measured: StepTimer | None = None
         self._has_begun = restart is not None
         self._clusters: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))  # engine, counts, and labels for these
         self._frame_times: list[float] = []  # [s], of all frames so far
@@ -369,9 +370,8 @@ class Simulation(ReadOnlySettings):
                         self.writer.open(self, criteria)
                 with Signals() as signals:
                     try:
-                        timer = StepTimer(self)
-                        outcome = run_loop(self, criteria, signals, timer)
-                        timer.record()
+                        outcome = run_loop(self, criteria, signals, self._timer)
+                        self._timer.record()
                     finally:
                         self._engine.restore_user_order()
             return self._close(outcome, criteria)
@@ -496,7 +496,9 @@ class Simulation(ReadOnlySettings):
         memo: dict[int, Any] = {}
         other = object.__new__(type(self))
         for name, value in vars(self).items():
-            given = None if name == "writer" else [] if name == "observers" else copy.deepcopy(value, memo)
+            given = (
+                None if name in ("writer", "_measured") else [] if name == "observers" else copy.deepcopy(value, memo)
+            )
             object.__setattr__(other, name, given)
         other._clock.end()  # of a simulation that runs, in an observer
         object.__setattr__(other, "_updating", False)
@@ -564,6 +566,13 @@ class Simulation(ReadOnlySettings):
             self._engine.begin()
             self._has_begun = True
             self._record_output()
+
+    @property
+    def _timer(self) -> StepTimer:
+        """What measures the cost of the runs; a new one after a change of forces."""
+        if self._measured is None or not self._measured.is_valid:
+            self._measured = StepTimer(self)
+        return self._measured
 
     def _log_row(self) -> dict[str, float]:
         engine = self._engine
