@@ -131,8 +131,9 @@ def stored_frame(
     if exact:
         log["particles/position"] = arrays.position.T.copy()
         log["particles/radius"] = arrays.radius.copy()
+    sides = np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)
     frame = SimpleNamespace(
-        configuration=SimpleNamespace(step=step, box=np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)),
+        configuration=SimpleNamespace(step=step, box=sides),
         particles=particles,
         bonds=SimpleNamespace(N=len(pair), types=["contact"], typeid=np.zeros(len(pair), np.uint32), group=pair),
         log=log,

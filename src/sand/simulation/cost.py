@@ -14,8 +14,6 @@ from operator import add, sub
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..compiler.cache import read_record, write_record
 from ..compiler.jit import cache_folder
 from ..contact.model import Contact
@@ -211,9 +209,7 @@ class StepTimer:
         counted = (engine.steps, self._simulation._clock.stepping, *engine.awake_work)
         return counted, int(engine._state.count[CONTACTS])
 
-    def _add(
-        self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int
-    ) -> None:
+    def _add(self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int) -> None:
         steps, seconds, awake_steps, awake = map(sub, after, before)
         if self._rigid:
             found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
