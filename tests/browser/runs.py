@@ -59,8 +59,8 @@ class Body:
     @property
     def arrays(self) -> SimpleNamespace:
         """Components first, as in a state."""
-        names = ("position", "radius", "mass", "material", "velocity", "spin", "charge", "orientation", "moment", "image")
-        return SimpleNamespace(**{name: getattr(self, name).T for name in names}, id=self.id)
+        columns = {name: values.T for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+        return SimpleNamespace(**columns)
 
     @property
     def own_units(self) -> dict[str, str]:

@@ -43,6 +43,51 @@ def test_no_cadence_changes_a_bit(tmp_path):
 
 
 @pytest.mark.compiled("dipoles")
+def test_states_that_an_observer_keeps_do_not_change():
+    """Views, arrays, groups and states of each output stay as they were, whatever of them is kept; motion is the same.
+
+    States at times of output lie in the same memory, one after another, as long as nobody holds any part of them.
+    """
+    kept: dict = {
+        "view": lambda sim: sim.grains.position,
+        "array": lambda sim: sim.state.clock,
+        "grains": lambda sim: sim.grains,
+        "contacts": lambda sim: sim.state.contacts,
+        "state": lambda sim: sim.state,
+        "nothing": lambda sim: None,
+    }
+
+    def numbers(part):
+        """Copies of the arrays in what was kept."""
+        if isinstance(part, np.ndarray):
+            return [part.copy()]
+        held = getattr(part, "arrays", part or ())
+        return [array.copy() for array in (held() if callable(held) else held)]
+
+    class Keep(sand.Observer):
+        def __init__(self, choose):
+            self.choose, self.parts, self.then, self.places = choose, [], [], []
+
+        def see(self, simulation, row):
+            self.parts.append(self.choose(simulation))
+            self.then.append(numbers(self.parts[-1]))
+            self.places.append(simulation.grains.position.ctypes.data)
+
+    ends = []
+    for name, choose in kept.items():
+        keep = Keep(choose)
+        sim = gas_simulation(frame_every="0.3 ns", observers=[keep])
+        sim.run(until="6 ns")
+        ends.append(state(sim))
+        assert len(keep.parts) == 21
+        for part, then in zip(keep.parts[1:], keep.then[1:], strict=True):
+            assert all(np.array_equal(one, other) for one, other in zip(numbers(part), then, strict=True)), name
+        # the first row is that of the start, in the regular state
+        assert len(set(keep.places[1:])) < 5 if name == "nothing" else len(set(keep.places[1:])) == 20, name
+    assert all(end == ends[0] for end in ends)
+
+
+@pytest.mark.compiled("dipoles")
 def test_a_resumed_run_continues_its_cadences(tmp_path, monkeypatch):
     """Stopped three times between two outputs: the files have the bits of those of an uninterrupted run."""
     cadence = {"frame_every": "log(5 per decade, from 10 ps)", "row_every": "500 steps", "checkpoint_every": "0.7 ns"}

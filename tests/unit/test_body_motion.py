@@ -3,22 +3,25 @@
 import math
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import gamma
 
 import sand
-from sand.analysis.body_motion import MEDIAN_ENERGY, BodyMotion, body_motion, body_temperatures
+from sand.analysis.body_motion import MEDIAN_ENERGY, BodyMotion, body_motion, body_temperatures, temperatures_of
 from sand.analysis.ledger_columns import LedgerColumns
 from sand.box import Box
 from sand.cli.main import main
 from sand.constants import BOLTZMANN
+from sand.contact.measure import BODY_ROWS, measure_bodies
 from sand.io.ledger_table import TEMPERATURES
 from sand.plotting.panels import has_temperatures
 from sand.plotting.plots import history_figure
 from sand.plotting.run_figure import run_figure
 from sand.simulation.ledger import Ledger
+from sand.state.arrays import cluster_arrays
 from sand.viewer.series import series_from_ledger
 
 BOX = Box.periodic(1e-6)
@@ -241,3 +244,39 @@ def test_a_run_of_an_earlier_version_goes_on(tmp_path, capsys):
     for words in (["info", str(folder)], ["plot", str(folder), "--what", "temperatures"]):
         assert main(words) == 0
     assert "None" not in capsys.readouterr().out
+
+
+def test_the_stage_finds_the_same_motion():
+    """The stage of a run against `body_motion`, body by body, to 1e-12: both sum a dozen numbers, in another order.
+
+    Bodies lie across the boundary. A single grain has no internal energy at all.
+    """
+    grains, pairs, _ = random_bodies()
+    sides = np.concatenate([pairs[:, 0], pairs[:, 1]])
+    order = np.argsort(sides, kind="stable")
+    contacts = SimpleNamespace(
+        pair=pairs.T,
+        formed=np.zeros(len(pairs)),
+        side=np.concatenate([2 * np.arange(len(pairs)), 2 * np.arange(len(pairs)) + 1])[order].astype(np.uint32),
+        start=np.searchsorted(sides[order], np.arange(len(grains) + 1)),
+    )
+    found, expected = np.zeros((BODY_ROWS, len(grains))), body_motion(grains, pairs, BOX)
+    parts = {"grains": grains.arrays, "contacts": contacts, "span": BOX.span}
+    count = measure_bodies.function(
+        *(parts[name] for name in measure_bodies.needs[:-1]), (found, cluster_arrays(len(grains)))
+    )
+    assert count == len(SIZES)
+    for values, exact in zip(found[:, :count], expected, strict=True):
+        assert values == pytest.approx(exact, rel=1e-12, abs=0.0)
+    assert (found[4, :count][expected.grains == 1] == 0.0).all()
+
+
+def test_temperatures_of_one_two_and_no_number():
+    """The median of an even number of energies is the mean of the middle two; NaN among them is NaN."""
+    energies = np.array([4.0, 1.0, 2.0, 8.0]) * BOLTZMANN
+    for count in (1, 2, 3, 4):
+        found = temperatures_of(energies[:count], energies[:count])
+        assert found.translation == pytest.approx(2.0 / 3.0 * energies[:count].mean() / BOLTZMANN, rel=1e-15, abs=0.0)
+        median = float(np.median(energies[:count])) / (MEDIAN_ENERGY * BOLTZMANN)
+        assert found.rotation_median == pytest.approx(median, rel=1e-15, abs=0.0)
+    assert math.isnan(temperatures_of(energies, np.full(2, np.nan)).rotation_median)

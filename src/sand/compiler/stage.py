@@ -183,7 +183,7 @@ class Stage:
             address = table.stages.get(self) or table.stages.setdefault(self, self.address(table, parameters))
             return int(call_from_python(address, table.address, table.address, block))
         call = table.calls.get(self)
-        if call is None or len(call[0]) != len(parameters) or not all(map(is_, call[0], parameters)):
+        if call is None or not _has_same_members(parameters, call[0]):
             row = np.array([*words_of(parameters), 0], np.int64)
             call = table.calls[self] = parameters, row, self.address(table, parameters), address_of(row)
         return int(call_from_python(call[2], table.address, call[3], block))
@@ -219,6 +219,12 @@ class Stage:
         words = self.function.__qualname__, "wide" if wide else "", code_digest(self.function) or ""
         entry = _renamed(entry, "_".join(word for word in words if word))
         return kernel(entry, cached=self._cached, nogil=True, wrapper=False, purpose=self.purpose)
+
+
+def _has_same_members(one: Any, other: Any) -> bool:
+    """Whether two values are tuples of one type and of the same objects."""
+    is_tuple = isinstance(one, tuple) and type(one) is type(other) and len(one) == len(other)
+    return is_tuple and all(map(is_, one, other))
 
 
 class PythonStage:

@@ -210,11 +210,11 @@ class Table:
         before = self._parts.get(name)
         if before is value and name in self._parts:
             return
-        if type(value) in NUMBERS and type(before) is type(value) and value == before:
-            if value or type(value) is not float:  # 0 and −0 differ
-                return
+        is_number = type(value) in NUMBERS and type(before) is type(value)
+        if is_number and value == before and (value or type(value) is not float):  # 0.0 and −0.0 differ
+            return
         self._parts[name] = value
-        if COMPILED and type(value) in NUMBERS and type(before) is type(value):
+        if COMPILED and is_number:
             self._rows[name] = np.array([value], np.float64 if type(value) is float else np.int64)
             self._addresses[self._names[name]] = address_of(self._rows[name])
         elif COMPILED and _is_group_like(value, before):  # the same types: only addresses and lengths are new

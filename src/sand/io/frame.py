@@ -130,10 +130,9 @@ def stored_frame(
         log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
     if exact:
         log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
+    sides = np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)
     frame = SimpleNamespace(
-        configuration=SimpleNamespace(
-            step=step, box=np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)
-        ),
+        configuration=SimpleNamespace(step=step, box=sides),
         particles=particles,
         bonds=SimpleNamespace(N=len(pair), types=["contact"], typeid=np.zeros(len(pair), np.uint32), group=pair),
         log=log,

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from ..errors import BadInput, warn
+from ..errors import BadInput, FilesFailed, warn
 from .damage import set_aside
-from .run_folder import LEDGER, SUMMARY, append_text, read_json, read_text, replace_file
+from .run_folder import LEDGER, SUMMARY, read_json, read_text, replace_file
 
 ROUNDING = 1e-14
 """Difference between a total and the sum of its columns, relative to the sum of their magnitudes, due to rounding."""
@@ -23,7 +24,9 @@ Row = dict[str, float]
 
 
 class LedgerFile:
-    """Writer of ledger.csv: one row per entry, numbers to full precision; opens the file for each row.
+    """Writer of ledger.csv: one row per entry, numbers to full precision.
+
+    The file stays open until `close`, between rows too; each row is handed to the system at once.
 
     Parameters
     ----------
@@ -41,13 +44,28 @@ class LedgerFile:
         text = _text(self.columns, given)
         replace_file(path, text.encode())
         self._rows, self._digest = len(given), hashlib.sha256(text.encode())
+        self._file: io.FileIO | None = None
 
     def append(self, row: Row) -> None:
         """Append a row.  Raises FilesFailed."""
-        line = _line(self.columns, row)
-        append_text(self.path, line)
+        line = _line(self.columns, row).encode()
+        try:
+            if self._file is None:
+                self._file = io.FileIO(self.path, "ab")
+            rest = line
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self.close()
+            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
         self._rows += 1
-        self._digest.update(line.encode())
+        self._digest.update(line)
+
+    def close(self) -> None:
+        """Close the file, so that Windows can move or remove it; the next row opens it again."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
     def described(self) -> dict[str, int | str]:
         """Number of rows and digest of the text written, for summary.json."""
@@ -55,7 +73,7 @@ class LedgerFile:
 
 
 def _line(columns: Sequence[str], row: Row) -> str:
-    return ",".join(repr(row[name]) for name in columns) + "\n"
+    return ",".join(map(repr, map(row.__getitem__, columns))) + "\n"
 
 
 def _text(columns: Sequence[str], rows: Iterable[Row]) -> str:

@@ -206,9 +206,16 @@ class TrajectoryWriter:
 
 def _open_gsd(path: Path, mode: str) -> Any:
     """Open a GSD file that is closed before the program ends, because GSD's objects cannot close it afterwards."""
+    import gsd.fl
     import gsd.hoomd
 
-    file = gsd.hoomd.open(str(path), mode)
+    if mode == "w":
+        gsd.hoomd.open(str(path), mode).close()
+        mode = "r+"
+    try:  # GSD writes notes about each chunk, which nobody reads but which take time
+        file = gsd.hoomd.HOOMDTrajectory(gsd.fl.GSDFile(str(path), mode, None, None, None, debug=False))
+    except TypeError:  # earlier versions have no such option
+        file = gsd.hoomd.open(str(path), mode)
     file.closes_at_exit = weakref.finalize(file, _close_gsd, file.file)
     return file
 

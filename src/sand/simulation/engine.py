@@ -653,11 +653,10 @@ class Engine:
 
     def _energies_at_grains(self, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
         """As `energies_at_grains`, in arrays that the next call uses again."""
-        table, state, columns = self._current_table(self.state), self.state, self.columns()
-        if self._shares.keys() != set(columns) or any(
-            len(share) != len(state.grains) for share in self._shares.values()
-        ):
-            self._shares = {name: np.zeros(len(state.grains)) for name in columns}
+        state, columns = self.state, dict.fromkeys(self.columns())
+        table, count = self._current_table(state), len(state.grains)
+        if self._shares.keys() != columns.keys() or any(len(share) != count for share in self._shares.values()):
+            self._shares = {name: np.zeros(count) for name in columns}
         shares = self._shares
         for share in shares.values():
             share[:] = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -44,7 +44,7 @@ WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
 def log_row(
     state: State,
     lost: Sequence[float],
-    labels: np.ndarray,
+    clusters: Mapping[str, float],
     bodies: BodyMotion,
     of_contacts: Sequence[float],
     forces: dict[str, float],
@@ -56,8 +56,8 @@ def log_row(
     ----------
     lost : Sequence[float]
         Losses [J] up to this time, see `Engine.losses`.
-    labels : ndarray
-        Cluster of each grain (N,).
+    clusters : Mapping[str, float]
+        Numbers of clusters, see `cluster_numbers`.
     bodies : BodyMotion
         Motion of the bodies.
     of_contacts : Sequence[float]
@@ -68,7 +68,7 @@ def log_row(
         Columns of the walls, see `walls.wall_columns`.
     """
     energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *of_contacts]
-    counts = count_row(state, labels)
+    counts = count_row(state, clusters)
     row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, lost, strict=True))
@@ -81,26 +81,24 @@ def log_row(
     return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
-def labels_in(state: State) -> np.ndarray:
-    """Cluster of each grain (N,)."""
-    return labels_of(len(state.grains), state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64))
+def cluster_numbers(state: State) -> dict[str, float]:
+    """Number of clusters, their mean size and the largest size."""
+    pairs = state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64)
+    sizes = np.bincount(labels_of(len(state.grains), pairs))
+    return {"clusters": len(sizes), "mean_cluster_size": mean_size(sizes), "largest_cluster": int(sizes.max())}
 
 
-def count_row(state: State, labels: np.ndarray) -> dict[str, float]:
-    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, given their labels."""
-    contacts = int(state.count[CONTACTS])
-    sizes = np.bincount(labels)
+def count_row(state: State, clusters: Mapping[str, float]) -> dict[str, float]:
+    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, which are given."""
     at_rest = state.at_rest
     return {
         "step": state.steps,
         "time": state.time,
-        "contacts": contacts,
+        "contacts": int(state.count[CONTACTS]),
         "made": int(state.count[MADE]),
         "moved": int(state.count[SLIPPED]),
         "broken": int(state.count[BROKEN]),
-        "clusters": len(sizes),
-        "mean_cluster_size": mean_size(sizes),
-        "largest_cluster": int(sizes.max()),
+        **clusters,
         **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
     }
 

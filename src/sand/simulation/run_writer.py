@@ -149,8 +149,10 @@ class RunWriter:
             self._case = case_of(simulation, *self._ends)
 
     def release(self) -> None:
-        """Release the lock of the folder; `open` takes it again."""
+        """Close the ledger and release the lock of the folder; the next row and `open` take them again."""
         Signals.saving.discard(self)
+        if self._ledger is not None:
+            self._ledger.close()
         if self._lock is not None:
             self._lock.release()
             self._lock = None

@@ -34,7 +34,7 @@ from .cost import StepTimer
 from .displays import DISPLAYS
 from .driven import read_driven
 from .exclusive import Exclusive, exclusive
-from .ledger import Ledger, count_row, kinetic_energies, labels_in, log_row
+from .ledger import Ledger, cluster_numbers, count_row, kinetic_energies, log_row
 from .observers import Observer
 from .outcome import Outcome, Result
 from .run_loop import run_loop
@@ -156,7 +156,8 @@ class Simulation(ReadOnlySettings):
         self._clock, self._exclusive = WallClock(), Exclusive()
         self._measured: StepTimer | None = None
         self._has_begun = restart is not None
-        self._clusters: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))  # engine, counts, and labels for these
+        # engine, counts of contacts, and numbers of clusters for these
+        self._clusters: tuple[Any, Any, dict[str, float]] = (None, None, {})
         self._frame_times: list[float] = []  # [s], of all frames so far
         self._chosen: Chosen | None = None  # cadence of frames of the present or last run, if the user gives none
         self._met: tuple[Any, int] | None = None  # the condition that was met, and the step
@@ -576,22 +577,22 @@ class Simulation(ReadOnlySettings):
 
     def _log_row(self) -> dict[str, float]:
         engine = self._engine
-        found = engine.losses().tolist(), self._labels(), engine.body_motion()
+        found = engine.losses().tolist(), self._cluster_numbers(), engine.body_motion()
         energies = engine.contact_energies(), engine.force_energies()
         row = log_row(self.state, *found, *energies, wall_columns(self._walls))
         return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
 
-    def _labels(self) -> np.ndarray:
-        """Cluster of each grain (N,), found anew after contacts have formed or broken."""
+    def _cluster_numbers(self) -> dict[str, float]:
+        """Numbers of clusters, found anew after contacts have formed or broken."""
         state, engine = self.state, self._engine
         key = (len(state.grains), *(int(state.count[k]) for k in (CONTACTS, MADE, BROKEN)))
         if self._clusters[:2] != (engine, key):
-            self._clusters = engine, key, labels_in(state)
+            self._clusters = engine, key, cluster_numbers(state)
         return self._clusters[2]
 
     def _count_row(self) -> dict[str, float]:
         """The part of a row of the ledger that needs no energies."""
-        return count_row(self.state, self._labels())
+        return count_row(self.state, self._cluster_numbers())
 
     def _record_output(self, with_frame: bool = True) -> None:
         """Add a row to the ledger, write it, with a frame or without, and call the observers."""
