@@ -198,7 +198,7 @@ def _type_check(part: Any) -> _TypeCheck | None:
     if origin is tuple and inner and inner[-1] is not Ellipsis:
         what = "whole numbers" if set(inner) == {int} else "values"
         words = f"{_WORDS.get(len(inner), len(inner))} {what}"
-        return _TypeCheck(lambda v: not isinstance(v, str) and _length(v) == len(inner), words)
+        return _TypeCheck(lambda v: not isinstance(v, str) and _length(v) == len(inner) and _is_iterable(v), words)
     if origin in _LISTS:
         return _TypeCheck(lambda v: not isinstance(v, (str, bytes)) and _is_iterable(v), "a list")
     anything = origin is Any or not isinstance(origin, type) or origin in (float, complex, object)
@@ -282,7 +282,7 @@ def _read(
     if isinstance(value, type) and f"{_public_name(value)}(…)" in constructors:
         raise BadInput(f"{name} = {_public_name(value)} is a class; write {_public_name(value)}(…) to make one")
     if "a path" in words:  # paths may also be given as text
-        words.remove("text")
+        words = [word for word in words if word != "text"]
     wanted = f" must be {' or '.join(words)}" if words else f"; give {' or '.join(constructors)}"
     raise BadInput(f"{name} = {shown(value)}{wanted}")
 

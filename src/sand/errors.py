@@ -12,8 +12,10 @@ from typing import Any
 
 LONGEST = 80
 """Characters of a value that a message shows."""
+MOST_ERRORS = 100
+"""Errors of one input that are described; the others are counted."""
 LONGEST_WORD, LONGEST_LINE = 300, 1500
-"""Characters of a word, which may be the path of a file, and of a line of a message; the middle of longer ones is cut."""
+"""Characters of a word, which may be a path, and of a line of a message; the middle of longer ones is cut."""
 
 
 class SandError(Exception):
@@ -111,9 +113,9 @@ class ErrorCollector:
             return instead
 
     def done(self) -> None:
-        """Raise BadInput if there were errors."""
+        """Raise BadInput if there were errors; it describes the first `MOST_ERRORS`."""
         if self.problems:
-            raise BadInput(self.problems)
+            raise BadInput(first_problems(self.problems[:MOST_ERRORS], len(self.problems), "errors"))
 
 
 def first_problems(problems: Sequence[str], total: int, kind: str) -> list[str]:
@@ -145,7 +147,7 @@ def shown(value: Any) -> str:
 
 
 def refuse_other(frame: Any, *names: str, called: str = "frame") -> None:
-    """Raise BadInput if `frame`, the argument of this name, lacks one of these attributes."""
+    """Raise BadInput if `frame`, the argument of this name, is a class or lacks one of these attributes."""
     if isinstance(frame, type) or not all(hasattr(frame, name) for name in names):
         raise BadInput(f"{called} = {shown(frame)}; give a frame, such as sand.open(DIR).frames[-1]")
 

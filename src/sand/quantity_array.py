@@ -9,7 +9,6 @@ import numpy as np
 from .errors import BadInput
 from .units import has_unit_within, si_array
 
-
 WRITERS = {
     np.copyto: (1, "src"),
     np.put: (2, "v"),

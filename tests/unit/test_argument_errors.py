@@ -1,16 +1,21 @@
 """Wrong arguments in scripts: each raises BadInput with one line that says what to write. Nothing is compiled."""
 
+import operator
 import pickle
 import sys
 import warnings
 from types import SimpleNamespace
 
 import numpy as np
+import pint
 import pytest
 
 import sand
+from sand.config.case import check_case
 from sand.io.bodies import write_body
 from sand.io.run_folder import LEDGER, TRAJECTORY
+from sand.io.trajectory import read_frames
+from sand.quantity_array import QuantityArray
 from sand.simulation.contact_table import ContactTable
 
 
@@ -22,6 +27,7 @@ def namespace(tmp_path_factory):
     run = tmp_path_factory.mktemp("run")
     write_body(run / "body.gsd", grains)
     (run / "body.gsd").rename(run / TRAJECTORY)
+    body = read_frames(run / TRAJECTORY)[0]
     (run / LEDGER).write_text("step,total\n0,1.0\n")
     table = ContactTable.__new__(ContactTable)
     table.update({"pair": np.zeros((0, 2), int), "overlap": np.zeros(0)})
@@ -35,6 +41,7 @@ def namespace(tmp_path_factory):
         "table": table,
         "frame": SimpleNamespace(radius=np.ones(2), pair=np.zeros((0, 2), int)),
         "run": str(run),
+        "body": body,
     }
 
 
@@ -222,6 +229,28 @@ EXPERIMENTS = [
     ("sand.analysis.fits.power_law([1, 2], [1, 2], groups=[1])", "groups must have one entry for each"),
     ("sand.analysis.quantities.measured(frame, np.ones(2))", "name = array of shape (2,) must be text"),
     ("sand.analysis.frame_statistics.aggregate_statistics(7)", "frame = 7; give a frame"),
+    ("sand.analysis.internal_motion.internal_kinetic_energy(None, [], sand.Box.open())", "grains = None; give a frame"),
+    ("sand.analysis.quantities.quantity('radius', frame=sand.Grains)", "frame = sand.Grains; give a frame"),
+    ("sand.analysis.fits.jackknife(None, [1.0, 2.0])", "estimate = None is not a number"),
+    ("sand.analysis.fits.jackknife((1, 2, 3), [1.0, 2.0])", "estimate = (1, 2, 3) must be one number"),
+    (
+        "sand.analysis.fractal.ensemble_dimension([5, 20], [1, 3], 1.0, least=10**5000)",
+        "least = <int> is a whole number",
+    ),
+    ("sand.analysis.clusters.percolating_clusters(x, [[1], [2]], sand.Box.open())", "pairs"),
+    ("sand.theory.growth.aggregate_moment('1 A m^2', 10, exponent=1e30)", "exponent = 1e+30 must be at most 1"),
+    ("sand.theory.smoluchowski.log_sizes(100, per_decade=1e30)", "per_decade = 1e+30 must be at most 3000"),
+    ("sand.setup.gas(5, '1 um', classes=np.zeros((1, 3)), **iron)", "classes.0 = array of shape (3,); give a table"),
+    ("sand.setup.aggregates.rest_distance('iron', 0)", "radius = 0.0 must be above 0 m"),
+    ("sand.setup.turned(grains, 7)", "rotation = 7; give a scipy.spatial.transform.Rotation"),
+    ("sand.setup.from_frame(body, materials={1: 2})", "unknown material 'silica'"),
+    ("sand.setup.from_frame(body, materials={'silica': 2})", "material = 2; give a sand.Material"),
+    ("sim.run(until=sand.Grains)", "until = sand.Grains is not a quantity in s"),
+    ("sim.run(stop=sand.Grains)", "stop = sand.Grains is not a condition"),
+    ("sim.ledger[{}]", "there is no column {}"),
+    ("sand.plotting.render.still.still_picture(body, view=[[1, 2], [3]])", "three finite numbers, not all 0"),
+    ("sand.plotting.render.still.still_picture(body, field={1: 2})", "field = {1: 2} is not a quantity in T"),
+    ("sand.plotting.render.still.still_picture(body, size=['a', 300])", "size 'a'x300: width and height"),
 ]
 
 SLIPS = [*ARGUMENTS, *SIMULATIONS, *SETUPS, *EXPERIMENTS]
@@ -235,6 +264,62 @@ def test_a_wrong_argument_gives_one_line(namespace, slip, line):
         eval(slip, dict(namespace))
     assert line in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+LONG, REGISTRY = "x" * 5000, pint.UnitRegistry()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: sand.Grains([[0, 0, 0]], 1e-8, LONG),
+        lambda: sand.Grains([[0, 0, 0]], 1e-8, "iron", **{LONG: 1}),
+        lambda: sand.Contact(slip="a b " * 2000),
+        lambda: getattr(sand, LONG),
+        lambda: check_case({"run": {"until": LONG, "stop": LONG}, LONG: {}, "grains": {"material": LONG}}, "case"),
+    ],
+)
+def test_long_values_are_shortened(make):
+    """Values of thousands of characters lose their middle in messages; the end of the message stays."""
+    with pytest.raises(sand.BadInput) as caught:
+        make()
+    assert all(len(problem) <= 1500 and not problem.endswith("…") for problem in caught.value.problems)
+    path = "/" + "folder/" * 40 + "file.toml"
+    assert path in str(sand.BadInput(f"there is no file {path}"))
+
+
+def test_many_wrong_entries_are_counted():
+    """Of thousands of wrong entries of a list the first hundred are described."""
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Driven(["x"] * 5000)
+    assert len(caught.value.problems) == 101 and caught.value.problems[-1] == "… and 4900 more errors"
+
+
+@pytest.mark.parametrize("value", [np.full((2, 3), 1.0) * REGISTRY.Unit("cm/s"), "1 cm/s"])
+def test_what_numpy_writes_into_a_change_keeps_its_unit(value):
+    """Functions of NumPy that write into an array of a change convert text and quantities, or refuse them."""
+    everywhere = np.ones((2, 3), bool)
+    writers = [
+        lambda array, value: np.copyto(array, value),
+        lambda array, value: np.copyto(dst=array, src=value),
+        lambda array, value: np.putmask(array, everywhere, value),
+        lambda array, value: np.place(array, everywhere, value),
+        lambda array, value: np.put(array, range(6), value),
+        lambda array, value: array.put(range(6), value),
+        lambda array, value: operator.iadd(array, value),
+        lambda array, value: operator.isub(array, f"-{value}" if isinstance(value, str) else -value),
+    ]
+    for write in writers:
+        array = QuantityArray(np.zeros((2, 3)), "m/s", "velocity")
+        write(array, value)
+        assert np.asarray(array) == pytest.approx(np.full((2, 3), 0.01), rel=1e-15, abs=0.0)
+        with pytest.raises(sand.BadInput, match=r"velocity = .* is not a quantity in m/s"):
+            write(array, "1 m" if isinstance(value, str) else value * REGISTRY.s)
+    array.fill("2 mm/s")
+    np.copyto(plain := np.zeros((2, 3)), array)
+    assert (plain == 2e-3).all()
+    array += [1.0, 2.0, 3.0]
+    assert array[0].tolist() == [1.002, 2.002, 3.002]
 
 
 @pytest.mark.parametrize(

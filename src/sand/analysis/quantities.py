@@ -162,8 +162,7 @@ def names_of(frame: Any) -> tuple[str, ...]:
 @checked
 def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES, frame: Any = None) -> Quantity:
     """Look up a quantity by name, also an own quantity of `frame`. Raises BadInput if it is not one of `allowed`."""
-    if frame is not None:
-        refuse_other(frame, "own")
+    refuse_other(frame)
     own: Any = getattr(frame, "own", {})
     if name in own:
         return Quantity(name, own.units[name], own_label(name), "sequential", _floats(lambda f: f.own[name]), "")

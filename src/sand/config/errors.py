@@ -9,12 +9,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import BadInput, did_you_mean, first_problems
+from ..errors import MOST_ERRORS, BadInput, did_you_mean, first_problems
 from .sections import INTEGRATORS
 
 Model = TypeVar("Model", bound=BaseModel)
-MOST_ERRORS = 100
-"""Errors of a case file that are described, each of which takes milliseconds; the others are counted."""
 RENAMED = {"path": "file"}
 """Keys of earlier versions, with their present names."""
 
@@ -43,7 +41,7 @@ def validate(model: type[Model], content: Any, name: str, problems: Iterable[str
     try:
         case = model.model_validate(content)
     except ValidationError as error:
-        slips = error.errors()
+        slips = error.errors()  # each description takes milliseconds
         lines = [line for slip in slips[:MOST_ERRORS] for line in _messages(slip, model, table)]
         found += first_problems(lines, len(lines) + max(len(slips) - MOST_ERRORS, 0), "errors")
     if found or case is None:

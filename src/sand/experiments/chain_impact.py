@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..integrate.verlet import Verlet
@@ -22,7 +22,7 @@ from ..material import Material
 from ..setup.aggregates import chain, rest_distance
 from ..setup.encounters import combined
 from ..simulation.simulation import Simulation
-from ..units import si
+from ..units import si, whole_number
 
 SHAPES = ("T", "branched", "bent", "straight", "ring", "broken", "gone")
 PERPENDICULAR = 30.0
@@ -153,6 +153,7 @@ def first_touch(
     material: Material | str, radius: float, place: float, grains: int = 8
 ) -> tuple[np.ndarray, list[list[int]]]:
     """Positions (N + 1, 3) [m] and contacts of hit-and-stick: the projectile stays at its first contact."""
+    whole_number(grains, "grains", 1, MOST_GRAINS)
     pitch = rest_distance(material, radius)
     position = np.zeros((grains + 1, 3))
     position[:grains, 0] = pitch * (np.arange(grains) - (grains - 1))

@@ -38,9 +38,14 @@ def rest_distance(material: Material | str, radius: float) -> float:
         Material or name of a preset.
     radius : float
         Radius of both grains [m] > 0.
+
+    Raises
+    ------
+    BadInput
+        If the radius is not above 0, or so small that the grains would overlap by more than half of it.
     """
-    one = as_material(material)
-    pair = grain_set_of(np.full(2, radius), [one, one])
+    one, size = as_material(material), si(radius, "m", "radius", above=0.0)
+    pair = grain_set_of(np.full(2, size), [one, one])
     return float(rest_distances(pair, np.array([0]), np.array([1]))[0])
 
 

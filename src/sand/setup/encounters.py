@@ -38,7 +38,9 @@ def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
 
 @checked
 def turned(body: Grains, rotation: Rotation) -> Grains:
-    """Rotate a body about its centre of mass, with velocities, spins and moments."""
+    """Rotate a body about its centre of mass, with velocities, spins and moments.  Raises BadInput for no rotation."""
+    if isinstance(rotation, type) or not hasattr(rotation, "apply"):
+        raise BadInput(f"rotation = {shown(rotation)}; give a scipy.spatial.transform.Rotation")
     middle = np.average(body.position, axis=0, weights=body.mass)
     # SciPy does not accept read-only views
     velocity, spin, moment = (rotation.apply(v.copy()) for v in (body.velocity, body.spin, body.moment))

@@ -13,7 +13,6 @@ import hmac
 import os
 import re
 import secrets
-import socket
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
@@ -36,6 +35,8 @@ CLOSING_TIME = 1.0
 """Longest time [s] until a connection that gives way to a new one has ended."""
 CLIENT_TIMEOUT = 30.0
 """Seconds after which the connection of a silent client is closed."""
+BOTH_WAYS = 2
+"""`socket.SHUT_RDWR`."""
 HEADERS = {
     "Content-Security-Policy": SERVED_POLICY,
     "X-Content-Type-Options": "nosniff",
@@ -84,7 +85,7 @@ class Server(ThreadingHTTPServer):
         script, styles = read_bundle()
         self.dataset, self.token = dataset, secrets.token_urlsafe(24)
         self._free_connections = threading.BoundedSemaphore(MAX_CONNECTIONS)
-        self._awaited: dict[socket.socket, None] = {}  # connections whose client is awaited, the longest first
+        self._awaited: dict[Any, None] = {}  # connections whose client is awaited, the longest first
         self._lock = threading.Lock()
         self._files = {
             "": ("text/html; charset=utf-8", served_page(dataset.name)),
@@ -138,10 +139,10 @@ class Server(ThreadingHTTPServer):
             if slowest is not None:
                 del self._awaited[slowest]
                 with contextlib.suppress(OSError):
-                    slowest.shutdown(socket.SHUT_RDWR)
+                    slowest.shutdown(BOTH_WAYS)
         return slowest is not None
 
-    def await_client(self, connection: socket.socket, awaited: bool) -> None:
+    def await_client(self, connection: Any, awaited: bool) -> None:
         """Note that a connection waits from now on for its client, to send a request or to take an answer, or not."""
         with self._lock:
             self._awaited.pop(connection, None)

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...arguments import checked
-from ...errors import BadInput, warn
+from ...errors import BadInput, shown, warn
 from .cross_sections import rows_by_flight, run_flights, seed_of
 from .encounters import Flight
 from .flight_driver import HIT
@@ -116,6 +116,9 @@ def probability_map(
     BadInput
         If there is no set-up, or a number of cells or flights is below 1.
     """
+    flights = list(flights)
+    if wrong := [one for one in flights if not isinstance(one, Flight)]:
+        raise BadInput(f"flights: {shown(wrong[0])} is no set-up; make each with sand.experiments.scattering.flight(…)")
     if not flights or cells < 1 or per_cell < 1:
         raise BadInput(f"a map needs speeds, and cells = {cells} and per_cell = {per_cell} of at least 1")
     most = [min(HEADROOM * one.scales.widest, one.distance if one.sphere else np.inf) for one in flights]

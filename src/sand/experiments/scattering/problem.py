@@ -15,7 +15,7 @@ from ...forces.vectors import three
 from ...grains import Grains
 from ...material import Material, as_material
 from ...theory.magnetic import thermal_speed
-from ...units import format_quantity, in_unit, is_word, si
+from ...units import dimensions, format_quantity, in_unit, is_word, si
 from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 
@@ -214,7 +214,7 @@ def _spin(value: Any, heat: float) -> tuple[Any, float]:
         if SPINS[value] > 0.0 and not heat > 0.0:
             raise BadInput(f"spin = {value!r} needs a temperature above 0 K")
         return (REST, REST), SPINS[value] * BOLTZMANN * heat
-    parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) else [value]
+    parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) and dimensions(value) else [value]
     if len(parts) == 2:
         return (three(parts[0], "rad/s", "spin of the projectile"), three(parts[1], "rad/s", "spin of the target")), 0.0
     both = three(value, "rad/s", "spin")

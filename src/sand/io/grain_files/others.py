@@ -73,7 +73,7 @@ def read_by_ase(path: Path) -> GrainFile:
     ImportError
         If ASE is not installed.
     """
-    import ase.io  # type: ignore[import-not-found]
+    import ase.io
 
     try:
         if (form := ase.io.formats.filetype(str(path), guess=True)) not in BY_ASE:

@@ -13,7 +13,8 @@ from PIL import Image
 from ...analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, quantity
 from ...arguments import checked
 from ...box import Box
-from ...errors import BadInput, did_you_mean, refuse_other
+from ...errors import BadInput, did_you_mean, refuse_other, shown
+from ...units import in_unit, si_array
 from ..run_figure import DPI, RunFigure, figure_bytes, headline
 from ..style import DARK_BACKGROUND, LIGHT_BACKGROUND, MUTED, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, plot_style, rgb
 from .colouring import ColourKey, coloured
@@ -128,7 +129,9 @@ def still_picture(
     """
     refuse_other(frame, "radius", "pair", "box")
     towards_eye = check_picture_options(colour, bonds, view, size, dpi, frame)
-    flux_density = None if field is None else np.asarray(field, dtype=np.float64)
+    flux_density = None if field is None else si_array(field, "T", "field")
+    if flux_density is not None and (flux_density.shape != (3,) or not np.isfinite(flux_density).all()):
+        raise BadInput(f"field = {shown(field)} must be three finite numbers [T]")
     scene = make_scene(frame, frame.pair, frame.box, whole)
     scene, key = _coloured_scene(scene, frame, colour, flux_density, arrows)
     if cluster is not None:
@@ -176,8 +179,11 @@ def check_picture_options(
                 quantity(name, allowed, of)
             except BadInput as error:
                 problems += error.problems
-    if not all(MIN_SIZE <= length <= MAX_SIZE for length in size):
-        problems.append(f"size {size[0]}x{size[1]}: width and height must be from {MIN_SIZE} to {MAX_SIZE} pixels")
+    width, height = tuple(size)
+    if not all(isinstance(v, (int, np.integer)) and MIN_SIZE <= v <= MAX_SIZE for v in (width, height)):
+        problems.append(
+            f"size {shown(width)}x{shown(height)}: width and height must be from {MIN_SIZE} to {MAX_SIZE} pixels"
+        )
     if not LEAST_DPI <= dpi <= MOST_DPI:
         problems.append(f"dpi {dpi}: pixels per inch must be from {LEAST_DPI} to {MOST_DPI}")
     direction: Any = VIEWS.get(view) if isinstance(view, str) else view
@@ -189,12 +195,12 @@ def check_picture_options(
                 f"there is no view '{view}'; {did_you_mean(view, tuple(VIEWS))} (or three numbers: '1,-2,0.5')"
             )
     if direction is not None:
-        numbers = np.asarray(direction, dtype=np.float64)
-        if numbers.shape != (3,) or not np.isfinite(numbers).all() or not 0.0 < np.linalg.norm(numbers) < 1e9:
-            problems.append(f"view {view!r}: the direction to the eye must be three finite numbers, not all 0")
+        direction = in_unit(direction, "1")
+        if np.shape(direction) != (3,) or not 0.0 < np.linalg.norm(direction) < 1e9:
+            problems.append(f"view {shown(view)}: the direction to the eye must be three finite numbers, not all 0")
     if problems:
         raise BadInput(problems)
-    return None if direction is None else np.asarray(direction, dtype=np.float64)
+    return None if direction is None else np.asarray(direction)
 
 
 def _coloured_scene(
