@@ -59,7 +59,18 @@ class Body:
     @property
     def arrays(self) -> SimpleNamespace:
         """Components first, as in a state."""
-        names = ("position", "radius", "mass", "material", "velocity", "spin", "charge", "orientation", "moment", "image")
+        names = (
+            "position",
+            "radius",
+            "mass",
+            "material",
+            "velocity",
+            "spin",
+            "charge",
+            "orientation",
+            "moment",
+            "image",
+        )
         return SimpleNamespace(**{name: getattr(self, name).T for name in names}, id=self.id)
 
     @property
