@@ -373,9 +373,9 @@ def test_a_python_function_as_a_stage():
         clock[0] += parameters[0] * block
         return 7 * block
 
-    @stage("a call")
-    def calls(table, program, count):
-        return call_stage(program, 0, table, count[0])
+    @stage("a call", parts=("program", "count"))
+    def calls(s):
+        return call_stage(s, 0, s.count[0])
 
     table = table_of(clock=np.zeros(1), count=np.array([3]), program=None)
     program = Program(table, {0: (PythonStage(in_python), (2.0,))}, 1)

@@ -154,10 +154,11 @@ def test_external_forces_add_up():
         table, own = engine._current_table(engine.state), engine.state.grains.arrays
         program = build_program(engine._components, parameters, table)
         own.force[...] = own.torque[...] = 0.0
-        add_external_loads(table["scratch"], parameters.forces, program, table, 0.0)
+        table.set("program", program)
+        add_external_loads(table, 0.0)
         assert own.force[:, 0] == pytest.approx((0, 0, -3 * 9.81 * weighs), rel=1e-6, abs=0.0)
         assert own.torque[:, 0] == pytest.approx((0, -0.5 * turns, 0), rel=1e-6, abs=0.0)
-        energy = sum_external(table["scratch"], parameters.forces, program, table, 0.0, ENERGY)
+        energy = sum_external(table, 0.0, ENERGY)
         assert energy == pytest.approx(3 * 9.81 * 2 * weighs, rel=1e-6, abs=0.0)
 
 

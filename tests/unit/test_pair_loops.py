@@ -59,14 +59,24 @@ def test_blocked_sums_of_several_forces(order, monkeypatch):
         count, queue = sim.state.count.copy(), new_task_queue(40, 0)
         queue.words[SHARED] = shared
         build_verlet_list(arrays, far, count, span, sim._engine.parameters.search)
-        table = table_of(grains=arrays, long_range=far, span=span)
+        numbers_of = ForceNumbers(len(names), 0)
+        parts = {
+            "grains": arrays,
+            "long_range": far,
+            "span": span,
+            "count": count,
+            "queue": queue,
+            "forces": numbers_of,
+        }
+        table = table_of(**parts, program=None)
         stages = {
             FIRST_FORCE + PAIR_STAGES * k + SUM: (pair_force_stages(sums[name], False)[SUM], numbers[name])
             for k, name in enumerate(names)
         }
         program = Program(table, stages, FIRST_FORCE + PAIR_STAGES * len(names))
         far.force[...] = far.torque[...] = 1.0  # of an earlier sum
-        sum_pair_forces(far, count, ForceNumbers(len(names), 0), queue, program, table)
+        table.set("program", program)
+        sum_pair_forces(table)
         return far.force, far.torque, arrays.field
 
     once, alone = loads(order, False), [loads([name], False) for name in order]

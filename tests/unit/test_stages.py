@@ -113,10 +113,10 @@ def copy_parts(given, copies, matrix, flag, whole, real, nested, settings, param
     return settings.most
 
 
-@stage("a test", cached=False)
-def call_other(table, program, block):
+@stage("a test", cached=False, parts=("program",))
+def call_other(s, block):
     """Call stage 1 of a program."""
-    return call_stage(program, 1, table, block)
+    return call_stage(s, 1, block)
 
 
 @pytest.mark.compiled("small")
@@ -230,11 +230,11 @@ def check_values(values):
     return values.size
 
 
-@stage("a test", cached=False)
-def check_twice(table, program, values, block):
+@stage("a test", cached=False, parts=("program", "values"))
+def check_twice(s, block):
     """Call `check_values` through a program; the second statement is not reached after an error."""
-    number = call_stage(program, 2, table, block)
-    values[0] = 99.0
+    number = call_stage(s, 2, block)
+    s.values[0] = 99.0
     return number
 
 
@@ -301,9 +301,9 @@ def two_stages():
     def impossible(values):
         return values.no_such_attribute
 
-    @stage("a test", cached=False)
-    def call_one(table, program, which):
-        return call_stage(program, which, table, 0) if has_stage(program, which) else -1
+    @stage("a test", cached=False, parts=("program", "which"))
+    def call_one(s):
+        return call_stage(s, s.which, 0) if has_stage(s, s.which) else -1
 
     values = np.array([1.0])
     table = table_of(values=values, program=None, which=3)
@@ -370,13 +370,13 @@ def count_calls(found):
     found[0] += 1.0
     return 0
 
-@stage("a test", cached=False)
-def wait_and_call(table, program, found):
+@stage("a test", cached=False, parts=("program", "found"))
+def wait_and_call(s):
     x = 0.0
     for k in range(50_000_000):
         x = 0.5 * x + np.sqrt(x + k)
-    found[1] = x
-    return call_stage(program, 0, table, 0)
+    s.found[1] = x
+    return call_stage(s, 0, 0)
 
 table = Table(("program", "found"))
 found = np.zeros(2)
@@ -445,10 +445,10 @@ def add_up(group, settings, parameters, block):
     group.values[0, block] = total
     return group.values.size
 
-@stage("a test")
-def add_up_twice(table, program, group):
-    number = call_stage(program, 1, table, 0) + call_stage(program, 1, table, 2)
-    return number if has_stage(program, 1) and not has_stage(program, 0) else -1
+@stage("a test", parts=("program", "group"))
+def add_up_twice(s):
+    number = call_stage(s, 1, 0) + call_stage(s, 1, 2)
+    return number if has_stage(s, 1) and not has_stage(s, 0) else -1
 
 table = Table(("group", "settings", "program"))
 values = np.arange(12.0).reshape(2, 6) ** 3

@@ -13,7 +13,7 @@ from numba.core.datamodel import models
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, register_model
 
-__all__ = ["WORD", "Group", "array_of"]
+__all__ = ["WORD", "Group", "array_of", "constant_word"]
 
 WORD = ir.IntType(64)
 
@@ -54,11 +54,11 @@ def _array_of_group(context: Any, builder: Any, group: Group, value: Any, name: 
     _, dtype, axes = group.fields[number]
     first = len(group.fields) + sum(axes for _, _, axes in group.fields[:number])
     row = builder.extract_value(value, len(group.fields))
-    shape = [_constant_word(builder, row, first + axis) for axis in range(axes)]
+    shape = [constant_word(builder, row, first + axis) for axis in range(axes)]
     return array_of(context, builder, dtype, builder.extract_value(value, number), shape)
 
 
-def _constant_word(builder: Any, row: Any, index: int) -> Any:
+def constant_word(builder: Any, row: Any, index: int) -> Any:
     """A word of a row, which does not change during a call of a stage, so that loops need not read it again."""
     word = builder.load(builder.gep(row, [ir.Constant(WORD, index)]))
     word.set_metadata("invariant.load", builder.module.add_metadata([]))

@@ -117,32 +117,32 @@ class Program:
             raise KeyboardInterrupt from error
 
 
-def has_stage(program: Any, number: int) -> bool:
-    """Whether a program has a stage of this number."""
-    return number in program.stages
+def has_stage(s: Any, number: int) -> bool:
+    """Whether the program among the parts `s` has a stage of this number."""
+    return number in s.program.stages
 
 
-def call_stage(program: Any, number: int, table: Any, block: int) -> int:
-    """Call a stage of a program; returns its integer.  An exception in it is passed on."""
-    stage, parameters = program.stages[number]
-    return int(stage.in_python(table, parameters, block))
+def call_stage(s: Any, number: int, block: int) -> int:
+    """Call a stage of the program among the parts `s`; returns its integer.  An exception in it is passed on."""
+    stage, parameters = s.program.stages[number]
+    return int(stage.in_python(s, parameters, block))
 
 
 def _entry_call(context: Any, builder: Any, signature: Any, given: Any) -> tuple[Any, Any, Any]:
     """Call a stage of a program; whether the entry is ready afterwards, status, and result."""
-    program, number, table, block = given
+    program, number, s, block = given
     entries = context.make_array(signature.args[0])(context, builder, program).data
     first = builder.mul(number, ir.Constant(WORD, 3))
 
     def word(k: int) -> Any:
         return builder.load(builder.gep(entries, [builder.add(first, ir.Constant(WORD, k))]))
 
-    status, result = status_and_result(context, builder, word(0), table, word(1), block)
+    status, result = status_and_result(context, builder, word(0), s, word(1), block)
     return builder.icmp_signed("==", word(2), ir.Constant(WORD, READY)), status, result
 
 
 @intrinsic
-def _call_entry(typing_context: Any, program: Any, number: Any, table: Any, block: Any) -> Any:
+def _call_entry(typing_context: Any, program: Any, number: Any, s: Any, block: Any) -> Any:
     """Call a stage of a program; an exception is passed on."""
 
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -153,42 +153,42 @@ def _call_entry(typing_context: Any, program: Any, number: Any, table: Any, bloc
             context.call_conv.return_status_propagate(builder, status)
         return result
 
-    return types.int64(program, types.int64, table, types.int64), generate
+    return types.int64(program, types.int64, s, types.int64), generate
 
 
 @intrinsic
-def _entry_fails(typing_context: Any, program: Any, number: Any, table: Any, block: Any) -> Any:
+def _entry_fails(typing_context: Any, program: Any, number: Any, s: Any, block: Any) -> Any:
     """Call a stage of a program; whether it raised an exception."""
 
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         ready, status, _ = _entry_call(context, builder, signature, given)
         return builder.or_(builder.not_(ready), status.is_error)
 
-    return types.boolean(program, types.int64, table, types.int64), generate
+    return types.boolean(program, types.int64, s, types.int64), generate
 
 
-def stage_fails(program: Any, number: int, table: Any, block: int) -> bool:
-    """Call a stage of a program; returns whether it raised an exception, which is not passed on."""
-    call_stage(program, number, table, block)  # without the compiler there is one thread, which may raise it
+def stage_fails(s: Any, number: int, block: int) -> bool:
+    """Call a stage as `call_stage` does; returns whether it raised an exception, which is not passed on."""
+    call_stage(s, number, block)  # without the compiler there is one thread, which may raise it
     return False
 
 
 @overload(stage_fails)
-def _compiled_stage_fails(program, number, table, block):
-    def call(program, number, table, block):
-        return _entry_fails(program, number, table, block)
+def _compiled_stage_fails(s, number, block):
+    def call(s, number, block):
+        return _entry_fails(s.program, number, s, block)
 
     return call
 
 
 @overload(has_stage)
-def _compiled_has_stage(program, number):
-    return lambda program, number: program[number, 0] != 0
+def _compiled_has_stage(s, number):
+    return lambda s, number: s.program[number, 0] != 0
 
 
 @overload(call_stage)
-def _compiled_call_stage(program, number, table, block):
-    def call(program, number, table, block):
-        return _call_entry(program, number, table, block)
+def _compiled_call_stage(s, number, block):
+    def call(s, number, block):
+        return _call_entry(s.program, number, s, block)
 
     return call

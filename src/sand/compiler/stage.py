@@ -1,7 +1,8 @@
 """Stages: compiled functions that are called by address, with the state of a simulation in a table of addresses.
 
 A stage is an ordinary loop whose arguments are *parts* of the state by name, such as `grains`, `contacts` or `clock`.
-It is compiled and cached alone, for the types of these parts only.  Its compiled form takes three numbers:
+It is compiled and cached alone, for the types of these parts only.  A stage that calls others takes all parts that they
+need as one argument `s`, with `s.grains` and so on.  The compiled form of a stage takes three numbers:
 
     stage(table, parameters, block) → int64
 
@@ -29,12 +30,13 @@ from .native_calls import call_from_python
 from .processor import FAST_512_BIT, SLOW_GATHER, target
 from .progress import making_code
 from .table import (
+    ALL_PARTS,
     ANY_TABLE,
     BLOCK,
     PARAMETERS,
     SPECIAL,
-    TABLE,
     Address,
+    Parts,
     Table,
     address_of,
     kind_of,
@@ -104,17 +106,20 @@ class Stage:
     Attributes
     ----------
     function : callable
-        The function; its arguments are names of parts, `table`, `block` or `parameters`.  One that calls other stages
-        takes the `table`.
+        The function; its arguments are names of parts, `s`, `block` or `parameters`.  One that calls other stages takes
+        `s`, whose attributes are the parts.
     needs : tuple of str
         Names of its arguments.
+    parts : tuple of str
+        Names of the parts for whose types it is compiled: arguments, and attributes of `s`.
     purpose : str
         What it computes.
     """
 
-    def __init__(self, function: Callable, purpose: str, long_vectors: bool, cached: bool):
+    def __init__(self, function: Callable, purpose: str, long_vectors: bool, cached: bool, parts: tuple[str, ...]):
         self.function, self.purpose, self._long_vectors, self._cached = function, purpose, long_vectors, cached
         self.needs = tuple(inspect.signature(function).parameters)
+        self.parts = *(name for name in self.needs if name not in SPECIAL), *parts
         self._compiled, self._compiler = dict[Any, Any](), None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Stage:
@@ -134,7 +139,7 @@ class Stage:
 
     def _key(self, table: Table, parameters: Any) -> Any:
         """What identifies the types of these parts."""
-        return structure_of(parameters), *(table.key(name) for name in self.needs if name not in SPECIAL)
+        return structure_of(parameters), *map(table.key, self.parts)
 
     def _to_compile(self, table: Table, parameters: Any) -> tuple[Any, Any]:
         """Numba's dispatcher, and the signature for the types of these parts."""
@@ -151,7 +156,7 @@ class Stage:
 
     def in_python(self, table: Table, parameters: Any, block: int) -> Any:
         """Call the function without the compiler."""
-        special = {TABLE: table, BLOCK: block, PARAMETERS: parameters}
+        special = {ALL_PARTS: table, BLOCK: block, PARAMETERS: parameters}
         return self.function(*(special[name] if name in special else table[name] for name in self.needs))
 
     def prepare(self, table: Table, parameters: Any = (), block: int = 0) -> Callable[[], int]:
@@ -188,20 +193,22 @@ class Stage:
             call = table.calls[self] = parameters, row, self.address(table, parameters), address_of(row)
         return int(call_from_python(call[2], table.address, call[3], block))
 
-    @staticmethod
-    def _part(name: str, table: Table, own: Any) -> tuple[Any, Any]:
+    def _part(self, name: str, table: Table, own: Any) -> tuple[Any, Any]:
         """Index in the table, or name, and type of one argument; `own` is the structure of the parameters."""
         if name == PARAMETERS:
             return name, kind_of(own)
-        if name in SPECIAL:
-            return name, ANY_TABLE if name == TABLE else types.int64
+        if name == BLOCK:
+            return name, types.int64
+        if name == ALL_PARTS:
+            places = ((part, *table.place(part)) for part in self.parts)
+            return name, Parts(tuple((part, index, kind_of(structure)) for part, index, structure in places))
         index, structure = table.place(name)
         return index, kind_of(structure)
 
     def _dispatcher(self) -> Any:
         """What numba makes of the function, for any types."""
         # stages that this one calls may change its arrays
-        calls_stages = TABLE in self.needs
+        calls_stages = ALL_PARTS in self.needs
         wide = self._long_vectors and FAST_512_BIT
         keep = long_arrays_do_not_overlap if wide else arrays_do_not_overlap
         keep, body = (is_not_inlined, caller(self.function)) if calls_stages else (keep, loop(self.function))
@@ -251,7 +258,7 @@ class PythonStage:
 
     def in_python(self, table: Table, parameters: Any, block: int) -> Any:
         """Call the function."""
-        special = {TABLE: table, BLOCK: block, PARAMETERS: parameters}
+        special = {ALL_PARTS: table, BLOCK: block, PARAMETERS: parameters}
         return self.function(*(special[name] if name in special else table[name] for name in self.needs))
 
     def run(self, table: Table, parameters: Any = (), block: int = 0) -> int:
@@ -259,7 +266,9 @@ class PythonStage:
         return int(self.in_python(table, parameters, block))
 
 
-def stage(purpose: str, *, long_vectors: bool = False, cached: bool = True) -> Callable[[Callable], Stage]:
+def stage(
+    purpose: str, *, long_vectors: bool = False, cached: bool = True, parts: tuple[str, ...] = ()
+) -> Callable[[Callable], Stage]:
     """Decorator that makes a `Stage` of a function whose arguments are names of parts.
 
     Parameters
@@ -271,5 +280,7 @@ def stage(purpose: str, *, long_vectors: bool = False, cached: bool = True) -> C
     cached : bool, optional
         False to compile it in each process.  Otherwise it is cached on disk, code with formulas of the user by their
         source; code with other objects of the user is never cached.
+    parts : tuple of str, optional
+        Of a stage with the argument `s`: names of its attributes.
     """
-    return lambda function: Stage(function, purpose, long_vectors, cached)
+    return lambda function: Stage(function, purpose, long_vectors, cached, parts)

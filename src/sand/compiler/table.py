@@ -13,13 +13,14 @@ import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
 from numba import from_dtype, types
 from numba.core.datamodel import models
-from numba.extending import intrinsic, register_model
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
 
 from .entries import described
-from .groups import WORD, Group, array_of
+from .groups import WORD, Group, array_of, constant_word
 from .jit import COMPILED
 
-__all__ = ["ANY_TABLE", "BLOCK", "PARAMETERS", "SPECIAL", "TABLE", "Address", "Table", "address_of", "kind_of"]
+__all__ = ["ALL_PARTS", "BLOCK", "PARAMETERS", "SPECIAL", "Address", "Parts", "Table", "address_of", "kind_of"]
 __all__ += ["open_parts", "structure_of", "words_of"]
 
 ROW = WORD.as_pointer()
@@ -36,6 +37,46 @@ class Address(types.Opaque):
 register_model(Address)(models.OpaqueModel)
 
 
+class Parts(types.Opaque):
+    """Type of the argument `s` of stages, the address of a table: its parts are attributes, read where they are used.
+
+    Parameters
+    ----------
+    parts : tuple
+        (name, index in the table, type) of each part that the stage names.
+    """
+
+    def __init__(self, parts: tuple[tuple[str, int, Any], ...]):
+        self.parts = {name: (index, kind) for name, index, kind in parts}
+        super().__init__(
+            name=f"Parts({', '.join(f'{name}: {index} {described(kind)}' for name, index, kind in parts)})"
+        )
+
+
+register_model(Parts)(models.OpaqueModel)
+
+
+@infer_getattr
+class _PartsAttribute(AttributeTemplate):
+    key = Parts
+
+    def generic_resolve(self, s: Parts, name: str) -> Any:
+        """The type of one part."""
+        return s.parts[name][1] if name in s.parts else None
+
+
+@lower_getattr_generic(Parts)
+def _part_of_table(context: Any, builder: Any, s: Parts, value: Any, name: str) -> Any:
+    index, kind = s.parts[name]
+    return _row_of_part(context, builder, value, index).value(kind)
+
+
+def _row_of_part(context: Any, builder: Any, table: Any, index: int) -> _Row:
+    """The row of a part of a table."""
+    address = constant_word(builder, builder.bitcast(table, ROW), index)
+    return _Row(context, builder, builder.inttoptr(address, ROW))
+
+
 class _Row:
     """Reader of one row of 64-bit words."""
 
@@ -45,7 +86,7 @@ class _Row:
     def word(self) -> Any:
         """The next word, as an integer."""
         self.at += 1
-        return self.builder.load(self.builder.gep(self.pointer, [ir.Constant(WORD, self.at - 1)]))
+        return constant_word(self.builder, self.pointer, self.at - 1)
 
     def value(self, kind: Any) -> Any:
         """The next value of a numba type."""
@@ -69,12 +110,13 @@ class _Row:
         return self.builder.inttoptr(self.word(), self.context.get_value_type(types.CPointer(dtype)))
 
 
-TABLE, BLOCK = "table", "block"
-"""Arguments of a stage that are not parts: the table itself, to be passed to `call_stage`, and the block."""
+ALL_PARTS, BLOCK = "s", "block"
+"""Arguments of a stage that are not parts: the table, whose parts are attributes of `s`, and the block."""
 PARAMETERS = "parameters"
 """Argument of a stage that is opened from its own parameters."""
-SPECIAL = TABLE, BLOCK, PARAMETERS
+SPECIAL = ALL_PARTS, BLOCK, PARAMETERS
 ANY_TABLE = Address("any")
+"""Type of a table in the signature of a stage."""
 
 
 @intrinsic
@@ -83,18 +125,16 @@ def open_parts(typing_context: Any, table: Any, parameters: Any, block: Any) -> 
     kinds = types.Tuple.from_types([kind for _, kind in table.parts])
 
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        row = builder.bitcast(given[0], ROW)
         found = []
         for index, kind in table.parts:
-            if index == TABLE:
+            if index == ALL_PARTS:
                 found.append(given[0])
             elif index == BLOCK:
                 found.append(given[2])
             elif index == PARAMETERS:
                 found.append(_Row(context, builder, builder.bitcast(given[1], ROW)).value(kind))
             else:
-                address = builder.load(builder.gep(row, [ir.Constant(WORD, index)]))
-                found.append(_Row(context, builder, builder.inttoptr(address, ROW)).value(kind))
+                found.append(_row_of_part(context, builder, given[0], index).value(kind))
         return context.make_tuple(builder, kinds, found)
 
     return kinds(table, parameters, block), generate
@@ -254,6 +294,13 @@ class Table:
 
     def __getitem__(self, name: str) -> Any:
         return self._parts[name]
+
+    def __getattr__(self, name: str) -> Any:
+        """A part, as in compiled code."""
+        try:
+            return self.__dict__["_parts"][name]
+        except KeyError:
+            raise AttributeError(name) from None
 
     def index(self, name: str) -> int:
         """Index of a part in the table."""

@@ -23,7 +23,7 @@ from .event_location import NEVER, first_contact_time
 from .flight import finish_flight_step
 from .force_calls import sum_external
 from .force_stages import ENERGY
-from .parts import Stop
+from .parts import DRIVER_PARTS, Stop
 from .runge_kutta import (
     GROW,
     begin_step,
@@ -49,14 +49,14 @@ MAX_ATTEMPTS = 30
 
 
 @caller
-def refresh_verlet_list(grains, long_range, span, search, program, table):
+def refresh_verlet_list(s):
     """Rebuild the Verlet list once a quarter of its margin is used up; returns a `Stop`."""
-    if not search.listed:
+    if not s.search.listed:
         return Stop.NONE.value
-    moved = largest_displacement(grains, long_range.anchor, span)
+    moved = largest_displacement(s.grains, s.long_range.anchor, s.span)
     # written so that an anchor at infinity (no list yet) counts as stale
-    if not moved <= STALE_FRACTION * search.margin:
-        return call_stage(program, VERLET_LIST, table, 0)
+    if not moved <= STALE_FRACTION * s.search.margin:
+        return call_stage(s, VERLET_LIST, 0)
     return Stop.NONE.value
 
 
@@ -77,79 +77,69 @@ def first_trial(grains, contacts, long_range, clock, criteria, stride):
 
 
 @caller
-def adaptive_step(
-    grains, contacts, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work, criteria,
-    flight_limits, forces, queue, program, table, until, shorten
-):  # fmt: skip
+def adaptive_step(s):
     """Take one Runge–Kutta step; returns its length [s], whether it ends at a contact, and a Stop.
 
     A step whose first trial would pass `until` [s] is not taken, or, with `shorten`, tried up to this time.
     """
-    begin, stride = clock[TIME], flight_limits.stride
-    dt = proposed = first_trial(grains, contacts, long_range, clock, criteria, stride)
+    begin, stride = s.clock[TIME], s.flight_limits.stride
+    dt = proposed = first_trial(s.grains, s.contacts, s.long_range, s.clock, s.criteria, stride)
     if not dt > 0.0:
         return 0.0, False, Stop.NOT_FINITE
-    if begin + dt > until:
-        if not shorten:
+    if begin + dt > s.until:
+        if not s.shorten:
             return 0.0, False, Stop.TIME_REACHED
-        dt = proposed = until - begin
-    begin_step(grains, runge_kutta, scratch, external_work, forces, program, table, begin)
+        dt = proposed = s.until - begin
+    begin_step(s, begin)
     growth, attempts = GROW, 0
     while True:
         if attempts == 0 and begin + dt == begin:
-            set_stage(grains, runge_kutta, 0, 0.0)
-            sum_loads(grains, long_range, count, scratch, forces, queue, program, table, begin)
+            set_stage(s.grains, s.runge_kutta, 0, 0.0)
+            sum_loads(s, begin)
             return 0.0, False, Stop.NO_STEP
         error, limiting_grain = math.inf, -1
-        if try_step(
-            grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt,
-            stride
-        ):  # fmt: skip
-            error, limiting_grain = error_ratio(runge_kutta, dt, flight_limits)
+        if try_step(s, begin, dt, stride):  # fmt: skip
+            error, limiting_grain = error_ratio(s.runge_kutta, dt, s.flight_limits)
         if not error <= 1.0:
-            count[GRAIN1], count[GRAIN2] = limiting_grain, -1
-            count[REJECTED] += 1
+            s.count[GRAIN1], s.count[GRAIN2] = limiting_grain, -1
+            s.count[REJECTED] += 1
             dt *= step_size_factor(error, ORDER)
             growth, attempts = 1.0, 0
             continue
         if attempts == 0:
             proposed = dt * min(growth, step_size_factor(error, ORDER))
-        contact_time = first_contact_time(grains, long_range, runge_kutta, span, search, dt) if settings.on else NEVER
+        contact_time = (
+            first_contact_time(s.grains, s.long_range, s.runge_kutta, s.span, s.search, dt) if s.settings.on else NEVER
+        )
         if contact_time >= 1.0 or attempts == MAX_ATTEMPTS:
-            clock[FLIGHT] = min(proposed, criteria.longest)
+            s.clock[FLIGHT] = min(proposed, s.criteria.longest)
             return dt, contact_time <= 1.0, Stop.NONE
         dt *= contact_time
         attempts += 1
 
 
-@stage("the adaptive time steps")
-def free_flight(
-    table, program, grains, contacts, pair_list, long_range, runge_kutta, clock, count, lost, span, settings, search,
-    external_work, criteria, flight_limits, forces, queue, scratch, until, shorten
-):  # fmt: skip
+@stage(
+    "the adaptive time steps",
+    parts=(*DRIVER_PARTS, "contacts", "runge_kutta", "settings", "flight_limits"),
+)
+def free_flight(s):
     """Take one Runge–Kutta step and log the work of external forces; returns a `Stop`."""
-    stop = refresh_verlet_list(grains, long_range, span, search, program, table)
+    stop = refresh_verlet_list(s)
     if stop != Stop.NONE.value:
         return stop
     before = 0.0
-    if external_work.time_dependent:
-        before = sum_external(scratch, forces, program, table, clock[TIME], ENERGY)
-    dt, in_contact, reason = adaptive_step(
-        grains, contacts, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work,
-        criteria, flight_limits, forces, queue, program, table, until, shorten
-    )  # fmt: skip
+    if s.external_work.time_dependent:
+        before = sum_external(s, s.clock[TIME], ENERGY)
+    dt, in_contact, reason = adaptive_step(s)
     if reason != Stop.NONE:
         return reason.value
-    normalise_all(grains)
-    work = work_of(runge_kutta, dt) if external_work.time_dependent else 0.0
-    finish_flight_step(
-        grains, pair_list, clock, count, lost, scratch, span, external_work, forces, program, table, dt, in_contact,
-        before, work
-    )  # fmt: skip
-    if external_work.position_dependent:
-        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, clock[TIME])
+    normalise_all(s.grains)
+    work = work_of(s.runge_kutta, dt) if s.external_work.time_dependent else 0.0
+    finish_flight_step(s, dt, in_contact, before, work)
+    if s.external_work.position_dependent:
+        sum_loads(s, s.clock[TIME])
     if in_contact:
         return Stop.NONE.value
-    if has_stage(program, GAS_KICK):
-        call_stage(program, GAS_KICK, table, 0)
+    if has_stage(s, GAS_KICK):
+        call_stage(s, GAS_KICK, 0)
     return Stop.NONE.value

@@ -52,30 +52,27 @@ class FlightSettings:
 
 
 @caller
-def finish_flight_step(
-    grains, pair_list, clock, count, lost, scratch, span, external_work, forces, program, table, dt, in_contact, before,
-    work
-):  # fmt: skip
+def finish_flight_step(s, dt, in_contact, before, work):
     """Advance the time by dt [s], log the work of external forces, wrap positions, count the step.
 
     `before` is the energy of the time-dependent external forces at the start of the step, `work` what they did on the
     grains in it [J]. A step that ends at a contact (`in_contact`) is counted after the second half of a Verlet step of
     0 s, which forms the contact with new lists, new loads and a new choice of the step.
     """
-    invalidate_speeds(pair_list)
-    invalidate_skins(pair_list)
-    clock[TIME] += dt
-    if external_work.time_dependent:
-        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], ENERGY) - before + work
-    if external_work.position_dependent:
-        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], WRAPPING)
-    wrap_all(grains, span)
-    clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
+    invalidate_speeds(s.pair_list)
+    invalidate_skins(s.pair_list)
+    s.clock[TIME] += dt
+    if s.external_work.time_dependent:
+        s.lost[OUTSIDE] -= sum_external(s, s.clock[TIME], ENERGY) - before + work
+    if s.external_work.position_dependent:
+        s.lost[OUTSIDE] -= sum_external(s, s.clock[TIME], WRAPPING)
+    wrap_all(s.grains, s.span)
+    s.clock[STEP] = s.clock[CYCLE] = s.clock[LEFT] = 0.0
     if in_contact:
-        pair_list.anchor[0, 0] = math.inf
-        clock[FLIGHT] = 0.0
-        count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
-        count[STAGE] = 1
+        s.pair_list.anchor[0, 0] = math.inf
+        s.clock[FLIGHT] = 0.0
+        s.count[CHECKED] = s.count[STEP_INCREASES] = s.count[STEPS] - INCREASE_INTERVAL
+        s.count[STAGE] = 1
     else:
-        clock[STEP] = dt
-        count[STEPS] += 1
+        s.clock[STEP] = dt
+        s.count[STEPS] += 1

@@ -26,58 +26,58 @@ from .task_queue import SHARED, for_each_block, share_blocks
 
 
 @caller
-def add_external_loads(scratch, forces, program, table, time):
+def add_external_loads(s, time):
     """Add forces and torques of all external forces at a time [s] to the loads of the grains."""
-    scratch[LOAD_TIME] = time
-    for k in range(forces.external):
-        call_stage(program, FIRST_FORCE + PAIR_STAGES * forces.pair + EXTERNAL_STAGES * k + LOADS, table, 0)
+    s.scratch[LOAD_TIME] = time
+    for k in range(s.forces.external):
+        call_stage(s, FIRST_FORCE + PAIR_STAGES * s.forces.pair + EXTERNAL_STAGES * k + LOADS, 0)
 
 
 @caller
-def sum_external(scratch, forces, program, table, time, quantity):
+def sum_external(s, time, quantity):
     """Sum ENERGY, POWER or WRAPPING of all external forces at a time [s] over all grains."""
-    scratch[LOAD_TIME] = time
-    scratch[EXTERNAL] = 0.0
-    for k in range(forces.external):
-        call_stage(program, FIRST_FORCE + PAIR_STAGES * forces.pair + EXTERNAL_STAGES * k + WORK, table, quantity)
-    return scratch[EXTERNAL]
+    s.scratch[LOAD_TIME] = time
+    s.scratch[EXTERNAL] = 0.0
+    for k in range(s.forces.external):
+        call_stage(s, FIRST_FORCE + PAIR_STAGES * s.forces.pair + EXTERNAL_STAGES * k + WORK, quantity)
+    return s.scratch[EXTERNAL]
 
 
 @caller
-def sum_pair_forces(long_range, count, forces, queue, program, table):
+def sum_pair_forces(s):
     """Sum the loads of all pair forces over all pairs."""
-    clear_long_range_loads(long_range)
-    for k in range(forces.pair):
+    clear_long_range_loads(s.long_range)
+    for k in range(s.forces.pair):
         number = FIRST_FORCE + PAIR_STAGES * k + SUM
         for r in range(number + ROUND, number + ROUND + ROUNDS):
-            if has_stage(program, r):
-                for_each_block(program, r, table, queue.words, call_stage(program, r, table, BEGIN))
-        if queue.words[SHARED] == 1:
-            blocks = call_stage(program, number, table, BEGIN)
-            share_blocks(program, number, table, queue.words, blocks)
-            call_stage(program, number, table, END)
+            if has_stage(s, r):
+                for_each_block(s, r, call_stage(s, r, BEGIN))
+        if s.queue.words[SHARED] == 1:
+            blocks = call_stage(s, number, BEGIN)
+            share_blocks(s, number, blocks)
+            call_stage(s, number, END)
         else:
-            call_stage(program, number, table, WHOLE)
-    count[LONG_RANGE_SUMS] += 1
+            call_stage(s, number, WHOLE)
+    s.count[LONG_RANGE_SUMS] += 1
 
 
 @caller
-def add_pairs_in_contact(forces, program, table):
+def add_pairs_in_contact(s):
     """Add the pair forces of grains in contact to the contact loads."""
-    for k in range(forces.pair):
-        call_stage(program, FIRST_FORCE + PAIR_STAGES * k + IN_CONTACT, table, 0)
+    for k in range(s.forces.pair):
+        call_stage(s, FIRST_FORCE + PAIR_STAGES * k + IN_CONTACT, 0)
 
 
 @caller
-def subtract_pairs_in_contact(forces, program, table):
+def subtract_pairs_in_contact(s):
     """Subtract the pair forces of grains in contact from the sums over all pairs."""
-    for k in range(forces.pair):
-        call_stage(program, FIRST_FORCE + PAIR_STAGES * k + REASSIGN, table, SUBTRACT)
+    for k in range(s.forces.pair):
+        call_stage(s, FIRST_FORCE + PAIR_STAGES * k + REASSIGN, SUBTRACT)
 
 
 @caller
-def update_pairs_in_contact(contacts, count, forces, program, table):
+def update_pairs_in_contact(s):
     """Update the sums over all pairs for new and broken contacts."""
-    for k in range(forces.pair):
-        call_stage(program, FIRST_FORCE + PAIR_STAGES * k + REASSIGN, table, UPDATE)
-    mark_every_step(contacts, count)
+    for k in range(s.forces.pair):
+        call_stage(s, FIRST_FORCE + PAIR_STAGES * k + REASSIGN, UPDATE)
+    mark_every_step(s.contacts, s.count)

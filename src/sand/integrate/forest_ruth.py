@@ -45,7 +45,7 @@ from .flight import FlightSettings, finish_flight_step
 from .force_calls import sum_external
 from .force_stages import ENERGY, POWER
 from .motion import kick
-from .parts import Stop
+from .parts import DRIVER_PARTS, Stop
 from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads
 from .stages import EXPLAIN, GAS_KICK
 from .step_control import StepCriteria, is_close, is_past, quantise_step
@@ -115,41 +115,41 @@ def fastest_approach(grains, long_range, span, search):
 
 
 @loop
-def longest_free_step(grains, long_range, span, search, criteria, limits, forces):
+def longest_free_step(s):
     """Longest step [s] that the motion allows; 0 if the state is not finite.
 
-    Positions, spins and loads change on the time scale τ = 1/√(largest rate of any pair or grain); `limits.part` of it
+    Positions, spins and loads change on the time scale τ = 1/√(largest rate of any pair or grain); `flight_limits.part` of it
     is allowed.  Such rates follow from loads and velocities alone, whatever the force.
     """
     rate = fastest = fastest_spin = 0.0
     finite = True
-    for i in range(grains.mass.size):
-        v, w = load(grains.velocity, i), load(grains.spin, i)
+    for i in range(s.grains.mass.size):
+        v, w = load(s.grains.velocity, i), load(s.grains.spin, i)
         finite = finite and dot(v, v) < math.inf and dot(w, w) < math.inf
         fastest, fastest_spin = max(fastest, dot(v, v)), max(fastest_spin, dot(w, w))
-        rate = max(rate, turning_rate_of(grains, criteria, i))
-    if forces.pair > 0:
-        rate = max(rate, fastest_approach(grains, long_range, span, search))
+        rate = max(rate, turning_rate_of(s.grains, s.criteria, i))
+    if s.forces.pair > 0:
+        rate = max(rate, fastest_approach(s.grains, s.long_range, s.span, s.search))
     if not finite or not rate < math.inf:
         return 0.0
-    step = criteria.longest
-    step = min(step, limits.part / math.sqrt(rate)) if rate > 0.0 else step
+    step = s.criteria.longest
+    step = min(step, s.flight_limits.part / math.sqrt(rate)) if rate > 0.0 else step
     step = min(step, MAX_TURN / math.sqrt(fastest_spin)) if fastest_spin > 0.0 else step
-    return min(step, STRIDE_FRACTION * limits.stride / math.sqrt(fastest)) if fastest > 0.0 else step
+    return min(step, STRIDE_FRACTION * s.flight_limits.stride / math.sqrt(fastest)) if fastest > 0.0 else step
 
 
 @loop
-def choose_free_step(grains, long_range, clock, count, span, search, criteria, limits, forces):
+def choose_free_step(s):
     """The next step [s], a power of two of a second, or that of the user; 0 if the state is not finite.
 
     A change of the step changes the energy, so a step that a periodic motion needs once per period is kept.
     """
-    wanted, level = longest_free_step(grains, long_range, span, search, criteria, limits, forces), clock[FLIGHT]
-    if not wanted > 0.0 or limits.fixed > 0.0:
-        return limits.fixed if wanted > 0.0 else 0.0
+    wanted, level = longest_free_step(s), s.clock[FLIGHT]
+    if not wanted > 0.0 or s.flight_limits.fixed > 0.0:
+        return s.flight_limits.fixed if wanted > 0.0 else 0.0
     if wanted < 2.0 * level:
-        count[NEEDED] = count[STEPS]
-    held = (count[STEPS] - count[NEEDED]) * limits.part
+        s.count[NEEDED] = s.count[STEPS]
+    held = (s.count[STEPS] - s.count[NEEDED]) * s.flight_limits.part
     return quantise_step(level, wanted, level == 0.0 or held >= HOLD)
 
 
@@ -171,9 +171,7 @@ def drift_all(grains, runge_kutta, dt):
 
 
 @caller
-def try_free_step(
-    grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt, stride
-):
+def try_free_step(s, begin, dt, stride):
     """Drifts and kicks of one step; returns whether no grain moved farther than `stride`, and the work on grains [J].
 
     The work of time-dependent external forces in a kick of τ seconds is τ (F·v + M·ω), with the mean of v and ω before
@@ -181,18 +179,18 @@ def try_free_step(
     """
     work = 0.0
     for k in range(KICKS.size):
-        if not drift_all(grains, runge_kutta, DRIFTS[k] * dt) <= stride * stride:
+        if not drift_all(s.grains, s.runge_kutta, DRIFTS[k] * dt) <= stride * stride:
             return False, 0.0
         time = begin + TIMES[k] * dt
-        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, time)
+        sum_loads(s, time)
         power = 0.0
-        if external_work.time_dependent:
-            power += sum_external(scratch, forces, program, table, time, POWER)
-        kick(grains, KICKS[k] * dt)
-        if external_work.time_dependent:
-            power += sum_external(scratch, forces, program, table, time, POWER)
+        if s.external_work.time_dependent:
+            power += sum_external(s, time, POWER)
+        kick(s.grains, KICKS[k] * dt)
+        if s.external_work.time_dependent:
+            power += sum_external(s, time, POWER)
         work += 0.5 * KICKS[k] * dt * power
-    return drift_all(grains, runge_kutta, DRIFTS[KICKS.size] * dt) <= stride * stride, work
+    return drift_all(s.grains, s.runge_kutta, DRIFTS[KICKS.size] * dt) <= stride * stride, work
 
 
 @loop
@@ -213,89 +211,75 @@ def store_paths(grains, runge_kutta, dt):
 
 
 @caller
-def step_to_contact(
-    grains, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work, flight_limits,
-    forces, queue, program, table
-):  # fmt: skip
+def step_to_contact(s):
     """Take one step; returns its length [s], whether it ends at a contact, the work on grains [J], and a Stop.
 
     A step in which a grain moves too far is repeated with half its length, a step in which two grains touch from its
     start up to the first contact.  Pairs that are not listed cannot touch, because at no kick, and so nowhere in the
     step, a grain is farther than the stride from its start (see `first_contact_time`).
     """
-    begin, dt, stride = clock[TIME], clock[FLIGHT], flight_limits.stride
-    store_start(grains, runge_kutta)
+    begin, dt, stride = s.clock[TIME], s.clock[FLIGHT], s.flight_limits.stride
+    store_start(s.grains, s.runge_kutta)
     attempts = 0
     while True:
         if attempts == 0 and begin + dt == begin:
-            sum_loads(grains, long_range, count, scratch, forces, queue, program, table, begin)
+            sum_loads(s, begin)
             return 0.0, False, 0.0, Stop.NO_STEP
-        possible, work = try_free_step(
-            grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt,
-            stride
-        )  # fmt: skip
+        possible, work = try_free_step(s, begin, dt, stride)
         contact_time = NEVER
-        if possible and settings.on:
-            store_paths(grains, runge_kutta, dt)
-            contact_time = first_contact_time(grains, long_range, runge_kutta, span, search, dt)
+        if possible and s.settings.on:
+            store_paths(s.grains, s.runge_kutta, dt)
+            contact_time = first_contact_time(s.grains, s.long_range, s.runge_kutta, s.span, s.search, dt)
         if possible and (contact_time >= 1.0 or attempts == MAX_ATTEMPTS):
             return dt, contact_time <= 1.0, work, Stop.NONE
-        set_stage(grains, runge_kutta, 0, 0.0)
+        set_stage(s.grains, s.runge_kutta, 0, 0.0)
         if possible:
             dt *= contact_time
             attempts += 1
         else:
-            count[REJECTED] += 1
+            s.count[REJECTED] += 1
             dt *= 0.5
             attempts = 0
 
 
-@stage("the steps of fourth order")
-def symplectic_flight(
-    table, program, grains, contacts, pair_list, long_range, runge_kutta, clock, count, lost, span, settings, search,
-    external_work, criteria, flight_limits, forces, queue, scratch, until, last, shorten
-):  # fmt: skip
+@stage(
+    "the steps of fourth order",
+    parts=(*DRIVER_PARTS, "contacts", "runge_kutta", "settings", "flight_limits"),
+)
+def symplectic_flight(s):
     """Take one step and log the work of external forces; returns a `Stop`."""
-    stop = refresh_verlet_list(grains, long_range, span, search, program, table)
+    stop = refresh_verlet_list(s)
     if stop != Stop.NONE.value:
         return stop
-    if not clock[FLIGHT] > 0.0:
-        clock[FLIGHT] = choose_free_step(
-            grains, long_range, clock, count, span, search, criteria, flight_limits, forces
-        )
-    if not clock[FLIGHT] > 0.0:
+    if not s.clock[FLIGHT] > 0.0:
+        s.clock[FLIGHT] = choose_free_step(s)
+    if not s.clock[FLIGHT] > 0.0:
         return Stop.NOT_FINITE.value
-    if is_past(clock[TIME] + clock[FLIGHT], until):
-        if not shorten:
+    if is_past(s.clock[TIME] + s.clock[FLIGHT], s.until):
+        if not s.shorten:
             return Stop.TIME_REACHED.value
-        clock[FLIGHT] = until - clock[TIME]
+        s.clock[FLIGHT] = s.until - s.clock[TIME]
     before = 0.0
-    if external_work.time_dependent:
-        before = sum_external(scratch, forces, program, table, clock[TIME], ENERGY)
-    dt, in_contact, work, reason = step_to_contact(
-        grains, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work, flight_limits,
-        forces, queue, program, table
-    )  # fmt: skip
+    if s.external_work.time_dependent:
+        before = sum_external(s, s.clock[TIME], ENERGY)
+    dt, in_contact, work, reason = step_to_contact(s)
     if reason != Stop.NONE:
-        call_stage(program, EXPLAIN, table, reason.value)
+        call_stage(s, EXPLAIN, reason.value)
         return reason.value
-    finish_flight_step(
-        grains, pair_list, clock, count, lost, scratch, span, external_work, forces, program, table, dt, in_contact,
-        before, work
-    )  # fmt: skip
+    finish_flight_step(s, dt, in_contact, before, work)
     if in_contact:
         return Stop.NONE.value
     # with the loads of the last kick, so that the steps do not depend on output
-    clock[FLIGHT] = choose_free_step(grains, long_range, clock, count, span, search, criteria, flight_limits, forces)
-    if not clock[FLIGHT] > 0.0:
+    s.clock[FLIGHT] = choose_free_step(s)
+    if not s.clock[FLIGHT] > 0.0:
         return Stop.NOT_FINITE.value
-    if clock[TIME] >= until or is_close(clock[TIME], until) or count[STEPS] >= last:
+    if s.clock[TIME] >= s.until or is_close(s.clock[TIME], s.until) or s.count[STEPS] >= s.last:
         # output needs loads at the present positions; steps do not
-        sums = count[LONG_RANGE_SUMS]
-        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, clock[TIME])
-        count[LONG_RANGE_SUMS] = sums
-    if has_stage(program, GAS_KICK):
-        call_stage(program, GAS_KICK, table, 0)
+        sums = s.count[LONG_RANGE_SUMS]
+        sum_loads(s, s.clock[TIME])
+        s.count[LONG_RANGE_SUMS] = sums
+    if has_stage(s, GAS_KICK):
+        call_stage(s, GAS_KICK, 0)
     return Stop.NONE.value
 
 

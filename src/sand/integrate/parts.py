@@ -1,7 +1,8 @@
 """The parts of a simulation that stages take by name (`PARTS`), and the types of its settings.
 
 A stage (`compiler.stage`) is a function whose arguments are names of parts: arrays of the state such as `grains`,
-`contacts` or `clock`, and settings such as `span` or `criteria`.
+`contacts` or `clock`, and settings such as `span` or `criteria`.  Drivers and flights take all parts as one argument
+`s`: `s.grains`, `s.clock` and so on.
 """
 
 import math
@@ -18,6 +19,11 @@ PARTS = (
     *("program", "queue", "scratch", "until", "last", "shorten"),
 )
 """Names of the parts of a simulation, in the order of the table of addresses."""
+DRIVER_PARTS = (
+    *("program", "grains", "pair_list", "long_range", "clock", "count", "lost", "scratch", "span", "search"),
+    *("external_work", "criteria", "forces", "queue", "until", "last", "shorten"),
+)
+"""Parts that every driver and flight uses."""
 
 # --- indices of the part `scratch` (float64): numbers that one stage of a step leaves for another ---------------------
 DT = 0  # length of the step, or of the kick [s]

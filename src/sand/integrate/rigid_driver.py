@@ -40,7 +40,7 @@ from .body_touches import CLEAR, LOADED, find_near_bodies
 from .force_calls import add_external_loads, sum_external, sum_pair_forces
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
-from .parts import Stop
+from .parts import DRIVER_PARTS, Stop
 from .respa import add_long_range_loads
 from .rigid_body import (
     LARGEST_PIECE,
@@ -150,63 +150,61 @@ def any_has_to_wake(bodies, count):
 
 
 @caller
-def drift_with_work(
-    clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, limits, program, table, h
-):  # fmt: skip
+def drift_with_work(s, h):
     """Move the bodies at rest without substeps; log the work of external forces of time or position, and of a gas.
 
     Grains of awake clusters stay where they are; the change of their energies with time is part of the work.
     """
-    start, end, gained = clock[TIME], clock[TIME] + h, 0.0
-    is_wrapped, piece = not external_work.position_dependent, min(LARGEST_PIECE, limits.step_fraction)
-    if external_work.time_dependent:
-        gained += sum_external(scratch, forces, program, table, end, ENERGY)
-        gained -= sum_external(scratch, forces, program, table, start, ENERGY)
-    if gas.gas.on:
-        lost[GAS] += drift_bodies_in_gas(grains, bodies, count, span, gas, h, is_wrapped, piece)
+    start, end, gained = s.clock[TIME], s.clock[TIME] + h, 0.0
+    is_wrapped, piece = not s.external_work.position_dependent, min(LARGEST_PIECE, s.flight_limits.step_fraction)
+    if s.external_work.time_dependent:
+        gained += sum_external(s, end, ENERGY)
+        gained -= sum_external(s, start, ENERGY)
+    if s.gas.gas.on:
+        s.lost[GAS] += drift_bodies_in_gas(s.grains, s.bodies, s.count, s.span, s.gas, h, is_wrapped, piece)
     else:
-        drift_bodies(grains, bodies, count, span, h, is_wrapped, piece)
-    if external_work.time_dependent:
-        gained += sum_external(scratch, forces, program, table, end, ENERGY)
-        gained -= sum_external(scratch, forces, program, table, start, ENERGY)
+        drift_bodies(s.grains, s.bodies, s.count, s.span, h, is_wrapped, piece)
+    if s.external_work.time_dependent:
+        gained += sum_external(s, end, ENERGY)
+        gained -= sum_external(s, start, ENERGY)
     gained *= 0.5
-    if external_work.position_dependent:
-        gained += sum_external(scratch, forces, program, table, end, WRAPPING)
-        wrap_all(grains, span)
-    lost[OUTSIDE] -= gained
+    if s.external_work.position_dependent:
+        gained += sum_external(s, end, WRAPPING)
+        wrap_all(s.grains, s.span)
+    s.lost[OUTSIDE] -= gained
 
 
 @caller
-def update_lists(grains, pair_list, long_range, span, search, criteria, program, table):
+def update_lists(s):
     """Rebuild stale lists; returns the value of a `Stop`."""
-    invalidate_skins(pair_list)
-    if search.listed and list_is_stale(
-        grains, long_range.anchor, span, 0.5 * search.margin, pair_list.skin, LONG_RANGE_SKIN
+    invalidate_skins(s.pair_list)
+    if s.search.listed and list_is_stale(
+        s.grains, s.long_range.anchor, s.span, 0.5 * s.search.margin, s.pair_list.skin, LONG_RANGE_SKIN
     ):
-        stop = call_stage(program, VERLET_LIST, table, 0)
+        stop = call_stage(s, VERLET_LIST, 0)
         if stop != Stop.NONE.value:
             return stop
-    if list_is_stale(grains, pair_list.anchor, span, 0.25 * criteria.pair_gap, pair_list.skin, PAIR_LIST_SKIN):
-        return call_stage(program, PAIR_LIST, table, 0)
+    if list_is_stale(
+        s.grains, s.pair_list.anchor, s.span, 0.25 * s.criteria.pair_gap, s.pair_list.skin, PAIR_LIST_SKIN
+    ):
+        return call_stage(s, PAIR_LIST, 0)
     return Stop.NONE.value
 
 
 @caller
-def sum_outer_loads(
-    grains, bodies, long_range, clock, count, scratch, forces, holds_loads, queue, program, table
-):  # fmt: skip
+def sum_outer_loads(s, holds_loads):
     """Sum all loads but those of contacts, over all pairs of grains, at the time of the end of the step."""
-    for i in range(grains.mass.size):
-        put(grains.force, i, (0.0, 0.0, 0.0))
-        put(grains.torque, i, (0.0, 0.0, 0.0))
-    add_external_loads(scratch, forces, program, table, clock[TIME] + clock[STEP])
-    if forces.pair > 0:
-        sum_pair_forces(long_range, count, forces, queue, program, table)
-        add_long_range_loads(grains, long_range)
+    for i in range(s.grains.mass.size):
+        put(s.grains.force, i, (0.0, 0.0, 0.0))
+        put(s.grains.torque, i, (0.0, 0.0, 0.0))
+    add_external_loads(s, s.clock[TIME] + s.clock[STEP])
+    if s.forces.pair > 0:
+        sum_pair_forces(s)
+        add_long_range_loads(s.grains, s.long_range)
     if holds_loads:
-        for i in range(grains.mass.size):
-            accrue(grains.force, i, load(bodies.excluded_force, i))
-            accrue(grains.torque, i, load(bodies.excluded_torque, i))
+        for i in range(s.grains.mass.size):
+            accrue(s.grains.force, i, load(s.bodies.excluded_force, i))
+            accrue(s.grains.torque, i, load(s.bodies.excluded_torque, i))
 
 
 @loop
@@ -219,119 +217,96 @@ def awake_grains(bodies):
 
 
 @caller
-def first_half(
-    grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria, forces,
-    flight_limits, program, table, until, shorten, some_awake
-):  # fmt: skip
+def first_half(s, some_awake):
     """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
-    bodies.quick[:] = 0
-    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
-    h, longest = longest_step(grains, bodies, pair_list, count, span, criteria, flight_limits, some_awake)
+    s.bodies.quick[:] = 0
+    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
+    h, longest = longest_step(s.grains, s.bodies, s.pair_list, s.count, s.span, s.criteria, s.flight_limits, some_awake)
     if not h > 0.0:
-        call_stage(program, EXPLAIN, table, Stop.NOT_FINITE.value)
+        call_stage(s, EXPLAIN, Stop.NOT_FINITE.value)
         return Stop.NOT_FINITE.value
-    if clock[TIME] + h == clock[TIME]:
+    if s.clock[TIME] + h == s.clock[TIME]:
         return Stop.NO_STEP.value
     takes_substeps = False
-    if flight_limits.substeps:
-        shared = choose_shared_step(grains, bodies, pair_list, count, span, gas, flight_limits, h, longest)
+    if s.flight_limits.substeps:
+        shared = choose_shared_step(
+            s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits, h, longest
+        )
         h, takes_substeps = shared, shared > h
-    if is_past(clock[TIME] + h, until):
-        if not shorten:
-            bodies.quick[:] = 0
+    if is_past(s.clock[TIME] + h, s.until):
+        if not s.shorten:
+            s.bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
-        h = until - clock[TIME]
+        h = s.until - s.clock[TIME]
     if not takes_substeps:
-        find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, h)
-    find_loaded_bodies(grains, bodies, clock, count)
-    clock[STEP] = h
-    if any_has_to_wake(bodies, count):
-        bodies.quick[:] = 0
+        find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
+    find_loaded_bodies(s.grains, s.bodies, s.clock, s.count)
+    s.clock[STEP] = h
+    if any_has_to_wake(s.bodies, s.count):
+        s.bodies.quick[:] = 0
         return Stop.TOUCH_AHEAD.value
     if takes_substeps:
         return Stop.SUBSTEPS.value
-    kick_bodies(bodies, count, 0.5 * h)
-    drift_with_work(
-        clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, flight_limits, program, table, h
-    )  # fmt: skip
-    count[STAGE] = 1
+    kick_bodies(s.bodies, s.count, 0.5 * h)
+    drift_with_work(s, h)
+    s.count[STAGE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
 
 @caller
-def second_half(
-    grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces, flight_limits,
-    queue, program, table, awake, had_substeps
-):  # fmt: skip
+def second_half(s, awake, had_substeps):
     """Update the lists, sum the loads, and kick; returns the value of a `Stop`."""
-    stop = update_lists(grains, pair_list, long_range, span, search, criteria, program, table)
+    stop = update_lists(s)
     if stop != Stop.NONE.value:
         return stop
-    sum_outer_loads(
-        grains, bodies, long_range, clock, count, scratch, forces, flight_limits.holds_loads, queue, program, table
-    )  # fmt: skip
-    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
-    kick_bodies(bodies, count, 0.5 * clock[STEP])
-    move_velocities(grains, bodies, count)
-    bodies.quick[:] = 0
-    clock[TIME] += clock[STEP]
-    if gas.gas.on:
-        clock[KICKED] = clock[TIME]
+    sum_outer_loads(s, s.flight_limits.holds_loads)
+    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
+    kick_bodies(s.bodies, s.count, 0.5 * s.clock[STEP])
+    move_velocities(s.grains, s.bodies, s.count)
+    s.bodies.quick[:] = 0
+    s.clock[TIME] += s.clock[STEP]
+    if s.gas.gas.on:
+        s.clock[KICKED] = s.clock[TIME]
     if not had_substeps:
-        clock[SOME_AWAKE] += clock[STEP] if awake > 0 else 0.0
-        clock[GRAINS_AWAKE] += awake * clock[STEP] / grains.mass.size
-    count[STEPS] += 1 if clock[STEP] > 0.0 else 0
-    count[STAGE] = 0
+        s.clock[SOME_AWAKE] += s.clock[STEP] if awake > 0 else 0.0
+        s.clock[GRAINS_AWAKE] += awake * s.clock[STEP] / s.grains.mass.size
+    s.count[STEPS] += 1 if s.clock[STEP] > 0.0 else 0
+    s.count[STAGE] = 0
     return Stop.AWAKE_LOADS.value if awake > 0 else Stop.NONE.value
 
 
 @caller
-def body_steps_until(
-    grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, gas, criteria,
-    forces, flight_limits, queue, program, table, until, last, shorten
-):  # fmt: skip
+def body_steps_until(s):
     """Take steps until the last end of a step not after `until` [s], or step `last`; returns the value of a `Stop`."""
-    awake = awake_grains(bodies)
-    invalidate_speeds(pair_list)
+    awake = awake_grains(s.bodies)
+    invalidate_speeds(s.pair_list)
     while True:
         stop = Stop.NONE.value
-        if count[STAGE] == 0:
-            if count[COMPARED] >= 0 and count[COMPARED] != count[MADE] + count[BROKEN]:
+        if s.count[STAGE] == 0:
+            if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
-            if clock[TIME] >= until or (shorten and is_close(clock[TIME], until)):
+            if s.clock[TIME] >= s.until or (s.shorten and is_close(s.clock[TIME], s.until)):
                 return Stop.TIME_REACHED.value
-            if count[STEPS] >= last:
+            if s.count[STEPS] >= s.last:
                 return Stop.NONE.value
-            stop = first_half(
-                grains, bodies, pair_list, clock, count, lost, scratch, span, external_work, gas, criteria,
-                forces, flight_limits, program, table, until, shorten, awake > 0
-            )  # fmt: skip
-        elif count[STAGE] == AFTER_SUBSTEPS:
-            drift_with_work(
-                clock, lost, scratch, span, external_work, gas, forces, grains, bodies, count, flight_limits, program,
-                table, clock[STEP]
-            )  # fmt: skip
-            count[STAGE] = AFTER_ALL
+            stop = first_half(s, awake > 0)
+        elif s.count[STAGE] == AFTER_SUBSTEPS:
+            drift_with_work(s, s.clock[STEP])
+            s.count[STAGE] = AFTER_ALL
         if stop == Stop.NONE.value:
-            stop = second_half(
-                grains, bodies, pair_list, long_range, clock, count, scratch, span, search, gas, criteria, forces,
-                flight_limits, queue, program, table, awake, count[STAGE] == AFTER_ALL
-            )  # fmt: skip
+            stop = second_half(s, awake, s.count[STAGE] == AFTER_ALL)
         if stop != Stop.NONE.value:
             return stop
 
 
-@stage("the steps of rigid bodies")
-def advance_bodies(
-    table, program, grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work,
-    gas, criteria, forces, flight_limits, queue, until, last, shorten
-):  # fmt: skip
+@stage(
+    "the steps of rigid bodies",
+    parts=(*DRIVER_PARTS, "bodies", "gas", "flight_limits"),
+)
+def advance_bodies(s):
     """Take steps of all bodies, then end the work of the other threads; returns the value of a `Stop`."""
-    stop = body_steps_until(
-        grains, bodies, pair_list, long_range, clock, count, lost, scratch, span, search, external_work, gas,
-        criteria, forces, flight_limits, queue, program, table, until, last, shorten
-    )  # fmt: skip
-    join_workers(queue.words)
+    stop = body_steps_until(s)
+    join_workers(s)
     return stop
 
 

@@ -147,39 +147,37 @@ def error_ratio(runge_kutta, dt, error_limits):
 
 
 @rare
-def sum_loads(grains, long_range, count, scratch, forces, queue, program, table, time):
+def sum_loads(s, time):
     """Sum all loads of free grains at their present positions."""
-    for i in range(grains.mass.size):
-        put(grains.force, i, (0.0, 0.0, 0.0))
-        put(grains.torque, i, (0.0, 0.0, 0.0))
-    add_external_loads(scratch, forces, program, table, time)
-    if forces.pair > 0:
-        sum_pair_forces(long_range, count, forces, queue, program, table)
-        add_long_range_loads(grains, long_range)
+    for i in range(s.grains.mass.size):
+        put(s.grains.force, i, (0.0, 0.0, 0.0))
+        put(s.grains.torque, i, (0.0, 0.0, 0.0))
+    add_external_loads(s, time)
+    if s.forces.pair > 0:
+        sum_pair_forces(s)
+        add_long_range_loads(s.grains, s.long_range)
 
 
 @caller
-def begin_step(grains, runge_kutta, scratch, external_work, forces, program, table, begin):
+def begin_step(s, begin):
     """Store the state at the start of the step, at the time `begin`, and the rates of stage 0."""
-    store_start(grains, runge_kutta)
-    store_rates(grains, runge_kutta, 0)
-    if external_work.time_dependent:
-        runge_kutta.power[0] = sum_external(scratch, forces, program, table, begin, POWER)
+    store_start(s.grains, s.runge_kutta)
+    store_rates(s.grains, s.runge_kutta, 0)
+    if s.external_work.time_dependent:
+        s.runge_kutta.power[0] = sum_external(s, begin, POWER)
 
 
 @caller
-def try_step(
-    grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt, stride
-):
+def try_step(s, begin, dt, stride):
     """Compute all stages of a step; False if a grain moves farther than `stride`."""
-    for s in range(1, STAGES):
-        if not set_stage(grains, runge_kutta, s, dt) <= stride * stride:
+    for k in range(1, STAGES):
+        if not set_stage(s.grains, s.runge_kutta, k, dt) <= stride * stride:
             return False
-        time = begin + TIMES[s] * dt
-        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, time)
-        store_rates(grains, runge_kutta, s)
-        if external_work.time_dependent:
-            runge_kutta.power[s] = sum_external(scratch, forces, program, table, time, POWER)
+        time = begin + TIMES[k] * dt
+        sum_loads(s, time)
+        store_rates(s.grains, s.runge_kutta, k)
+        if s.external_work.time_dependent:
+            s.runge_kutta.power[k] = sum_external(s, time, POWER)
     return True
 
 

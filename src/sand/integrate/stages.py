@@ -182,9 +182,16 @@ def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     def wall_step(grains, walls, wall_contacts, clock, count, settings, criteria, parameters):
         """Set the longest step that walls allow; returns a `Stop`."""
         contact, approach, behind = find_step(
-            grains, walls, wall_contacts, count, settings.per_period, parameters, criteria.longest, criteria.impact,
+            grains,
+            walls,
+            wall_contacts,
+            count,
+            settings.per_period,
+            parameters,
+            criteria.longest,
+            criteria.impact,
             CLOSING_FRACTION,
-        )  # fmt: skip
+        )
         set_wall_step(clock, count, contact, approach, criteria.longest)
         if behind >= 0:
             count[GRAIN1] = behind
@@ -314,13 +321,16 @@ def settle(grains, contacts, clusters, clock, lost, span, settings):
     return 0
 
 
-@stage("the cause of a stop")
-def explain_stop(grains, contacts, pair_list, long_range, count, span, criteria, scratch, block):
+@stage(
+    "the cause of a stop",
+    parts=("grains", "contacts", "pair_list", "long_range", "count", "span", "criteria", "scratch"),
+)
+def explain_stop(s, block):
     """Set GRAIN1 and GRAIN2 to the grains that caused a stop, whose number is the block."""
     if block == Stop.NO_STEP.value:
-        find_limiting_grains(grains, long_range, contacts.start, pair_list, count, span, criteria)
+        find_limiting_grains(s.grains, s.long_range, s.contacts.start, s.pair_list, s.count, s.span, s.criteria)
     elif block == Stop.NOT_FINITE.value:
-        count[GRAIN1] = first_not_finite(grains)
+        s.count[GRAIN1] = first_not_finite(s.grains)
     else:
-        count[GRAIN1] = first_too_fast(grains, criteria.pair_gap, scratch[DT], block)
+        s.count[GRAIN1] = first_too_fast(s.grains, s.criteria.pair_gap, s.scratch[DT], block)
     return 0

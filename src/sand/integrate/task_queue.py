@@ -90,14 +90,15 @@ def has_block_left(word):
 
 
 @rare
-def share_blocks(program, number, table, words, blocks):
+def share_blocks(s, number, blocks):
     """Process all blocks of a stage together with the workers."""
+    words = s.queue.words
     write(words, FINISHED, 0)
     write(words, FAILED, 0)
     write(words, WORD, (number << TASK) | (blocks << BLOCKS))
     word = fetch_add(words, WORD, 1 << FRONT)
     while has_block_left(word):
-        call_stage(program, number, table, field_of(word, FRONT))
+        call_stage(s, number, field_of(word, FRONT))
         fetch_add(words, FINISHED, 1)
         word = fetch_add(words, WORD, 1 << FRONT)
     spins = 0
@@ -106,23 +107,23 @@ def share_blocks(program, number, table, words, blocks):
         if spins > SPINS_BEFORE_YIELD:
             yield_cpu()
     if read(words, FAILED) > 0:  # a worker cannot raise an exception: the block is processed again, here
-        call_stage(program, number, table, read(words, FAILED) - 1)
+        call_stage(s, number, read(words, FAILED) - 1)
 
 
 @caller
-def for_each_block(program, number, table, words, blocks):
+def for_each_block(s, number, blocks):
     """Process the blocks 0 … blocks − 1 of a stage, together with the workers where there are any."""
-    if words[SHARED] == 1:
-        share_blocks(program, number, table, words, blocks)
+    if s.queue.words[SHARED] == 1:
+        share_blocks(s, number, blocks)
     else:
         for b in range(blocks):
-            call_stage(program, number, table, b)
+            call_stage(s, number, b)
 
 
-@stage("the work of other threads")
-def take_blocks(table, program, queue):
+@stage("the work of other threads", parts=("program", "queue"))
+def take_blocks(s):
     """Work of a worker thread: take blocks from the back of the queue until the task is QUIT."""
-    words = queue.words
+    words = s.queue.words
     fetch_add(words, ACTIVE, 1)
     spins = 0
     word = read(words, WORD)
@@ -133,7 +134,7 @@ def take_blocks(table, program, queue):
             word = fetch_add(words, WORD, 1 << BACK)
             if has_block_left(word):
                 block = field_of(word, BLOCKS) - 1 - field_of(word, BACK)
-                if stage_fails(program, word >> TASK, table, block):
+                if stage_fails(s, word >> TASK, block):
                     write(words, FAILED, block + 1)
                 fetch_add(words, FINISHED, 1)
             spins = 0
@@ -145,8 +146,9 @@ def take_blocks(table, program, queue):
 
 
 @rare
-def join_workers(words):
+def join_workers(s):
     """End the workers and wait until the last has returned, so that no other thread accesses the arrays."""
+    words = s.queue.words
     write(words, WORD, QUIT << TASK)
     while read(words, ACTIVE) > 0:
         yield_cpu()
