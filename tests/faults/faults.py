@@ -117,7 +117,7 @@ FAULTS = (
           "v0 = scale(dt / 5.0, ", "v0 = scale(dt / 10.0, ",
           "unit/test_event_location.py::test_interpolation_of_quintic_motion_is_exact"),
     Fault("the second half of a kick is a whole one", "factor 2", "loop", "integrate/driver.py",
-          "return kick(grains, 0.5 * clock[STEP])", "return kick(grains, clock[STEP])",
+          "return kick(s.grains, 0.5 * s.clock[STEP])", "return kick(s.grains, s.clock[STEP])",
           "physics/test_magnetic_dynamics.py::test_oscillation_of_two_distant_dipoles"),
     Fault("after a break the others keep the wrong twist", "lost row", "loop", "contact/events.py",
           "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
@@ -168,7 +168,7 @@ FAULTS = (
           "problems += error.problems", "problems += []",
           "unit/test_grains.py::test_materials_are_checked"),
     Fault("a moment per mass taken for a moment", "forgotten unit", "settings", "grains.py",
-          "per_mass * mass", "per_mass",
+          '("A m^2/kg", mass)', '("A m^2/kg", 1.0)',
           "unit/test_grains.py::test_derived_quantities"),
     # files
     Fault("quaternion components are read one position off", "off by one", "files", "io/frame.py",

@@ -118,8 +118,8 @@ def fastest_approach(grains, long_range, span, search):
 def longest_free_step(s):
     """Longest step [s] that the motion allows; 0 if the state is not finite.
 
-    Positions, spins and loads change on the time scale τ = 1/√(largest rate of any pair or grain); `flight_limits.part` of it
-    is allowed.  Such rates follow from loads and velocities alone, whatever the force.
+    Positions, spins and loads change on the time scale τ = 1/√(largest rate of any pair or grain), of which the part
+    `flight_limits.part` is allowed.  Such rates follow from loads and velocities alone, whatever the force.
     """
     rate = fastest = fastest_spin = 0.0
     finite = True
