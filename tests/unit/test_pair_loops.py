@@ -13,7 +13,7 @@ from sand.forces.pair import generic_loops, loops
 from sand.integrate.force_calls import sum_pair_forces
 from sand.integrate.force_stages import PAIR_STAGES, SUM, pair_force_stages
 from sand.integrate.parts import ForceNumbers
-from sand.integrate.stages import FIRST_FORCE
+from sand.integrate.stages import StageNumber
 from sand.integrate.task_queue import SHARED, new_task_queue
 from sand.neighbours.cell_list import build_verlet_list
 from sand.state.arrays import empty_long_range_arrays
@@ -70,10 +70,10 @@ def test_blocked_sums_of_several_forces(order, monkeypatch):
         }
         table = table_of(**parts, program=None)
         stages = {
-            FIRST_FORCE + PAIR_STAGES * k + SUM: (pair_force_stages(sums[name], False)[SUM], numbers[name])
+            StageNumber.FIRST_FORCE + PAIR_STAGES * k + SUM: (pair_force_stages(sums[name], False)[SUM], numbers[name])
             for k, name in enumerate(names)
         }
-        program = Program(table, stages, FIRST_FORCE + PAIR_STAGES * len(names))
+        program = Program(table, stages, StageNumber.FIRST_FORCE + PAIR_STAGES * len(names))
         far.force[...] = far.torque[...] = 1.0  # of an earlier sum
         table.set("program", program)
         sum_pair_forces(table)

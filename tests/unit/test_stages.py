@@ -303,7 +303,7 @@ def two_stages():
 
     @stage("a test", cached=False, parts=("program", "which"))
     def call_one(s):
-        return call_stage(s, s.which, 0) if has_stage(s, s.which) else -1
+        return call_stage(s, s.which) if has_stage(s, s.which) else -1
 
     values = np.array([1.0])
     table = table_of(values=values, program=None, which=3)
@@ -376,7 +376,7 @@ def wait_and_call(s):
     for k in range(50_000_000):
         x = 0.5 * x + np.sqrt(x + k)
     s.found[1] = x
-    return call_stage(s, 0, 0)
+    return call_stage(s, 0)
 
 table = Table(("program", "found"))
 found = np.zeros(2)
@@ -447,7 +447,7 @@ def add_up(group, settings, parameters, block):
 
 @stage("a test", parts=("program", "group"))
 def add_up_twice(s):
-    number = call_stage(s, 1, 0) + call_stage(s, 1, 2)
+    number = call_stage(s, 1) + call_stage(s, 1, 2)
     return number if has_stage(s, 1) and not has_stage(s, 0) else -1
 
 table = Table(("group", "settings", "program"))

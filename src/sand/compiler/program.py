@@ -122,7 +122,7 @@ def has_stage(s: Any, number: int) -> bool:
     return number in s.program.stages
 
 
-def call_stage(s: Any, number: int, block: int) -> int:
+def call_stage(s: Any, number: int, block: int = 0) -> int:
     """Call a stage of the program among the parts `s`; returns its integer.  An exception in it is passed on."""
     stage, parameters = s.program.stages[number]
     return int(stage.in_python(s, parameters, block))
@@ -183,12 +183,14 @@ def _compiled_stage_fails(s, number, block):
 
 @overload(has_stage)
 def _compiled_has_stage(s, number):
+    if isinstance(number, types.IntEnumMember):
+        return lambda s, number: s.program[number.value, 0] != 0
     return lambda s, number: s.program[number, 0] != 0
 
 
 @overload(call_stage)
-def _compiled_call_stage(s, number, block):
-    def call(s, number, block):
+def _compiled_call_stage(s, number, block=0):
+    def call(s, number, block=0):
         return _call_entry(s.program, number, s, block)
 
     return call

@@ -35,7 +35,7 @@ from .runge_kutta import (
     try_step,
     work_of,
 )
-from .stages import GAS_KICK, VERLET_LIST
+from .stages import StageNumber
 from .step_control import steps_of_free_grains
 
 ORDER = 5.0
@@ -56,7 +56,7 @@ def refresh_verlet_list(s):
     moved = largest_displacement(s.grains, s.long_range.anchor, s.span)
     # written so that an anchor at infinity (no list yet) counts as stale
     if not moved <= STALE_FRACTION * s.search.margin:
-        return call_stage(s, VERLET_LIST, 0)
+        return call_stage(s, StageNumber.VERLET_LIST)
     return Stop.NONE.value
 
 
@@ -140,6 +140,6 @@ def free_flight(s):
         sum_loads(s, s.clock[TIME])
     if in_contact:
         return Stop.NONE.value
-    if has_stage(s, GAS_KICK):
-        call_stage(s, GAS_KICK, 0)
+    if has_stage(s, StageNumber.GAS_KICK):
+        call_stage(s, StageNumber.GAS_KICK)
     return Stop.NONE.value

@@ -62,36 +62,7 @@ from .respa import (
     integrate_displacement,
     update_constant_loads,
 )
-from .stages import (
-    BATH_WALL_WORK,
-    BATH_WORK,
-    CONTACT_PASS,
-    CONTACT_STEP,
-    DRIFT,
-    DRIVE,
-    EXPLAIN,
-    EXTRAPOLATE,
-    FIRST_FORCE,
-    FLIGHT,
-    FORM,
-    GAS_KICK,
-    GATHER,
-    GATHER_AND_KICK,
-    INNER_LIST,
-    NEXT_STEP,
-    PAIR_LIST,
-    PREPARE_RATES,
-    REMOVE_BROKEN,
-    SETTLE,
-    SETTLE_CLUSTERS,
-    SORT,
-    STIFFNESS_WORK,
-    STORE_POSITIONS,
-    VERLET_LIST,
-    WALL_CONTACTS,
-    WALL_LOADS,
-    WALL_STEP,
-)
+from .stages import NEXT_STEP, StageNumber
 from .step_control import cycle_steps, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
@@ -112,10 +83,10 @@ def sum_rates(s, cycle):
     """The rates of the Taylor series at the start of a cycle of `cycle` [s]; none for 0."""
     if cycle > 0.0:
         s.scratch[CYCLE_LENGTH] = cycle
-        call_stage(s, PREPARE_RATES, 0)
+        call_stage(s, StageNumber.PREPARE_RATES)
         for k in range(s.forces.pair):
-            call_stage(s, FIRST_FORCE + PAIR_STAGES * k + RATES, 0)
-    call_stage(s, STORE_POSITIONS, 0)
+            call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * k + RATES)
+    call_stage(s, StageNumber.STORE_POSITIONS)
 
 
 @caller
@@ -155,17 +126,17 @@ def drift_with_work(s, dt):
         gained -= sum_external(s, start, ENERGY)
     s.scratch[DT] = dt
     blocks = blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK)
-    driven = has_stage(s, DRIVE)
+    driven = has_stage(s, StageNumber.DRIVE)
     if driven:
-        call_stage(s, DRIVE, HOLD)
+        call_stage(s, StageNumber.DRIVE, HOLD)
     if s.clock[STEP] != dt:
-        if has_stage(s, BATH_WORK):
-            call_stage(s, BATH_WORK, NEXT_STEP)
-        if has_stage(s, BATH_WALL_WORK):
-            call_stage(s, BATH_WALL_WORK, NEXT_STEP)
-    for_each_block(s, DRIFT, blocks)
+        if has_stage(s, StageNumber.BATH_WORK):
+            call_stage(s, StageNumber.BATH_WORK, NEXT_STEP)
+        if has_stage(s, StageNumber.BATH_WALL_WORK):
+            call_stage(s, StageNumber.BATH_WALL_WORK, NEXT_STEP)
+    for_each_block(s, StageNumber.DRIFT, blocks)
     if driven:
-        call_stage(s, DRIVE, RELEASE)
+        call_stage(s, StageNumber.DRIVE, RELEASE)
     if s.external_work.time_dependent:
         gained += sum_external(s, end, ENERGY)
         gained -= sum_external(s, start, ENERGY)
@@ -192,9 +163,9 @@ def sum_loads(s, due, elapsed):
 
     Long-range loads are summed if `due`; within a cycle their constant part or extrapolation replaces them.
     """
-    for_each_block(s, GATHER, blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK))
-    if has_stage(s, WALL_LOADS):
-        call_stage(s, WALL_LOADS, 0)
+    for_each_block(s, StageNumber.GATHER, blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK))
+    if has_stage(s, StageNumber.WALL_LOADS):
+        call_stage(s, StageNumber.WALL_LOADS)
     add_external_loads(s, s.clock[TIME] + s.clock[STEP])
     if s.forces.pair == 0:
         s.count[LONG_RANGE_SUMS] += 1
@@ -204,31 +175,31 @@ def sum_loads(s, due, elapsed):
         add_constant_loads(s.grains, s.long_range, elapsed)
     else:
         s.scratch[SINCE] = elapsed
-        call_stage(s, EXTRAPOLATE, 0)
+        call_stage(s, StageNumber.EXTRAPOLATE)
 
 
 @caller
 def loads_and_kick(s, due, elapsed):
     """Sum the loads and apply the second half kick; returns the squares of the largest speed and spin."""
-    driven = has_stage(s, DRIVE)
-    if has_stage(s, GATHER_AND_KICK):
+    driven = has_stage(s, StageNumber.DRIVE)
+    if has_stage(s, StageNumber.GATHER_AND_KICK):
         s.count[LONG_RANGE_SUMS] += 1
         s.scratch[DT] = 0.5 * s.clock[STEP]
         blocks = blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK)
         if driven:
-            call_stage(s, DRIVE, HOLD)
-        for_each_block(s, GATHER_AND_KICK, blocks)
+            call_stage(s, StageNumber.DRIVE, HOLD)
+        for_each_block(s, StageNumber.GATHER_AND_KICK, blocks)
         if driven:
             s.scratch[DT] = s.clock[STEP]
-            call_stage(s, DRIVE, RELEASE)
+            call_stage(s, StageNumber.DRIVE, RELEASE)
         return largest_speeds(s.queue, blocks)
     sum_loads(s, due, elapsed)
     if not driven:
         return kick(s.grains, 0.5 * s.clock[STEP])
-    call_stage(s, DRIVE, HOLD)
+    call_stage(s, StageNumber.DRIVE, HOLD)
     fastest, fastest_spin = kick(s.grains, 0.5 * s.clock[STEP])
     s.scratch[DT] = s.clock[STEP]
-    call_stage(s, DRIVE, RELEASE)
+    call_stage(s, StageNumber.DRIVE, RELEASE)
     return fastest, fastest_spin
 
 
@@ -251,7 +222,7 @@ def first_half(s):
 
     A cycle that would pass `until` [s] is not begun, or, with `shorten`, ends at this time.
     """
-    at_wall = call_stage(s, WALL_STEP, 0) if has_stage(s, WALL_STEP) else Stop.NONE.value
+    at_wall = call_stage(s, StageNumber.WALL_STEP) if has_stage(s, StageNumber.WALL_STEP) else Stop.NONE.value
     grain = s.count[GRAIN1]
     dt, stop = possible_step(s.grains, s.contacts, s.pair_list, s.long_range, s.clock, s.count, s.span, s.criteria)
     if stop == Stop.NONE.value and at_wall != Stop.NONE.value:
@@ -259,7 +230,7 @@ def first_half(s):
     if stop != Stop.NONE.value:
         s.scratch[DT] = dt
         if stop != Stop.OVERCOMPRESSED.value:
-            call_stage(s, EXPLAIN, stop)
+            call_stage(s, StageNumber.EXPLAIN, stop)
         close_cycle(s)
         return stop
     if s.clock[LEFT] == 0.0:
@@ -289,16 +260,16 @@ def update_lists(s):
     if s.search.listed and list_is_stale(
         s.grains, s.long_range.anchor, s.span, 0.5 * s.search.margin, s.pair_list.skin, LONG_RANGE_SKIN
     ):
-        stop = call_stage(s, VERLET_LIST, 0)
+        stop = call_stage(s, StageNumber.VERLET_LIST)
         if stop != Stop.NONE.value:
             return stop, stale
     if stale:
-        stop = call_stage(s, PAIR_LIST, 0)
+        stop = call_stage(s, StageNumber.PAIR_LIST)
         if stop != Stop.NONE.value:
             return stop, stale
     # written so that a skin that is not a number counts as used up
     if s.settings.on and (stale or not s.pair_list.skin[INNER_SKIN] > 0.0):
-        call_stage(s, INNER_LIST, 0)
+        call_stage(s, StageNumber.INNER_LIST)
     return Stop.NONE.value, stale
 
 
@@ -306,7 +277,7 @@ def update_lists(s):
 def update_contacts(s):
     """Update all contacts, and slip or break those beyond a limit; returns whether any contact broke."""
     blocks = blocks_of(s.count[CONTACTS], CONTACTS_PER_BLOCK)
-    for_each_block(s, CONTACT_PASS, blocks)
+    for_each_block(s, StageNumber.CONTACT_PASS, blocks)
     pending = False
     for b in range(blocks):
         passed = load_contact_sums(s.queue.passed, b)
@@ -315,8 +286,8 @@ def update_contacts(s):
         if s.settings.damped or passed.slipped > 0.0:
             log_contact_sums(s.count, s.lost, passed)
     if s.settings.follow:
-        call_stage(s, STIFFNESS_WORK, 0)
-    return pending and call_stage(s, SETTLE, 0) == 1
+        call_stage(s, StageNumber.STIFFNESS_WORK)
+    return pending and call_stage(s, StageNumber.SETTLE) == 1
 
 
 @caller
@@ -328,23 +299,23 @@ def second_half(s):
     formed = count_new_contacts(s.grains, s.pair_list, s.count, s.span)
     if s.count[CONTACTS] + formed > s.contacts.pair.shape[1]:
         return Stop.CONTACTS_FULL.value
-    driven = has_stage(s, DRIVE)
+    driven = has_stage(s, StageNumber.DRIVE)
     if driven:
-        call_stage(s, DRIVE, HOLD_IN_EVENTS)
-    if has_stage(s, WALL_CONTACTS):
-        stop = call_stage(s, WALL_CONTACTS, 0)
+        call_stage(s, StageNumber.DRIVE, HOLD_IN_EVENTS)
+    if has_stage(s, StageNumber.WALL_CONTACTS):
+        stop = call_stage(s, StageNumber.WALL_CONTACTS)
         if stop != Stop.NONE.value:
             if driven:
-                call_stage(s, DRIVE, RELEASE_FROM_EVENTS)
+                call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)
             return stop
     broken = update_contacts(s)
     if formed > 0:
-        call_stage(s, FORM, 0)
-        call_stage(s, SORT, 0)
+        call_stage(s, StageNumber.FORM)
+        call_stage(s, StageNumber.SORT)
     if driven:
-        call_stage(s, DRIVE, RELEASE_FROM_EVENTS)
+        call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)
     if formed > 0 or list_rebuilt:
-        call_stage(s, CONTACT_STEP, 0)
+        call_stage(s, StageNumber.CONTACT_STEP)
     dt, elapsed = s.clock[STEP], s.clock[CYCLE] - s.clock[LEFT]
     due = s.clock[LEFT] == 0.0 or broken or formed > 0
     if s.respa.impulse and s.count[CONTACTS] > 0:
@@ -358,20 +329,20 @@ def second_half(s):
                 update_pairs_in_contact(s)
         s.clock[LEFT], s.clock[CYCLE] = 0.0, elapsed
     if broken:
-        call_stage(s, REMOVE_BROKEN, 0)
-        call_stage(s, SORT, 0)
-        call_stage(s, CONTACT_STEP, 0)
+        call_stage(s, StageNumber.REMOVE_BROKEN)
+        call_stage(s, StageNumber.SORT)
+        call_stage(s, StageNumber.CONTACT_STEP)
     s.clock[TIME] += dt
     s.count[STEPS] += 1
     s.count[STAGE] = 0
     if due:
-        gas, settling = has_stage(s, GAS_KICK), has_stage(s, SETTLE_CLUSTERS)
+        gas, settling = has_stage(s, StageNumber.GAS_KICK), has_stage(s, StageNumber.SETTLE_CLUSTERS)
         if gas:
-            call_stage(s, GAS_KICK, 0)
+            call_stage(s, StageNumber.GAS_KICK)
         if settling:
-            call_stage(s, SETTLE_CLUSTERS, 0)
+            call_stage(s, StageNumber.SETTLE_CLUSTERS)
         if gas and driven:
-            call_stage(s, DRIVE, RESET)
+            call_stage(s, StageNumber.DRIVE, RESET)
         if gas or settling or s.respa.impulse:  # speeds changed between steps
             invalidate_speeds(s.pair_list)
     return Stop.NONE.value
@@ -395,10 +366,10 @@ def steps_until(s):
                     return Stop.TIME_REACHED.value
                 if s.count[STEPS] >= s.last:
                     return Stop.NONE.value
-            if s.count[CONTACTS] == 0 and s.clock[LEFT] == 0.0 and has_stage(s, FLIGHT):
-                stop = call_stage(s, FLIGHT, 0)
+            if s.count[CONTACTS] == 0 and s.clock[LEFT] == 0.0 and has_stage(s, StageNumber.FLIGHT):
+                stop = call_stage(s, StageNumber.FLIGHT)
                 if stop == Stop.NOT_FINITE.value:
-                    call_stage(s, EXPLAIN, stop)
+                    call_stage(s, StageNumber.EXPLAIN, stop)
             else:
                 stop = first_half(s)
         if stop == Stop.NONE.value and s.count[STAGE] == 1:

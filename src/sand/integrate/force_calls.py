@@ -21,7 +21,7 @@ from .force_stages import (
 )
 from .parts import EXTERNAL, LOAD_TIME
 from .respa import clear_long_range_loads, mark_every_step
-from .stages import FIRST_FORCE
+from .stages import StageNumber
 from .task_queue import SHARED, for_each_block, share_blocks
 
 
@@ -30,7 +30,7 @@ def add_external_loads(s, time):
     """Add forces and torques of all external forces at a time [s] to the loads of the grains."""
     s.scratch[LOAD_TIME] = time
     for k in range(s.forces.external):
-        call_stage(s, FIRST_FORCE + PAIR_STAGES * s.forces.pair + EXTERNAL_STAGES * k + LOADS, 0)
+        call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * s.forces.pair + EXTERNAL_STAGES * k + LOADS)
 
 
 @caller
@@ -39,7 +39,7 @@ def sum_external(s, time, quantity):
     s.scratch[LOAD_TIME] = time
     s.scratch[EXTERNAL] = 0.0
     for k in range(s.forces.external):
-        call_stage(s, FIRST_FORCE + PAIR_STAGES * s.forces.pair + EXTERNAL_STAGES * k + WORK, quantity)
+        call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * s.forces.pair + EXTERNAL_STAGES * k + WORK, quantity)
     return s.scratch[EXTERNAL]
 
 
@@ -48,7 +48,7 @@ def sum_pair_forces(s):
     """Sum the loads of all pair forces over all pairs."""
     clear_long_range_loads(s.long_range)
     for k in range(s.forces.pair):
-        number = FIRST_FORCE + PAIR_STAGES * k + SUM
+        number = StageNumber.FIRST_FORCE + PAIR_STAGES * k + SUM
         for r in range(number + ROUND, number + ROUND + ROUNDS):
             if has_stage(s, r):
                 for_each_block(s, r, call_stage(s, r, BEGIN))
@@ -65,19 +65,19 @@ def sum_pair_forces(s):
 def add_pairs_in_contact(s):
     """Add the pair forces of grains in contact to the contact loads."""
     for k in range(s.forces.pair):
-        call_stage(s, FIRST_FORCE + PAIR_STAGES * k + IN_CONTACT, 0)
+        call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * k + IN_CONTACT)
 
 
 @caller
 def subtract_pairs_in_contact(s):
     """Subtract the pair forces of grains in contact from the sums over all pairs."""
     for k in range(s.forces.pair):
-        call_stage(s, FIRST_FORCE + PAIR_STAGES * k + REASSIGN, SUBTRACT)
+        call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * k + REASSIGN, SUBTRACT)
 
 
 @caller
 def update_pairs_in_contact(s):
     """Update the sums over all pairs for new and broken contacts."""
     for k in range(s.forces.pair):
-        call_stage(s, FIRST_FORCE + PAIR_STAGES * k + REASSIGN, UPDATE)
+        call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * k + REASSIGN, UPDATE)
     mark_every_step(s.contacts, s.count)

@@ -47,7 +47,7 @@ from .force_stages import ENERGY, POWER
 from .motion import kick
 from .parts import DRIVER_PARTS, Stop
 from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads
-from .stages import EXPLAIN, GAS_KICK
+from .stages import StageNumber
 from .step_control import StepCriteria, is_close, is_past, quantise_step
 from .step_parts import MAX_TURN
 from .verlet import Verlet
@@ -264,7 +264,7 @@ def symplectic_flight(s):
         before = sum_external(s, s.clock[TIME], ENERGY)
     dt, in_contact, work, reason = step_to_contact(s)
     if reason != Stop.NONE:
-        call_stage(s, EXPLAIN, reason.value)
+        call_stage(s, StageNumber.EXPLAIN, reason.value)
         return reason.value
     finish_flight_step(s, dt, in_contact, before, work)
     if in_contact:
@@ -278,8 +278,8 @@ def symplectic_flight(s):
         sums = s.count[LONG_RANGE_SUMS]
         sum_loads(s, s.clock[TIME])
         s.count[LONG_RANGE_SUMS] = sums
-    if has_stage(s, GAS_KICK):
-        call_stage(s, GAS_KICK, 0)
+    if has_stage(s, StageNumber.GAS_KICK):
+        call_stage(s, StageNumber.GAS_KICK)
     return Stop.NONE.value
 
 

@@ -29,6 +29,7 @@ from .force_stages import (
     pair_force_stages,
 )
 from .parts import ContactParameters, StepParameters
+from .stages import StageNumber
 
 
 class Components(NamedTuple):
@@ -49,34 +50,34 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     """The stages that a simulation calls, by number, with their own parameters."""
     respa, work = parameters.respa, parameters.external_work
     found: dict[int, Stage] = {
-        stages.DRIFT: stages.drift_stage(given.magnetic, given.wide),
-        stages.EXPLAIN: stages.explain_stop,
+        StageNumber.DRIFT: stages.drift_stage(given.magnetic, given.wide),
+        StageNumber.EXPLAIN: stages.explain_stop,
     }
     if given.pair_forces or given.external_forces or given.walls is not None:
-        found[stages.GATHER] = stages.gather_stage(given.wide)
+        found[StageNumber.GATHER] = stages.gather_stage(given.wide)
     else:
-        found[stages.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
+        found[StageNumber.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
     if parameters.search.listed:
-        found[stages.VERLET_LIST] = stages.verlet_list
+        found[StageNumber.VERLET_LIST] = stages.verlet_list
     if parameters.settings.on:
         found |= _contact_stages(given, parameters)
     if respa.taylor:
-        found[stages.PREPARE_RATES] = stages.prepare_rates
-        found[stages.STORE_POSITIONS] = stages.store_summation_positions
-        found[stages.EXTRAPOLATE] = stages.extrapolate
+        found[StageNumber.PREPARE_RATES] = stages.prepare_rates
+        found[StageNumber.STORE_POSITIONS] = stages.store_summation_positions
+        found[StageNumber.EXTRAPOLATE] = stages.extrapolate
     if given.gas:
-        found[stages.GAS_KICK] = stages.kick_by_gas
+        found[StageNumber.GAS_KICK] = stages.kick_by_gas
     if given.flight is not None:
-        found[stages.FLIGHT] = given.flight
+        found[StageNumber.FLIGHT] = given.flight
     program: dict[int, tuple[Stage | PythonStage, Any]] = {number: (each, ()) for number, each in found.items()}
     if given.driven is not None:
-        program[stages.DRIVE] = drive, given.driven
+        program[StageNumber.DRIVE] = drive, given.driven
     if given.walls is not None:
         of_walls = stages.wall_stages(given.law, variant_of(parameters.settings))
         program |= {number: (each, given.walls) for number, each in of_walls.items()}
         if variant_of(parameters.settings) == THERMAL:
-            program[stages.BATH_WALL_WORK] = stages.bath_wall_work, given.walls
-    number = stages.FIRST_FORCE
+            program[StageNumber.BATH_WALL_WORK] = stages.bath_wall_work, given.walls
+    number: int = StageNumber.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:
         own_stages = pair_force_stages(sums, given.wide)
@@ -102,26 +103,26 @@ def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, 
     """The stages of contacts by number."""
     damping = variant_of(parameters.settings)
     events = stages.contact_event_stages(given.law, damping)
-    found = {
-        stages.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
-        stages.INNER_LIST: stages.inner_list,
-        stages.CONTACT_PASS: stages.contact_pass_stage(given.law, damping, given.wide),
-        stages.SETTLE: events[stages.SETTLE],
-        stages.FORM: events[stages.FORM],
-        stages.SORT: resort_contacts_by_grain,
-        stages.CONTACT_STEP: stages.set_contact_step,
-        stages.REMOVE_BROKEN: stages.remove_broken,
+    found: dict[int, Stage] = {
+        StageNumber.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
+        StageNumber.INNER_LIST: stages.inner_list,
+        StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, damping, given.wide),
+        StageNumber.SETTLE: events[StageNumber.SETTLE],
+        StageNumber.FORM: events[StageNumber.FORM],
+        StageNumber.SORT: resort_contacts_by_grain,
+        StageNumber.CONTACT_STEP: stages.set_contact_step,
+        StageNumber.REMOVE_BROKEN: stages.remove_broken,
     }
     if damping == THERMAL:
-        found[stages.BATH_WORK] = stages.bath_work
+        found[StageNumber.BATH_WORK] = stages.bath_work
     if parameters.settings.follow:
-        found[stages.STIFFNESS_WORK] = events[stages.STIFFNESS_WORK]
+        found[StageNumber.STIFFNESS_WORK] = events[StageNumber.STIFFNESS_WORK]
     if parameters.settings.settling_time < math.inf:
-        found[stages.SETTLE_CLUSTERS] = stages.settle
+        found[StageNumber.SETTLE_CLUSTERS] = stages.settle
     return found
 
 
 def build_program(given: Components, parameters: StepParameters, table: Table) -> Program:
     """The program of a simulation, for the parts in a table; stages are compiled when they are first called."""
-    size = stages.FIRST_FORCE + PAIR_STAGES * len(given.pair_forces) + EXTERNAL_STAGES * len(given.external_forces)
+    size = StageNumber.FIRST_FORCE + PAIR_STAGES * len(given.pair_forces) + EXTERNAL_STAGES * len(given.external_forces)
     return Program(table, stages_of(given, parameters), size)

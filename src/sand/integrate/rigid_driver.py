@@ -51,7 +51,7 @@ from .rigid_body import (
     spin_of,
     sum_body_loads,
 )
-from .stages import EXPLAIN, PAIR_LIST, VERLET_LIST
+from .stages import StageNumber
 from .step_control import is_close, is_past
 from .substeps import AFTER_ALL, AFTER_SUBSTEPS, choose_shared_step, squared_rate
 from .task_queue import join_workers
@@ -181,13 +181,13 @@ def update_lists(s):
     if s.search.listed and list_is_stale(
         s.grains, s.long_range.anchor, s.span, 0.5 * s.search.margin, s.pair_list.skin, LONG_RANGE_SKIN
     ):
-        stop = call_stage(s, VERLET_LIST, 0)
+        stop = call_stage(s, StageNumber.VERLET_LIST)
         if stop != Stop.NONE.value:
             return stop
     if list_is_stale(
         s.grains, s.pair_list.anchor, s.span, 0.25 * s.criteria.pair_gap, s.pair_list.skin, PAIR_LIST_SKIN
     ):
-        return call_stage(s, PAIR_LIST, 0)
+        return call_stage(s, StageNumber.PAIR_LIST)
     return Stop.NONE.value
 
 
@@ -223,7 +223,7 @@ def first_half(s, some_awake):
     sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
     h, longest = longest_step(s.grains, s.bodies, s.pair_list, s.count, s.span, s.criteria, s.flight_limits, some_awake)
     if not h > 0.0:
-        call_stage(s, EXPLAIN, Stop.NOT_FINITE.value)
+        call_stage(s, StageNumber.EXPLAIN, Stop.NOT_FINITE.value)
         return Stop.NOT_FINITE.value
     if s.clock[TIME] + h == s.clock[TIME]:
         return Stop.NO_STEP.value

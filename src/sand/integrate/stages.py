@@ -6,6 +6,7 @@ and are compiled once for each; those of forces are in `force_stages`.
 
 import functools
 import math
+from enum import IntEnum
 
 import numpy as np
 
@@ -33,34 +34,38 @@ from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_fini
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
 
-# --- numbers of the stages ---------------------------------------------------------------------------------
-DRIFT = 0
-VERLET_LIST = 1
-PAIR_LIST = 2
-INNER_LIST = 3
-CONTACT_PASS = 4
-STIFFNESS_WORK = 5
-SETTLE = 6
-FORM = 7
-SORT = 8
-CONTACT_STEP = 9
-REMOVE_BROKEN = 10
-GATHER = 11
-GATHER_AND_KICK = 12
-PREPARE_RATES = 13
-STORE_POSITIONS = 14
-EXTRAPOLATE = 15
-GAS_KICK = 16
-FLIGHT = 17
-EXPLAIN = 18
-SETTLE_CLUSTERS = 19
-DRIVE = 20
-WALL_CONTACTS = 21
-WALL_LOADS = 22
-WALL_STEP = 23
-BATH_WORK = 24
-BATH_WALL_WORK = 25
-FIRST_FORCE = 26  # from here on the stages of forces, see force_stages
+
+class StageNumber(IntEnum):
+    """Entries of the program of a simulation."""
+
+    DRIFT = 0
+    VERLET_LIST = 1
+    PAIR_LIST = 2
+    INNER_LIST = 3
+    CONTACT_PASS = 4
+    STIFFNESS_WORK = 5
+    SETTLE = 6
+    FORM = 7
+    SORT = 8
+    CONTACT_STEP = 9
+    REMOVE_BROKEN = 10
+    GATHER = 11
+    GATHER_AND_KICK = 12
+    PREPARE_RATES = 13
+    STORE_POSITIONS = 14
+    EXTRAPOLATE = 15
+    GAS_KICK = 16
+    FLIGHT = 17
+    EXPLAIN = 18
+    SETTLE_CLUSTERS = 19
+    DRIVE = 20
+    WALL_CONTACTS = 21
+    WALL_LOADS = 22
+    WALL_STEP = 23
+    BATH_WORK = 24
+    BATH_WALL_WORK = 25
+    FIRST_FORCE = 26  # from here on the stages of forces, see `force_stages`
+
 
 NEXT_STEP, NO_STEP = range(2)
 """What follows the work of a bath: a step of `scratch[DT]`, or none, as at a row of the ledger."""
@@ -159,7 +164,7 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
         form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, clock[STEP])
         return 0
 
-    return {STIFFNESS_WORK: stiffness_work, SETTLE: settle_contacts, FORM: form}
+    return {StageNumber.STIFFNESS_WORK: stiffness_work, StageNumber.SETTLE: settle_contacts, StageNumber.FORM: form}
 
 
 @functools.cache
@@ -198,7 +203,11 @@ def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
             return Stop.OVERCOMPRESSED.value
         return Stop.NONE.value
 
-    return {WALL_CONTACTS: update_walls, WALL_LOADS: wall_loads, WALL_STEP: wall_step}
+    return {
+        StageNumber.WALL_CONTACTS: update_walls,
+        StageNumber.WALL_LOADS: wall_loads,
+        StageNumber.WALL_STEP: wall_step,
+    }
 
 
 @stage("the work of the noise of contacts")
