@@ -76,23 +76,24 @@ def to_lammps_dump(one: Exported) -> str:
     """Format a frame as a snapshot of a custom dump.
 
     Columns: id, type, position, radius, velocity, spin, moment, mass, charge, crossings of the box, time [s], own
-    quantities in SI with the prefix `d_` that LAMMPS gives such numbers, and cluster. The time is a column, and names
-    of materials are a comment behind `NUMBER OF ATOMS`, because some readers do not accept `ITEM: TIME`, and some no
-    columns of text. `TIMESTEP` is different in each frame, see `_numbers`.
+    quantities in SI with the prefix `d_` that LAMMPS gives such numbers, name of the material, and cluster. The time is
+    a column, because some readers do not accept `ITEM: TIME`. `TIMESTEP` is different in each frame, see `_numbers`.
     """
     frame = one.frame
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     head = (
         f"ITEM: TIMESTEP\n{one.number}\n"
-        f"ITEM: NUMBER OF ATOMS # {listed(one.materials)}\n{len(frame)}\n"
+        f"ITEM: NUMBER OF ATOMS\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {walls}\n{box}"
         "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz mass q ix iy iz v_time"
-        f"{''.join(f' d_{name}' for name in frame.own)} c_cluster\n"
+        f"{''.join(f' d_{name}' for name in frame.own)} typelabel c_cluster\n"
     )
     columns = [one.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, frame.mass]
-    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values(), one.cluster + 1]
-    return head + _table(frame.id, columns)
+    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values()]
+    labels = [listed([name]).replace(" ", "%20") for name in one.materials]
+    ends = [f"{labels[kind]} {cluster}\n" for kind, cluster in zip(one.material, one.cluster + 1, strict=True)]
+    return head + "".join(f"{row} {end}" for row, end in zip(_rows(frame.id, columns), ends, strict=True))
 
 
 def to_lammps_data(one: Exported) -> str:

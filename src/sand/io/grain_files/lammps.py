@@ -37,8 +37,8 @@ IN_HYBRID = {"sphere": "diameter density", "dipole": "q mux muy muz", "charge": 
 """Columns that a style adds to `id type x y z` of `hybrid`; one that occurs twice is written once."""
 BY_SAND = re.compile(r"SAND, step (\d+), (\S+) s, units si")
 """First line of a data file that SAND exported."""
-OF_SAND = {"v_time", "c_cluster"}
-"""Columns that show, with names of materials behind the number of atoms, that SAND exported a dump, in SI."""
+OF_SAND = {"typelabel", "v_time", "c_cluster"}
+"""Columns that show that SAND exported a dump, in SI."""
 SECTIONS = re.compile(
     r"^(Atoms|Velocities|Masses|Atom Type Labels|Bonds|Angles|Dihedrals|Impropers|Ellipsoids|Lines|Triangles|Bodies|"
     r"[A-Z][A-Za-z]* (?:Coeffs|Type Labels))\b\s*(?:#\s*(.*))?$"
@@ -196,8 +196,7 @@ def read_dump(path: Any, lines: list[str]) -> GrainFile:
 
 
 def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | None) -> GrainData:
-    heads = {k: lines[k].removeprefix("ITEM: ") for k in range(first, end) if lines[k].startswith("ITEM: ")}
-    items = {head.partition("#")[0].strip(): k for k, head in heads.items()}
+    items = {lines[k].strip().removeprefix("ITEM: "): k for k in range(first, end) if lines[k].startswith("ITEM: ")}
     atoms = next((name for name in items if name.startswith("ATOMS")), None)
     bounds = next((name for name in items if name.startswith("BOX BOUNDS")), None)
     try:
@@ -230,13 +229,9 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
             values = columns.pop(name, None)
             if values is not None and axis not in columns:
                 columns[axis] = low[k] + values * (high[k] - low[k]) if scaled else values
-    listed = heads[items["NUMBER OF ATOMS"]].partition("# ")[2]
-    by_sand = bool(listed) and set(names) >= OF_SAND
-    data = _in_si(path, columns, units, by_sand=by_sand)
+    data = _in_si(path, columns, units, by_sand=set(names) >= OF_SAND)
     data.box = FileBox(low, high, (x, y, z))
-    if by_sand and "type" in columns:
-        data.names = _labels({}, columns["type"], listed)
-    elif "typelabel" in texts:
+    if "typelabel" in texts:
         at = names.index("typelabel")
         data.names = [unlisted(rows[k][1][at])[0] for k in order]
     words = lines[first + 1].split()
