@@ -12,6 +12,7 @@ from sand.cli.main import main
 from sand.constants import BOLTZMANN
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
+from sand.experiments.growth_boxes import shared_settings
 
 CASE = {
     "run": {"until": "30 ns", "frame_every": "1 ns"},
@@ -176,6 +177,13 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     assert main(["analyse", str(ensembles / "magnetic" / "seed-1"), "--window", "1.2", "4"]) == 0
     shown = capsys.readouterr().out
     assert "1 of 30 grains" in shown and "nan" not in shown and "single grains  translation" in shown
+
+
+@pytest.mark.parametrize("forces", [3, [1], {"contact": 3}])
+def test_odd_forces_of_a_case_are_refused(forces):
+    """[forces] of a case.toml that was edited holds something else than tables."""
+    with pytest.raises(sand.BadInput, match="must be tables"):
+        shared_settings({"run": {}, "forces": forces})
 
 
 @pytest.mark.compiled("dipoles")

@@ -168,3 +168,11 @@ def test_simulations_of_one_process(tmp_path):
         assert [row["step"] for row in again.ledger.rows] == sand.open(folder).ledger["step"].tolist()
     with pytest.raises(sand.BadInput, match="another run"):  # refused twice
         first.run(until="0.4 ns")
+
+
+def test_a_shared_folder_may_be_locked_for_a_moment(tmp_path):
+    """Processes that share a folder wait for each other when they write; other jobs refuse a folder in use."""
+    with writing(tmp_path):
+        assert make_folder(tmp_path, shared=True) == tmp_path
+        with pytest.raises(sand.BadInput, match="writes to"):
+            make_folder(tmp_path)

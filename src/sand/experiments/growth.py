@@ -92,6 +92,10 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
     first = frames[0]
     frames.close()
+    try:
+        shared = shared_settings(run.case)
+    except BadInput as error:
+        raise error.at(str(folder)) from None
     moments = np.linalg.norm(first.moment, axis=1)
     return BoxResult(
         user_path(folder),
@@ -101,7 +105,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         float(first.radius.mean()),
         float(moments[moments > 0.0].mean()) if moments.any() else 0.0,
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
-        shared_settings(run.case),
+        shared,
         tuple(bodies),
     )
 

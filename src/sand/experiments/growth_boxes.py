@@ -199,9 +199,12 @@ def _finished_summary(place: Path) -> dict[str, Any]:
 
 
 def shared_settings(case: dict[str, Any]) -> dict[str, Any]:
-    """Settings that boxes of an ensemble share: the case without [run] and cut-offs, which depend on the grains."""
-    forces = {
-        name: {key: value for key, value in table.items() if key != "cutoff"}
-        for name, table in case.get("forces", {}).items()
-    }
+    """Settings that boxes of an ensemble share: the case without [run] and cut-offs, which depend on the grains.
+
+    Raises BadInput if [forces] holds anything but tables.
+    """
+    given = case.get("forces", {})
+    if not isinstance(given, dict) or not all(isinstance(table, dict) for table in given.values()):
+        raise BadInput("forces in case.toml must be tables, such as [forces.contact]")
+    forces = {name: {key: value for key, value in table.items() if key != "cutoff"} for name, table in given.items()}
     return {name: table for name, table in case.items() if name != "run"} | {"forces": forces}

@@ -76,7 +76,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     try:
         if folder.exists() and not folder.is_dir():
             raise BadInput(f"{folder} is a file; give the name of a new folder")
-        if (folder / LOCK).exists():
+        if not shared and (folder / LOCK).exists():  # those who share it wait for each other
             refuse_locked(folder)
         if is_used(folder) and not shared:
             if not overwrite:
