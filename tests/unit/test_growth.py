@@ -8,11 +8,13 @@ import pytest
 import tomli_w
 
 import sand
+from sand.analysis.body_motion import BodyMotion
 from sand.cli.main import main
 from sand.constants import BOLTZMANN
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 from sand.experiments.growth_boxes import shared_settings
+from sand.experiments.growth_report import temperatures_over_time
 
 CASE = {
     "run": {"until": "30 ns", "frame_every": "1 ns"},
@@ -211,3 +213,19 @@ def test_wrong_arguments_are_refused(ensembles, tmp_path, monkeypatch, capsys, w
     err = capsys.readouterr().err
     assert part in err and err.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_temperatures_are_pooled_at_equal_times():
+    """T = 2 E/(3 k_B) of the bodies of all boxes at one time; a box that ended early has frames at times of its own."""
+
+    def box(times, temperature):
+        energy = 1.5 * BOLTZMANN * temperature * np.ones(2)
+        bodies = BodyMotion(np.ones(2, int), np.ones(2), energy, 2.0 * energy, np.zeros(2))
+        return BoxResult("", np.zeros(1), np.ones(1), 2, 1.0, 0.0, {}, {}, tuple((t, bodies) for t in times))
+
+    boxes = [box([1.0, 2.0, 3.0], 100.0), box([1.0, 2.0 * (1.0 + 1e-12), 3.0], 300.0), box([0.4, 0.8, 1.2], 900.0)]
+    found = temperatures_over_time(boxes)
+    assert found[:, 0].tolist() == [1.0, 2.0, 3.0]
+    assert found[:, 1] == pytest.approx([200.0] * 3, rel=1e-12, abs=0.0)
+    assert found[:, 2] == pytest.approx([400.0] * 3, rel=1e-12, abs=0.0)
+    assert temperatures_over_time([box([], 1.0)]).shape == (0, 4)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +20,8 @@ from .growth import BoxResult, GrowthResult, Temperatures, all_aggregates, boxes
 
 NAMES = ("analysis.json", "growth.csv", "degrees.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
+SAME_TIME = 1e-9
+"""Relative difference of the times of frames up to which they are of one time."""
 
 
 class Ensemble(NamedTuple):
@@ -121,11 +125,23 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
 
 
 def temperatures_over_time(boxes: Sequence[BoxResult]) -> np.ndarray:
-    """Rows of time [s] and `BodyTemperatures` [K] of all bodies of all boxes, one for each frame read, (K, 4)."""
-    rows = []
-    for looks in zip(*(box.bodies for box in boxes), strict=False):
-        together = joined([motion for _, motion in looks])
-        rows.append([float(np.mean([time for time, _ in looks])), *body_temperatures(together)])
+    """Rows of time [s] and `BodyTemperatures` [K] of the bodies of all boxes, for each time that half of them have.
+
+    Boxes that ended at another time, or wrote frames at other times, have none at those of the others.
+
+    Returns
+    -------
+    ndarray
+        (K, 4).
+    """
+    looks = sorted(((time, motion) for box in boxes for time, motion in box.bodies), key=itemgetter(0))
+    starts = [k for k, (time, _) in enumerate(looks) if k == 0 or time > looks[k - 1][0] * (1.0 + SAME_TIME)]
+    groups = [looks[k:end] for k, end in pairwise([*starts, len(looks)])]
+    rows = [
+        [group[0][0], *body_temperatures(joined([motion for _, motion in group]))]
+        for group in groups
+        if 2 * len(group) >= len(boxes)
+    ]
     return np.array(rows).reshape(-1, 4)
 
 
