@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from .counts import COUNTS
 from .layers import LAYERS, PLAN, SOURCE, TOP, rank, written
 
 SOURCES = sorted(SOURCE.rglob("*.py"))
@@ -292,3 +293,9 @@ def test_the_source_archive_is_complete():
     names = {file.distribution_path for file in sdist.SdistBuilder(str(TOP)).recurse_included_files()}
     missing = {name for name in tracked_files() if (TOP / name).is_file()} - {name.replace("\\", "/") for name in names}
     assert not missing, sorted(missing)
+
+
+@pytest.mark.parametrize("count", COUNTS, ids=[count.what for count in COUNTS])
+def test_the_source_becomes_no_more_interwoven(count):
+    """Each count is at most its limit (`counts`), which is lowered as counts fall."""
+    assert count.now() <= count.most, f"{count.what}: {count.now()}, at most {count.most}"

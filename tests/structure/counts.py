@@ -1,0 +1,153 @@
+"""Counts that say how interwoven the source is, with the most that each may be.
+
+``python -m tests.structure.counts`` prints the table.  A limit is lowered when a change makes its count smaller, until
+the goal is reached.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from .layers import SOURCE, TOP
+
+MOST_PARAMETERS = 8
+"""Positional parameters that a function may have."""
+WALL = re.compile(r"(^|_)walls?(_|$)|Wall(?!Clock|Time)")
+NO_WALL = re.compile(r"wall_(time|clock|seconds|limit)|(time|clock)_wall", re.IGNORECASE)
+DRIVEN = re.compile(r"(^|_)driven(_|$)|Driven")
+RIGID = re.compile(r"(^|_)rigid(_|$)|Rigid")
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    """Syntax tree of each source file."""
+    return {path: ast.parse(path.read_text("utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
+
+
+def parameters() -> dict[str, int]:
+    """Number of positional parameters of each function that has more than `MOST_PARAMETERS`, without `self`."""
+    found = {}
+    for path, tree in trees().items():
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                names = [one.arg for one in (*node.args.posonlyargs, *node.args.args) if one.arg not in ("self", "cls")]
+                if len(names) > MOST_PARAMETERS:
+                    found[f"{path.relative_to(SOURCE)}:{node.name}"] = len(names)
+    return found
+
+
+def attributes_of_simulation() -> int:
+    """Number of attributes that the constructor of `Simulation` sets."""
+    (tree,) = (tree for path, tree in trees().items() if path == SOURCE / "simulation" / "simulation.py")
+    made = next(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name == "__init__")
+    stores = (node for node in ast.walk(made) if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store))
+    return len({node.attr for node in stores if isinstance(node.value, ast.Name) and node.value.id == "self"})
+
+
+def pairs_of_folders() -> int:
+    """Number of pairs of folders, or modules at the top, of which one imports the other."""
+    found = set()
+    for path, tree in trees().items():
+        own = path.relative_to(SOURCE).parent.parts or (path.stem,)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                base = path.relative_to(SOURCE).parts[: -node.level]
+                for name in node.names:
+                    parts = *base, *(node.module or "").split("."), name.name
+                    other = _folder_of(tuple(part for part in parts if part))
+                    if other and other != own:
+                        found.add(frozenset((own, other)))
+    return len(found)
+
+
+def _folder_of(parts: tuple[str, ...]) -> tuple[str, ...] | None:
+    """The folder of a module, or the module at the top, of a dotted name; None for the package itself."""
+    for end in range(len(parts), 0, -1):
+        path = SOURCE.joinpath(*parts[:end])
+        if path.is_dir():
+            return parts[:end]
+        if path.with_suffix(".py").exists():
+            return parts[: end - 1] or parts[:end]
+    return None
+
+
+def _names(path: Path) -> Iterator[str]:
+    """Identifiers of a source file, those of its imports included."""
+    for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline):
+        if token.type == tokenize.NAME:
+            yield token.string
+
+
+def files_that_name(what: re.Pattern[str]) -> list[str]:
+    """Source files with an identifier of a feature; files that the feature has for itself have it in their name."""
+    found = []
+    for path in trees():
+        own = what.search(path.stem) or any(what.search(part) for part in path.relative_to(SOURCE).parts[:-1])
+        if not own and any(what.search(name) and not NO_WALL.search(name) for name in _names(path)):
+            found.append(str(path.relative_to(SOURCE)))
+    return found
+
+
+def code_lines() -> int:
+    """Lines of the source without docstrings, comments and blank lines."""
+    total = 0
+    for path, tree in trees().items():
+        text = path.read_text("utf-8")
+        left_out = set()
+        for node in ast.walk(tree):
+            if (
+                isinstance(node, ast.Expr)
+                and isinstance(node.value, ast.Constant)
+                and isinstance(node.value.value, str)
+            ):
+                left_out |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+        lines = enumerate(text.splitlines(), 1)
+        total += sum(1 for k, line in lines if k not in left_out and line.strip() and not line.strip().startswith("#"))
+    return total
+
+
+def private_accesses_of_tests() -> int:
+    """Attributes with a leading underscore that unit tests read of objects that are not their own."""
+    number = 0
+    for path in sorted((TOP / "tests" / "unit").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Attribute) and re.match(r"_[a-z]", node.attr):
+                number += not (isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"))
+    return number
+
+
+class Count(NamedTuple):
+    """One count: what, its present value, the most that it may be, and the goal."""
+
+    what: str
+    now: Callable[[], int]
+    most: int
+    goal: int
+
+
+COUNTS = (
+    Count("functions with more than 8 positional parameters", lambda: len(parameters()), 37, 8),
+    Count("most positional parameters", lambda: max(parameters().values(), default=0), 12, 10),
+    Count("attributes that Simulation sets", attributes_of_simulation, 40, 15),
+    Count("pairs of folders of which one imports the other", pairs_of_folders, 340, 200),
+    Count("files that name rigid clusters outside their own", lambda: len(files_that_name(RIGID)), 23, 3),
+    Count("files that name walls outside their own", lambda: len(files_that_name(WALL)), 33, 3),
+    Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN)), 12, 3),
+    Count("code lines", code_lines, 35900, 32850),
+    Count("private accesses of unit tests", private_accesses_of_tests, 107, 30),
+)
+
+
+if __name__ == "__main__":
+    for count in COUNTS:
+        print(f"{count.what:55} {count.now():6}  at most {count.most:6}  goal {count.goal:6}")
+    print(
+        *(f"  {number:3} {name}" for name, number in sorted(parameters().items(), key=lambda item: -item[1])), sep="\n"
+    )
