@@ -43,6 +43,7 @@ def _check(values: parsing.OptionValues) -> Iterator[str]:
 @options.output
 def command(
     case: str | None,
+    *,
     source: str | None,
     frame: int | None,
     out: str | None,

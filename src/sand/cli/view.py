@@ -40,6 +40,7 @@ YOUNG = 5.0
 @options.output
 def command(
     folder: str,
+    *,
     html: str | None,
     every: int,
     frames: slice,

@@ -229,9 +229,7 @@ def first_half(s, some_awake):
         return Stop.NO_STEP.value
     takes_substeps = False
     if s.flight_limits.substeps:
-        shared = choose_shared_step(
-            s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits, h, longest
-        )
+        shared = choose_shared_step(s, h, longest)
         h, takes_substeps = shared, shared > h
     if is_past(s.clock[TIME] + h, s.until):
         if not s.shorten:

@@ -18,7 +18,7 @@ come to rest as in any step.  Contacts at rest carry all loads: the slow ones ar
 import math
 
 from ..box import nearest_image
-from ..compiler.jit import formula, loop
+from ..compiler.jit import caller, formula, loop
 from ..compiler.stage import stage
 from ..numerics.vec import add, load, norm, sub
 from ..state.state import BODIES, PAIRS, STEP
@@ -78,26 +78,26 @@ def mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, h):
     return number
 
 
-@loop
-def choose_shared_step(grains, bodies, pair_list, count, span, gas, limits, h, longest):
+@caller
+def choose_shared_step(s, h, longest):
     """Step of all bodies [s], h times a power of two, at most `longest`, with the least estimated cost per time.
 
     Marks the bodies that take substeps in it; none if it is h, the step that all bodies require.
     """
-    whole = GRAIN_COST * grains.mass.size
+    whole = GRAIN_COST * s.grains.mass.size
     least, best, tried = WORTH * whole / h, h, 2.0 * h
     while tried <= longest:
         if whole + CALL_COST < least * tried:  # else it cannot cost less
-            number = mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, tried)
+            number = mark_quick_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits, tried)
             each = SUBSTEP_COST + number * (SUBSTEP_GRAIN_COST + number * SUBSTEP_PAIR_COST)
             cost = (whole + CALL_COST + each * tried / h) / tried
             if cost < least:
                 least, best = cost, tried
         tried *= 2.0
     if best > h:
-        mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, best)
+        mark_quick_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits, best)
     else:
-        bodies.quick[:] = 0
+        s.bodies.quick[:] = 0
     return best
 
 
