@@ -63,7 +63,7 @@ MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
 """Logged arrays of grains that not all frames have."""
-ALIKE = ("scale/length", "periodic", "lengths")
+UNCHANGED = ("scale/length", "periodic", "lengths")
 """Logged arrays that are left out of frames in which they are those of the first one."""
 
 
@@ -185,8 +185,8 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
     """Append a frame to an open GSD file; `first`: of `first_chunks`, filled in when this is the first frame.
 
     A chunk is left out, as by gsd.hoomd, where readers find the same bytes without it: those of the first frame or, if
-    that has no such chunk, the default; of logged arrays only `ALIKE`. GSD reads no logged array that the first frame
-    lacks: identities and what is at rest that appear later are chunks of names that begin with `LATE`.
+    that has no such chunk, the default; of logged arrays only `UNCHANGED`. GSD reads no logged array that the first
+    frame lacks: identities and what is at rest that appear later are chunks of names that begin with `LATE`.
     """
     is_first, write = not first, file.file.write_chunk
     for name, (value_in, dtype, default) in _DEFAULTS.items():
@@ -200,10 +200,10 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
             first[name] = content
     for name, values in frame.log.items():
         known = first.get(f"log/{name}")
-        if name in ALIKE and known == values.tobytes():
+        if name in UNCHANGED and known == values.tobytes():
             continue
         write(f"{LATE if name in SOMETIMES and known is None and not is_first else 'log/'}{name}", values)
-        if is_first and name in (*ALIKE, *SOMETIMES):
+        if is_first and name in (*UNCHANGED, *SOMETIMES):
             first[f"log/{name}"] = values.tobytes()
     file.file.end_frame()
     if is_first:
@@ -212,7 +212,7 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
 
 def first_chunks(file: Any) -> dict[str, bytes]:
     """Bytes of the chunks of the first frame that `append_frame` compares with; empty if there is no frame."""
-    names = [*_DEFAULTS, *(f"log/{name}" for name in (*ALIKE, *SOMETIMES))]
+    names = [*_DEFAULTS, *(f"log/{name}" for name in (*UNCHANGED, *SOMETIMES))]
     return {name: file.file.read_chunk(0, name).tobytes() for name in names if file.file.chunk_exists(0, name)}
 
 
