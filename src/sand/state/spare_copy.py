@@ -48,22 +48,25 @@ class SpareCopy:
         """Whether a state has the shapes of the copy; finds the memory of its arrays."""
         groups = _groups_of(state)
         if not _are_same(groups, self._sources):
-            pairs = list(zip(self._copy.arrays(), state.arrays(), strict=True))  # type: ignore[union-attr]
-            if any(copy.shape != array.shape for copy, array in pairs):
+            found = _bytes_of(self._copy, state)
+            if found is None:
                 return False
-            self._sources = groups
-            self._bytes = [
-                (memoryview(copy).cast("B"), memoryview(array).cast("B"))
-                for copy, array in pairs
-                if copy.size and copy is not array
-            ]
-            self._references = list(map(getrefcount, self._parts))  # the views of the copy refer to it, too
+            self._sources, self._bytes = groups, found
+            self._references = list(map(getrefcount, self._parts))  # the bytes of the copy refer to it, too
         return True
 
     def _is_free(self) -> bool:
         # the copy itself is held by this object alone, as `_alone` is
         is_alone = getrefcount(self._copy) == getrefcount(self._alone)
         return is_alone and list(map(getrefcount, self._parts)) == self._references
+
+
+def _bytes_of(copy: Any, state: State) -> list[tuple[memoryview, memoryview]] | None:
+    """The bytes of each array of a copy and of a state, empty arrays left out; None if any shapes differ."""
+    pairs = list(zip(copy.arrays(), state.arrays(), strict=True))
+    if any(own.shape != array.shape for own, array in pairs):
+        return None
+    return [(memoryview(own).cast("B"), memoryview(array).cast("B")) for own, array in pairs if own.size]
 
 
 def _groups_of(state: State) -> list[Any]:
