@@ -88,10 +88,10 @@ def stored_frame(
     """
     arrays, own = grains.arrays, [m.name for m in grains.materials]
     scale = float(arrays.radius.mean()) if scale is None else scale
-    lengths = box.lengths
-    if None in lengths:
+    cloud = np.zeros(3)
+    if None in box.lengths:
         cloud = 2.0 * np.abs(arrays.position).max(axis=1) + 2.0 * arrays.radius.max()
-        lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(lengths)]
+    lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(box.lengths)]
     types = list(dict.fromkeys((*materials, *own)))
     particles = SimpleNamespace(
         N=len(grains),
@@ -154,7 +154,7 @@ def _letters(names: tuple[str, ...]) -> np.ndarray:
     return np.array(names, (bytes, width)).view(np.int8).reshape(len(names), width)
 
 
-DEFAULTS = {
+DEFAULTS: dict[str, np.ndarray] = {
     "configuration/step": np.array([0], np.uint64),
     "configuration/box": np.array([1, 1, 1, 0, 0, 0], np.float32),
     "particles/N": np.array([0], np.uint32),
@@ -273,7 +273,8 @@ def _crc32(stored: Any) -> int:
     with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
         for part in parts:
             # + 0 makes −0 and 0 equal, which GSD does not distinguish
-            code = zlib.crc32(np.ascontiguousarray(part + 0.0 if part.dtype.kind == "f" else part), code)
+            content: Any = np.ascontiguousarray(part + 0.0 if part.dtype.kind == "f" else part)
+            code = zlib.crc32(content, code)
     return code
 
 

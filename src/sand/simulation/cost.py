@@ -37,7 +37,7 @@ PER_PAIR, PER_EWALD_PAIR, PER_WAVE = 2e-9, 5e-9, 3.5e-9
 """Wall times [s] of a long-range sum for each grain and pair, and for each grain and wave vector."""
 PER_BODY_STEP, PER_AWAKE_STEP = 10e-6, 3e-6
 """Wall times [s] of a step of bodies, and of a contact step of awake clusters."""
-PER_OUTPUT, PER_OUTPUT_GRAIN = 2e-3, 2.7e-6
+PER_OUTPUT, PER_OUTPUT_GRAIN = 0.7e-3, 2.1e-6
 """Wall times [s] of a frame and its row, and of each grain in it."""
 START, FIGURE = 1.0, 1.5
 """Wall times [s] of the start of a run, with imports and compiled code from the disk, and of the figure at its end."""

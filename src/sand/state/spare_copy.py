@@ -63,7 +63,7 @@ class SpareCopy:
 
 def _bytes_of(copy: Any, state: State) -> list[tuple[memoryview, memoryview]] | None:
     """The bytes of each array of a copy and of a state, empty arrays left out; None if any shapes differ."""
-    pairs = list(zip(copy.arrays(), state.arrays(), strict=True))
+    pairs: list[tuple[Any, Any]] = list(zip(copy.arrays(), state.arrays(), strict=True))
     if any(own.shape != array.shape for own, array in pairs):
         return None
     return [(memoryview(own).cast("B"), memoryview(array).cast("B")) for own, array in pairs if own.size]
