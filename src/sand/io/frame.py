@@ -65,7 +65,7 @@ IN_FULL = ("position", "radius", "velocity", "mass", "charge")
 """Quantities that trajectories have in single precision, and files of bodies also in double precision."""
 SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
 """Logged arrays of grains that not all frames have."""
-ALIKE = ("scale/length", "periodic", "lengths")
+UNCHANGED = ("scale/length", "periodic", "lengths")
 """Logged arrays that are left out of frames in which they are those of the first one."""
 
 
@@ -88,10 +88,10 @@ def stored_frame(
     """
     arrays, own = grains.arrays, [m.name for m in grains.materials]
     scale = float(arrays.radius.mean()) if scale is None else scale
-    lengths = box.lengths
-    if None in lengths:
+    cloud = np.zeros(3)
+    if None in box.lengths:
         cloud = 2.0 * np.abs(arrays.position).max(axis=1) + 2.0 * arrays.radius.max()
-        lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(lengths)]
+    lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(box.lengths)]
     types = list(dict.fromkeys((*materials, *own)))
     particles = SimpleNamespace(
         N=len(grains),
@@ -153,7 +153,7 @@ def _letters(names: tuple[str, ...]) -> np.ndarray:
     return np.array(names, (bytes, width)).view(np.int8).reshape(len(names), width)
 
 
-DEFAULTS = {
+DEFAULTS: dict[str, np.ndarray] = {
     "configuration/step": np.array([0], np.uint64),
     "configuration/box": np.array([1, 1, 1, 0, 0, 0], np.float32),
     "particles/N": np.array([0], np.uint32),
@@ -184,8 +184,8 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
     """Append a frame to an open GSD file; `first`: of `first_chunks`, filled in when this is the first frame.
 
     A chunk is left out, as by gsd.hoomd, where readers find the same bytes without it: those of the first frame or, if
-    that has no such chunk, the default; of logged arrays only `ALIKE`. GSD reads no logged array that the first frame
-    lacks: identities and what is at rest that appear later are chunks of names that begin with `LATE`.
+    that has no such chunk, the default; of logged arrays only `UNCHANGED`. GSD reads no logged array that the first
+    frame lacks: identities and what is at rest that appear later are chunks of names that begin with `LATE`.
     """
     is_first, write = not first, file.file.write_chunk
     for name, (value_in, dtype, default) in _DEFAULTS.items():
@@ -199,10 +199,10 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
             first[name] = content
     for name, values in frame.log.items():
         known = first.get(f"log/{name}")
-        if name in ALIKE and known == values.tobytes():
+        if name in UNCHANGED and known == values.tobytes():
             continue
         write(f"{LATE if name in SOMETIMES and known is None and not is_first else 'log/'}{name}", values)
-        if is_first and name in (*ALIKE, *SOMETIMES):
+        if is_first and name in (*UNCHANGED, *SOMETIMES):
             first[f"log/{name}"] = values.tobytes()
     file.file.end_frame()
     if is_first:
@@ -211,7 +211,7 @@ def append_frame(file: Any, frame: Any, first: dict[str, bytes]) -> None:
 
 def first_chunks(file: Any) -> dict[str, bytes]:
     """Bytes of the chunks of the first frame that `append_frame` compares with; empty if there is no frame."""
-    names = [*_DEFAULTS, *(f"log/{name}" for name in (*ALIKE, *SOMETIMES))]
+    names = [*_DEFAULTS, *(f"log/{name}" for name in (*UNCHANGED, *SOMETIMES))]
     return {name: file.file.read_chunk(0, name).tobytes() for name in names if file.file.chunk_exists(0, name)}
 
 
@@ -272,7 +272,8 @@ def _crc32(stored: Any) -> int:
     with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
         for part in parts:
             # + 0 makes −0 and 0 equal, which GSD does not distinguish
-            code = zlib.crc32(np.ascontiguousarray(part + 0.0 if part.dtype.kind == "f" else part), code)
+            content: Any = np.ascontiguousarray(part + 0.0 if part.dtype.kind == "f" else part)
+            code = zlib.crc32(content, code)
     return code
 
 

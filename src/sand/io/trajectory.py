@@ -97,9 +97,10 @@ class TrajectoryWriter:
                     report(lost)
             self._open(resume_at is not None and path.exists())
             self._entries = len(gsd_index.read_index(path)[1])
-            if kept := len(self._file) - len(self._later):
-                self._scale = float(self._file.file.read_chunk(0, "log/scale/length")[0])
-                self._materials = read_materials(self._file, kept)
+            file: Any = self._file
+            if kept := len(file) - len(self._later):
+                self._scale = float(file.file.read_chunk(0, "log/scale/length")[0])
+                self._materials = read_materials(file, kept)
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
 

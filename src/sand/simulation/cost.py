@@ -45,7 +45,7 @@ PER_BODY_STEP, PER_BODY_GRAIN, PER_BODY_IN_GAS = 1e-6, 0.1e-6, 0.17e-6
 PER_AWAKE_STEP, PER_SUBSTEP = 3e-6, 50e-6
 """Wall times [s] of a contact step of awake clusters, and of a substep of quick bodies.  How many substeps a run takes
 is not known before, but those that it took say nothing about the speed of contact steps."""
-PER_OUTPUT, PER_OUTPUT_GRAIN = 2e-3, 2.7e-6
+PER_OUTPUT, PER_OUTPUT_GRAIN = 0.7e-3, 2.1e-6
 """Wall times [s] of a frame and its row, and of each grain in it."""
 START, FIGURE = 1.0, 1.5
 """Wall times [s] of the start of a run, with imports and compiled code from the disk, and of the figure at its end."""

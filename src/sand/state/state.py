@@ -129,7 +129,7 @@ GROUPS = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "wal
 """Groups of arrays of a state, besides its grains."""
 SINGLE = ("clock", "count", "lost", "cutoff", "order")
 """Its other arrays."""
-IN_GROUPS, OTHERS, SHAPE = attrgetter(*GROUPS), attrgetter(*SINGLE), attrgetter("shape")
+IN_GROUPS, OTHERS = attrgetter(*GROUPS), attrgetter(*SINGLE)
 WALL_CONTACT_ARRAYS = (
     *("pair", "pointer1", "pointer2", "twist", "formed", "constants", "lost", "damping", "force", "torque1", "flag"),
 )
@@ -205,17 +205,10 @@ class State:
             setattr(other, name, next(copies) if array.size else array)
         return other
 
-    def copy_to(self, other: State) -> bool:
-        """Make an earlier copy, whose arrays stay, equal to this state; False if the shapes of arrays differ."""
-        own, its = self.arrays(), other.arrays()
-        if list(map(SHAPE, own)) != list(map(SHAPE, its)):
-            return False
-        for array, copy in zip(own, its, strict=True):
-            if copy is not array:
-                copy[...] = array
-        other.box, other.uniform_contacts = self.box, self.uniform_contacts
-        vars(other.grains).update(vars(self.grains) | {"arrays": other.grains.arrays})
-        return True
+    def take_settings(self, other: State) -> None:
+        """Take over what another state has besides arrays."""
+        self.box, self.uniform_contacts = other.box, other.uniform_contacts
+        vars(self.grains).update(vars(other.grains) | {"arrays": self.grains.arrays})
 
     def arrays(self) -> list[np.ndarray]:
         """All arrays of the state."""
