@@ -14,11 +14,12 @@ import sand
 from sand.errors import FilesFailed
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.ledger_table import LedgerFile, read_ledger
-from sand.io.run_folder import make_folder, read_toml, replace_file, write_json, write_toml
+from sand.io.run_folder import make_folder, read_toml, replace_file, shows_a_run, write_json, write_toml
 from sand.io.trajectory import TrajectoryWriter, read_frames
 from sand.state.state import STEPS
 
 from ..physics.setups import struck_chain
+from .synthetic_trajectories import write_trajectory
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))
@@ -108,6 +109,18 @@ def test_folders_are_never_overwritten_unasked(tmp_path):
     assert not (folder / "summary.json").exists()
     with pytest.raises(sand.BadInput, match="is a file"):
         make_folder(folder / "notes.txt")
+
+
+def test_a_trajectory_shows_a_run(tmp_path):
+    """One of SAND alone is overwritten; a GSD file of another program, or any other content, is not."""
+    path = write_trajectory(tmp_path / "trajectory.gsd", [[(0, 1)]], 4)
+    assert shows_a_run(tmp_path)
+    path.unlink()
+    with gsd.hoomd.open(path, "w") as file:
+        file.append(gsd.hoomd.Frame())
+    assert not shows_a_run(tmp_path)
+    path.write_bytes(b"\xff" * 100)
+    assert not shows_a_run(tmp_path)
 
 
 def test_json_and_toml(tmp_path):

@@ -126,8 +126,12 @@ def shows_a_run(folder: Path) -> bool:
     for path in files_of_runs(folder):
         with contextlib.suppress(OSError), open(path, "rb") as file:
             begin = file.read(4096)
-            if path.name == TRAJECTORY and b"SAND" in begin:  # the application in the header of GSD
-                return True
+            if path.name == TRAJECTORY and len(begin) >= 40:
+                file.seek(
+                    min(int.from_bytes(begin[24:32], "little"), 2**62)
+                )  # where the header says names of chunks are
+                if b"log/scale/length" in file.read(8192):
+                    return True
             if path.name == LEDGER and begin.startswith(b"step,time,translation,rotation,"):
                 return True
             if CHECKPOINT.fullmatch(path.name) and begin.startswith(b"PK") and b"meta.json" in begin:
