@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from operator import add, sub
@@ -221,13 +222,19 @@ class StepTimer:
     """
 
     def __init__(self, simulation: Simulation, clock: Callable[[], float] = time.thread_time):
-        self._simulation, self._clock, self._calls = simulation, clock, 0
+        self._of, self._clock, self._calls = weakref.ref(simulation), clock, 0  # it ends with the simulation
         self._rigid = isinstance(simulation.stepping, RigidClusters)
         self._kind, self._long_range = kind_of(simulation), long_range_seconds(simulation)
         self._rough_output = output_seconds(simulation)
         # of each kind of step, and of outputs and figures: number, their time [s], and the rough estimate of that [s]
         self._sums = {mode: [0.0, 0.0, 0.0] for mode in (*MODES, OUTPUT, DRAWING)}
         self._recorded = 0.0  # time of what was measured when it was last recorded [s]
+
+    @property
+    def _simulation(self) -> Simulation:
+        found = self._of()
+        assert found is not None
+        return found
 
     @property
     def is_valid(self) -> bool:
