@@ -59,6 +59,19 @@ def test_what_is_not_an_array_of_lengths(value):
     assert in_unit(value, "m") is None
 
 
+@pytest.mark.parametrize(("unit", "wanted"), [("Hz", "rad/s"), ("rad/s", "Hz"), ("rpm", "Hz"), ("kilohertz", "rad/s")])
+def test_frequencies_are_no_angular_velocities(unit, wanted):
+    """1 Hz are 2π rad/s, which pint takes for 1 rad/s: refused as text and as a quantity."""
+    assert in_unit(f"1 {unit}", wanted) is None
+    assert in_unit(UNIT.Quantity(1.0, unit), wanted) is None
+
+
+def test_units_that_only_the_registry_of_the_user_has():
+    registry = pint.UnitRegistry()
+    registry.define("monomer_size = 0.3 um = mono")
+    assert in_unit(registry.Quantity(2.0, "mono"), "m") == pytest.approx(6e-7, rel=1e-12, abs=0.0)
+
+
 def test_masked_entries_are_named():
     with pytest.raises(sand.BadInput, match="radius has masked entries, 1 of 2; fill them"):
         sand.Grains(PAIR, MASKED, "silica")

@@ -15,7 +15,7 @@ CENTIMETRE, ANGSTROM, BOHR, FEMTOSECOND = 1e-2, 1e-10, 5.29177210903e-11, 1e-15
 STYLES = {
     "si": (1.0, 1.0, 1.0, 1.0),
     "cgs": (CENTIMETRE, CENTIMETRE, 1e-3, 3.3356409519815204e-10),
-    "micro": (1e-6, 1.0, 1e-18, 1e-12),
+    "micro": (1e-6, 1.0, 1e-15, 1e-12),
     "nano": (1e-9, 1.0, 1e-21, 1.602176634e-19),
     "metal": (ANGSTROM, 100.0, 1.66053906660e-27, 1.602176634e-19),
     "real": (ANGSTROM, 1e5, 1.66053906660e-27, 1.602176634e-19),
@@ -86,9 +86,9 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
         width = len(rows[0][1]) if rows else 4
         names = ["id", "vx", "vy", "vz", "wx", "wy", "wz"][: 7 if width == 7 else 4]
         moving = _numbers(path, rows, names)
-        turn = np.argsort(moving.pop("id"), kind="stable")
-        if len(turn) != stated:
-            raise BadInput(f"{path}: section Velocities has {len(turn)} lines, but there are {stated} atoms")
+        turn = np.argsort(moving["id"], kind="stable")
+        if not np.array_equal(moving.pop("id")[turn], identity):
+            raise BadInput(f"{path}: section Velocities must have one line for each atom of section Atoms, by its number")
         columns |= {name: values[turn] for name, values in moving.items()}
     own = BY_SAND.match(lines[0])
     data = _in_si(path, columns, _units(lines[0]), by_sand=own is not None)
