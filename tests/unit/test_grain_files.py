@@ -235,6 +235,17 @@ def test_units_of_lammps_styles(tmp_path, units, length, mass, speed):
     assert grains.velocity[0, 0] == pytest.approx(1.0, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.compiled("small")
+def test_contacts_across_the_box_of_the_case_are_put_at_rest(tmp_path):
+    """Columns state no box: two grains with a gap of 1e-4 r across a face of the case's box are in contact there."""
+    length, gap = 1e-6, 1e-4 * R
+    place = 0.5 * (length - 2.0 * R - gap)
+    (tmp_path / "a").write_text(f"{-place!r} 0 0 {R!r}\n{place!r} 0 0 {R!r}\n")
+    (start, notes) = told(start_from_file, tmp_path / "a", sand.Box.periodic(length), sand.SILICA)
+    across = length - np.ptp(start.grains.position[:, 0])
+    assert across == pytest.approx(D, abs=1e-6 * REST) and "1 contacts are put at rest" in notes[0]
+
+
 def test_a_file_of_many_frames_is_read_once(tmp_path, monkeypatch):
     """Frames are parsed from the text in memory: no time that grows as the square of their number."""
     from sand.io import file_frames
