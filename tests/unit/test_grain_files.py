@@ -136,7 +136,10 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("nan\n0 0 0 1\n", "line 1: 'nan' is not x y z"),
         ("# x y z r (nm)\n0 0 0 1\n", r"r has the unit nm, but x has none; write x \[nm\]"),
         ("x,y,z,r,vx [cm/s],vy,vz\n0,0,0,1e-7,1,1,1\n", "vy, vz: no unit, but vx has one"),
-        ('1\nLattice="1 0 0 0 1 0 0 0 1" pbc="T T" Properties=species:S:1:pos:R:3\nX 0 0 0\n', "pbc='T T' must be T or"),
+        (
+            '1\nLattice="1 0 0 0 1 0 0 0 1" pbc="T T" Properties=species:S:1:pos:R:3\nX 0 0 0\n',
+            "pbc='T T' must be T or",
+        ),
         ('1\nLattice="1 0 0 0 1 0 0 0 1" pbc="yes" Properties=species:S:1:pos:R:3\nX 0 0 0\n', "must be T or F"),
         ("1\nProperties=species:S:0:pos:R:3\n0 0 0\n", "is not made of name:type:number"),
         (
@@ -250,14 +253,15 @@ def test_a_file_of_many_frames_is_read_once(tmp_path, monkeypatch):
     """Frames are parsed from the text in memory: no time that grows as the square of their number."""
     from sand.io import file_frames
 
-    texts = [DUMP.format(k, "id x y z radius") + "".join(f"{j} {2e-7 * j} 0 0 1e-7\n" for j in (1, 2, 3)) for k in (4, 5)]
+    texts = [
+        DUMP.format(k, "id x y z radius") + "".join(f"{j} {2e-7 * j} 0 0 1e-7\n" for j in (1, 2, 3)) for k in (4, 5)
+    ]
     (tmp_path / "a").write_text("".join(texts))
     opened, open_grains = [], file_frames.open_grains
     monkeypatch.setattr(file_frames, "open_grains", lambda path: opened.append(path) or open_grains(path))
     monkeypatch.setattr("sand.io.bodies.open_grains", file_frames.open_grains)
     frames = open_frames(tmp_path / "a", material="silica")
     assert frames.steps.tolist() == [4, 5] and [frame.step for frame in frames] == [4, 5] and len(opened) == 1
-
 
 
 @pytest.mark.compiled("small")

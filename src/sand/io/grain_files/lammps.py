@@ -88,7 +88,9 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
         moving = _numbers(path, rows, names)
         turn = np.argsort(moving["id"], kind="stable")
         if not np.array_equal(moving.pop("id")[turn], identity):
-            raise BadInput(f"{path}: section Velocities must have one line for each atom of section Atoms, by its number")
+            raise BadInput(
+                f"{path}: section Velocities must have one line for each atom of section Atoms, by its number"
+            )
         columns |= {name: values[turn] for name, values in moving.items()}
     own = BY_SAND.match(lines[0])
     data = _in_si(path, columns, _units(lines[0]), by_sand=own is not None)
