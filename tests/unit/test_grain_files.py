@@ -143,8 +143,8 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ('1\nLattice="1 0 0 0 1 0 0 0 1" pbc="yes" Properties=species:S:1:pos:R:3\nX 0 0 0\n', "must be T or F"),
         ("1\nProperties=species:S:0:pos:R:3\n0 0 0\n", "is not made of name:type:number"),
         (
-            "LAMMPS units = si\n\n2 atoms\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n2 1 2e-7 2650 1 0 0\n\nVelocities\n\n"
-            "1 1 0 0\n7 2 0 0\n",
+            "LAMMPS units = si\n\n2 atoms\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n2 1 2e-7 2650 1 0 0\n"
+            "\nVelocities\n\n1 1 0 0\n7 2 0 0\n",
             "must have one line for each atom of section Atoms, by its number",
         ),
     ],

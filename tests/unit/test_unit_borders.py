@@ -83,7 +83,7 @@ def test_own_quantities_of_other_packages(package):
 
 @pytest.mark.parametrize("value", [["300 K", "310 m"], ["300 K", "20 degC"], MASKED, [1.0, np.ma.masked]], ids=str)
 def test_what_is_no_own_quantity(value):
-    with pytest.raises(sand.BadInput, match="own: heat = .* is no quantity"):
+    with pytest.raises(sand.BadInput, match=r"own: heat = .* is no quantity"):
         sand.Grains(PAIR, 1e-7, "silica", own={"heat": value})
 
 
