@@ -49,6 +49,7 @@ TEXTS = {
     "columns": (rows("{:.9f} {} {} 100"), "1 nm"),
     "tabs and comments": ("! made elsewhere\n" + rows("{:.9f}\t{}\t{}\t100  % sphere"), "1 nm"),
     "a number first": ("  3\n\n" + rows("{:.9f} {} {} 100"), "1 nm"),
+    "a title like a head of LAMMPS": ("3\n3 atoms\n" + rows("{:.9f} {} {} 100"), "1 nm"),
     "a number and a title": ("3\nmade elsewhere\n" + rows("{:.9f} {} {} 100"), "1 nm"),
     "named columns": ("r z y x\n" + rows("100 {2} {1} {0:.9f}"), "1 nm"),
     "named in a comment": ("# diameter x y z\n" + rows("200 {:.9f} {} {}"), "1 nm"),
@@ -93,7 +94,7 @@ def test_formats_are_known_by_their_content(tmp_path, name):
 def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
     """Of two frames the last is read by default; the radius comes from the caller."""
     path = tmp_path / "a.out"
-    other = "2\n\nSi 0 0 0\nFe 1 0 0\n"
+    other = "2\n2 atoms\nSi 0 0 0\nFe 1 0 0\n"
     path.write_text(other + "3\nmade elsewhere\n" + "".join(f"Si {10 * x!r} 0 0\n" for x, _, _ in NM))
     assert body_from_file(path, sand.SILICA, "100 nm").position[2, 0] == pytest.approx(D, rel=1e-12, abs=0.0)
     assert len(read_grains(path, sand.SILICA, 1e-10, frame=0).grains) == 2
@@ -132,6 +133,15 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("LAMMPS\n\n2 atoms\n\nAtoms # sphere\n\n1 1 1 1 0 0 0\n", "has 1 atoms, but the head says 2"),
         ("L\n\n1 atoms\n\nAtoms # sphere\n\n1 1 1 1 0 0 x\n", "line 7: .* is not id type diameter density x y z"),
         (DUMP.format(0, "id x y z") + "1 0 0 0\n", "lacks some of its 3 atoms"),
+        ("L\n\n1 atoms\n\na b xlo xhi\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n", "bounds of its box"),
+        ("L\n\n1 atoms\n\nAtoms # sphere\n\n1 nan 2e-7 2650 0 0 0\n", "line 7: '1 nan 2e-7 2650 0 0 0' is not id type"),
+        (DUMP.format(0, "id x x y z") + "1 0 0 0 0\n" * 3, "a column occurs twice among id x x y z"),
+        ("1\nProperties=pos:R:3:pos:R:3\n0 0 0 1 1 1\n", "a name occurs twice in Properties"),
+        ("1\nProperties=pos:R:3:radius:S:1\n0 0 0 big\n", "has no numbers for radius"),
+        (
+            "L boundary p p p\n\n1 atoms\n1 0 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n",
+            "a: box: lengths",
+        ),
         ("inf\n0 0 0 1\n", "line 1: 'inf' is not x y z"),
         ("nan\n0 0 0 1\n", "line 1: 'nan' is not x y z"),
         ("# x y z r (nm)\n0 0 0 1\n", r"r has the unit nm, but x has none; write x \[nm\]"),

@@ -121,7 +121,10 @@ def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, c
     unit = data.unit if length is None else si(length, "m", "length", above=0.0)
     assert unit is not None
     grains = _grains_of(path, data, unit, radius, choice)
-    box, centre = _box_of(data, unit)
+    try:
+        box, centre = _box_of(data, unit)
+    except BadInput as error:
+        raise error.at(f"{path}: box") from None
     return ReadGrains(grains, box, centre, None, tuple(data.notes), data.time, data.step)
 
 

@@ -111,6 +111,8 @@ def _layout(place: str, text: str) -> list[tuple[str, str, int]]:
     parts = text.split(":")
     if len(parts) % 3 or not all(width.isdecimal() and int(width) for width in parts[2::3]):
         raise BadInput(f"{place}: Properties={text[:60]!r} is not made of name:type:number")
+    if len(set(parts[::3])) < len(parts[::3]):
+        raise BadInput(f"{place}: a name occurs twice in Properties={text[:60]!r}")
     return [(name, kind, int(width)) for name, kind, width in zip(parts[::3], parts[1::3], parts[2::3], strict=True)]
 
 
@@ -121,7 +123,7 @@ def _columns(path: Any, rows: list[list[str]], layout: list[tuple[str, str, int]
     at = 0
     for name, kind, width in layout:
         known = known_as(name)
-        is_text = kind.upper() in "SL" or (known is not None and known[0] == "material")
+        is_text = kind.upper() in "SL" if known is None else known[0] == "material"
         if name == "Z":  # atomic numbers, not a coordinate
             known = None
         cells = [words[at : at + width] for words in rows]
