@@ -9,7 +9,7 @@ from sand.state.spare_copy import SpareCopy
 
 @pytest.fixture
 def state():
-    return sand.Simulation(sand.Grains([[0, 0, 0], [1e-6, 0, 0]], 1e-7, "silica"))._engine.regular_state
+    return sand.Simulation(sand.Grains([[0, 0, 0], [1e-6, 0, 0]], 1e-7, "silica")).regular_state
 
 
 def copied(spare, state, time):
