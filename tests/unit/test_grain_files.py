@@ -139,7 +139,8 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("1\nProperties=pos:R:3:pos:R:3\n0 0 0 1 1 1\n", "a name occurs twice in Properties"),
         ("1\nProperties=pos:R:3:radius:S:1\n0 0 0 big\n", "has no numbers for radius"),
         (
-            "L boundary p p p\n\n1 atoms\n1 0 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n",
+            "L boundary p p p\n\n1 atoms\n1 0 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\n"
+            "Atoms # sphere\n\n1 1 2e-7 2650 0 0 0\n",
             "a: box: lengths",
         ),
         ("inf\n0 0 0 1\n", "line 1: 'inf' is not x y z"),
