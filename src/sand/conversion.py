@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .errors import BadInput, shown
-from .unit_factors import number_from_text, scale
+from .unit_factors import is_unit, number_from_text, scale
 
 EXAMPLES = {
     "m": "10 nm",
@@ -113,7 +113,7 @@ def _from_pint(value: Any, unit: str) -> Any:
     if not hasattr(value, "magnitude"):
         return NotImplemented
     found = _scaled(value.magnitude, str(value.units), unit)
-    if found is None and hasattr(value, "m_as") and not is_masked(value.magnitude):
+    if found is None and hasattr(value, "m_as") and not is_masked(value.magnitude) and not is_unit(str(value.units)):
         try:  # units that only this registry has
             found = _converted(value.m_as(unit.replace("^", "**")), "1")
         except Exception:  # pint's error classes are not imported here

@@ -7,7 +7,9 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from .conversion import in_unit
+import numpy as np
+
+from .conversion import has_unit_within, in_unit
 from .unit_factors import LONGEST_TEXT, NUMBER, TEXT, factor, powers_of, registry, spelled, times
 
 _SI_UNITS = (
@@ -111,8 +113,8 @@ def with_own_unit(value: Any) -> tuple[Any, str] | None:
     Parameters
     ----------
     value : float, array_like, str, tuple or quantity
-        Numbers without a unit; text with a unit; numbers and a unit, `(values, "W/m^2")`; or a quantity of pint or
-        astropy.
+        Numbers without a unit; text with a unit; numbers and a unit, `(values, "W/m^2")`; a quantity of pint, astropy
+        or unyt, or an array of xarray; or a list of texts and quantities of one dimension, and of numbers in SI.
 
     Returns
     -------
@@ -125,10 +127,15 @@ def with_own_unit(value: Any) -> tuple[Any, str] | None:
     elif isinstance(value, str):
         match = re.fullmatch(rf"\s*({NUMBER})(.*)", value) if len(value) <= LONGEST_TEXT else None
         value, given = (match[1], _as_factors(match[2])) if match else (None, "1")
-    elif hasattr(value, "to_value"):  # astropy
-        value, given = value.value, value.unit.to_string().replace(" ", "*") or "1"
+    elif hasattr(value, "to_value"):  # astropy, unyt
+        unit_of_value = value.unit.to_string().replace(" ", "*") if hasattr(value, "unit") else str(value.units)
+        value, given = value.value, {"dimensionless": ""}.get(unit_of_value, unit_of_value) or "1"
     elif hasattr(value, "magnitude"):  # pint, of any registry
         value, given = value.magnitude, f"{value.units:~C}" or "1"
+    elif isinstance(getattr(value, "attrs", None), Mapping) and "units" in value.attrs:  # xarray
+        value, given = value.values, str(value.attrs["units"])
+    elif (isinstance(value, list) or (type(value) is np.ndarray and value.ndim)) and has_unit_within(value):
+        return _of_entries(list(value))
     unit = si_unit(given)
     ratio = None if unit is None else 1.0 if given in ("", unit) else factor(given, unit)
     if unit is None or ratio is None:
@@ -137,3 +144,13 @@ def with_own_unit(value: Any) -> tuple[Any, str] | None:
         return times(value, ratio), unit
     numbers = in_unit(value, "1")
     return None if numbers is None else (numbers * ratio, unit)
+
+
+def _of_entries(values: list[Any]) -> tuple[Any, str] | None:
+    """As `with_own_unit`, for a list: its unit is the first one of an entry."""
+    found = [with_own_unit(one) for one in values]
+    if any(one is None for one in found):
+        return None
+    unit = next((one[1] for one in found if one is not None and one[1] != "1"), "1")
+    numbers = in_unit(values, unit)
+    return None if numbers is None else (numbers, unit)

@@ -67,7 +67,7 @@ _KELVIN = {
 }
 """Factor and offset [K] of the scales of temperature."""
 _ENERGY_OF_ELECTRON = re.compile(r"[A-Za-zµμ]*(?:eV|electron_?volt)s?")
-_CYCLES = re.compile(r"(?<![A-Za-z])[A-Za-zµμ]?(?:Hz|hertz|Bq|becquerel)(?![A-Za-z])")
+_CYCLES = re.compile(r"(?<![A-Za-z])[A-Za-zµμ]*(?:Hz|hertz|Bq|becquerel)(?![A-Za-z])")
 _ANGLES = re.compile(r"rad|rpm|rps|rev|turn|deg|cycle")
 
 
@@ -133,6 +133,15 @@ def scale(text: str, unit: str) -> tuple[float, float] | None:
         return None if energy is None else (energy / BOLTZMANN, 0.0)
     found = factor(text, unit)
     return None if found is None else (found, 0.0)
+
+
+@functools.lru_cache(maxsize=512)
+def is_unit(text: str) -> bool:
+    """Whether this is a unit, of any dimension."""
+    try:
+        return powers_of(text) is not None or bool(registry().parse_units(spelled(text)) is not None)
+    except Exception:  # various error classes of pint, which is not imported here
+        return False
 
 
 def number_from_text(text: str, unit: str) -> float | None:

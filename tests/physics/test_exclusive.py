@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.simulation import exclusive
 
 from .setups import different
 
@@ -41,24 +42,53 @@ class Calls(sand.Observer):
 
 @COMPILED
 def test_other_threads_are_refused_during_a_run_and_change_no_bit():
-    """What uses the engine is refused in one line each; reading time, steps and positions is not."""
+    """What uses the engine is refused in one line each; reading time and steps is not.
+
+    Grains and choices use it, too: grains that are sorted in memory are brought back into the user's order.
+    """
     calls = [
         lambda sim: sim.status(),
         lambda sim: sim.run(steps=5),
         lambda sim: sim.loads(),
         lambda sim: sim.contacts,
         lambda sim: sim.copy(),
+        lambda sim: sim.grains,
+        lambda sim: sim.regular_state,
+        lambda sim: sim.choices,
         lambda sim: sim.change().__enter__(),
     ]
-    watcher = Calls([*calls, lambda sim: (sim.time, sim.steps, sim.grains.position.copy())])
+    watcher = Calls([*calls, lambda sim: (sim.time, sim.steps)])
     alone, watched = gas(), gas(observers=[watcher])
     for sim in (alone, watched):
         sim.run(steps=3000)
-    refused = ["another thread works with this simulation"] * 5 + ["can be changed by an updater only"]
+    refused = ["another thread works with this simulation"] * 8 + ["can be changed by an updater only"]
     assert len(watcher.errors) == len(refused)
     for text, error in zip(refused, watcher.errors, strict=True):
         assert text in error and "\n" not in error
     assert different(alone, watched) == []
+
+
+@COMPILED
+def test_a_short_call_of_another_thread_is_waited_for(monkeypatch):
+    """A run begins when a status, or whatever another thread asks for, has been found; one that lasts is refused."""
+    sim, begun, ended = gas(20), threading.Event(), threading.Event()
+
+    def work():
+        with sim._exclusive.held("status"):
+            begun.set()
+            ended.wait(10.0)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    begun.wait(10.0)
+    monkeypatch.setattr(exclusive, "PATIENCE", 0.01)
+    with pytest.raises(sand.BadInput, match="another thread works with this simulation, so that run is not possible"):
+        sim.run(steps=5)
+    monkeypatch.setattr(exclusive, "PATIENCE", 60.0)
+    timer = threading.Timer(0.05, ended.set)
+    timer.start()
+    assert sim.run(steps=5).steps == 5
+    thread.join()
 
 
 @COMPILED

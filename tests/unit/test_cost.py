@@ -1,6 +1,7 @@
 """Expected cost of a run: steps, wall time, memory and compilation, and the table that runs write."""
 
 import csv
+import errno
 import json
 import math
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
+from sand.compiler.cache import write_record
 from sand.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.experiments.templates import TEMPLATES
 from sand.simulation import coagulation, cost
@@ -408,6 +410,18 @@ def test_output_is_counted():
         assert number_in(cadence, span, 799) == number
     sim = simulation(row_every="10 ns")
     assert cost.outputs(sim, 1e-6, 1.0) == pytest.approx(2.0 + 200.0 + 100.0, rel=0.0, abs=2.0)
+    assert cost.outputs(sim, 1e-20, 1.0) == 2.0 + 200.0, "of a run whose frames no user may ask for: 1e-20 s / 200"
+
+
+def test_a_record_on_a_read_only_file_system(monkeypatch, tmp_path):
+    """The table that cannot be written is no error, also where nothing can be deleted."""
+
+    def fails(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(Path, "write_text", fails)
+    monkeypatch.setattr(Path, "unlink", fails)
+    write_record(tmp_path / "speeds.json", {})
 
 
 def test_memory_grows_with_the_grains():

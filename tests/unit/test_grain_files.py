@@ -49,6 +49,7 @@ TEXTS = {
     "columns": (rows("{:.9f} {} {} 100"), "1 nm"),
     "tabs and comments": ("! made elsewhere\n" + rows("{:.9f}\t{}\t{}\t100  % sphere"), "1 nm"),
     "a number first": ("  3\n\n" + rows("{:.9f} {} {} 100"), "1 nm"),
+    "a title like a head of LAMMPS": ("3\n3 atoms\n" + rows("{:.9f} {} {} 100"), "1 nm"),
     "a number and a title": ("3\nmade elsewhere\n" + rows("{:.9f} {} {} 100"), "1 nm"),
     "named columns": ("r z y x\n" + rows("100 {2} {1} {0:.9f}"), "1 nm"),
     "named in a comment": ("# diameter x y z\n" + rows("200 {:.9f} {} {}"), "1 nm"),
@@ -93,7 +94,7 @@ def test_formats_are_known_by_their_content(tmp_path, name):
 def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
     """Of two frames the last is read by default; the radius comes from the caller."""
     path = tmp_path / "a.out"
-    other = "2\n\nSi 0 0 0\nFe 1 0 0\n"
+    other = "2\n2 atoms\nSi 0 0 0\nFe 1 0 0\n"
     path.write_text(other + "3\nmade elsewhere\n" + "".join(f"Si {10 * x!r} 0 0\n" for x, _, _ in NM))
     assert body_from_file(path, sand.SILICA, "100 nm").position[2, 0] == pytest.approx(D, rel=1e-12, abs=0.0)
     assert len(read_grains(path, sand.SILICA, 1e-10, frame=0).grains) == 2
@@ -132,6 +133,31 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("LAMMPS\n\n2 atoms\n\nAtoms # sphere\n\n1 1 1 1 0 0 0\n", "has 1 atoms, but the head says 2"),
         ("L\n\n1 atoms\n\nAtoms # sphere\n\n1 1 1 1 0 0 x\n", "line 7: .* is not id type diameter density x y z"),
         (DUMP.format(0, "id x y z") + "1 0 0 0\n", "lacks some of its 3 atoms"),
+        ("L\n\n1 atoms\n\na b xlo xhi\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n", "bounds of its box"),
+        ("L\n\n1 atoms\n\nAtoms # sphere\n\n1 nan 2e-7 2650 0 0 0\n", "line 7: '1 nan 2e-7 2650 0 0 0' is not id type"),
+        (DUMP.format(0, "id x x y z") + "1 0 0 0 0\n" * 3, "a column occurs twice among id x x y z"),
+        ("1\nProperties=pos:R:3:pos:R:3\n0 0 0 1 1 1\n", "a name occurs twice in Properties"),
+        ("1\nProperties=pos:R:3:radius:S:1\n0 0 0 big\n", "has no numbers for radius"),
+        (
+            "L boundary p p p\n\n1 atoms\n1 0 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\n"
+            "Atoms # sphere\n\n1 1 2e-7 2650 0 0 0\n",
+            "a: box: lengths",
+        ),
+        ("inf\n0 0 0 1\n", "line 1: 'inf' is not x y z"),
+        ("nan\n0 0 0 1\n", "line 1: 'nan' is not x y z"),
+        ("# x y z r (nm)\n0 0 0 1\n", r"r has the unit nm, but x has none; write x \[nm\]"),
+        ("x,y,z,r,vx [cm/s],vy,vz\n0,0,0,1e-7,1,1,1\n", "vy, vz: no unit, but vx has one"),
+        (
+            '1\nLattice="1 0 0 0 1 0 0 0 1" pbc="T T" Properties=species:S:1:pos:R:3\nX 0 0 0\n',
+            "pbc='T T' must be T or",
+        ),
+        ('1\nLattice="1 0 0 0 1 0 0 0 1" pbc="yes" Properties=species:S:1:pos:R:3\nX 0 0 0\n', "must be T or F"),
+        ("1\nProperties=species:S:0:pos:R:3\n0 0 0\n", "is not made of name:type:number"),
+        (
+            "LAMMPS units = si\n\n2 atoms\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n2 1 2e-7 2650 1 0 0\n"
+            "\nVelocities\n\n1 1 0 0\n7 2 0 0\n",
+            "must have one line for each atom of section Atoms, by its number",
+        ),
     ],
 )
 def test_mistakes_in_files_are_named(tmp_path, text, message):
@@ -202,6 +228,51 @@ def of_hoomd(path, **given):
     frame.configuration.box = [50, 50, 50, 0, 0, 0]
     with gsd.hoomd.open(str(path), "w") as file:
         file.append(frame)
+
+
+@pytest.mark.parametrize(
+    ("units", "length", "mass", "speed"),
+    [("si", 1.0, 1.0, 1.0), ("cgs", 1e-2, 1e-3, 1e-2), ("micro", 1e-6, 1e-15, 1.0), ("nano", 1e-9, 1e-21, 1.0)],
+)
+def test_units_of_lammps_styles(tmp_path, units, length, mass, speed):
+    """A silica sphere of 0.1 μm, its mass 2650 kg/m³ × 4π/3 r³ and 1 m/s, written in each style.
+
+    LAMMPS: micro has picograms (10⁻¹² g) and μm/μs, nano attograms (10⁻¹⁸ g) and nm/ns, cgs grams and cm/s.
+    """
+    weight = sand.SILICA.density * 4.0 / 3.0 * np.pi * R**3
+    text = f"ITEM: UNITS\n{units}\n" + DUMP.format(0, "id x y z radius mass vx").replace("\n3\n", "\n1\n")
+    row = f"1 0 0 0 {R / length!r} {1.1 * weight / mass!r} {1.0 / speed!r}"
+    (tmp_path / "a").write_text(text.replace(" vx", " vx vy vz") + row + " 0 0\n")
+    grains = read_grains(tmp_path / "a", sand.SILICA).grains
+    assert grains.radius[0] == pytest.approx(R, rel=1e-12, abs=0.0)
+    assert grains.mass[0] == pytest.approx(1.1 * weight, rel=1e-12, abs=0.0)
+    assert grains.velocity[0, 0] == pytest.approx(1.0, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.compiled("small")
+def test_contacts_across_the_box_of_the_case_are_put_at_rest(tmp_path):
+    """Columns state no box: two grains with a gap of 1e-4 r across a face of the case's box are in contact there."""
+    length, gap = 1e-6, 1e-4 * R
+    place = 0.5 * (length - 2.0 * R - gap)
+    (tmp_path / "a").write_text(f"{-place!r} 0 0 {R!r}\n{place!r} 0 0 {R!r}\n")
+    (start, notes) = told(start_from_file, tmp_path / "a", sand.Box.periodic(length), sand.SILICA)
+    across = length - np.ptp(start.grains.position[:, 0])
+    assert across == pytest.approx(D, abs=1e-6 * REST) and "1 contacts are put at rest" in notes[0]
+
+
+def test_a_file_of_many_frames_is_read_once(tmp_path, monkeypatch):
+    """Frames are parsed from the text in memory: no time that grows as the square of their number."""
+    from sand.io import file_frames
+
+    texts = [
+        DUMP.format(k, "id x y z radius") + "".join(f"{j} {2e-7 * j} 0 0 1e-7\n" for j in (1, 2, 3)) for k in (4, 5)
+    ]
+    (tmp_path / "a").write_text("".join(texts))
+    opened, open_grains = [], file_frames.open_grains
+    monkeypatch.setattr(file_frames, "open_grains", lambda path: opened.append(path) or open_grains(path))
+    monkeypatch.setattr("sand.io.bodies.open_grains", file_frames.open_grains)
+    frames = open_frames(tmp_path / "a", material="silica")
+    assert frames.steps.tolist() == [4, 5] and [frame.step for frame in frames] == [4, 5] and len(opened) == 1
 
 
 @pytest.mark.compiled("small")

@@ -116,6 +116,27 @@ def test_without_locks_a_run_goes_on_with_a_warning(tmp_path, monkeypatch):
                 FolderLock(tmp_path).release()
 
 
+def test_without_locks_an_earlier_process_of_the_same_pid_has_ended(tmp_path, monkeypatch):
+    """In a container, each start may have the same pid and name: a job that was killed can be resumed by the next."""
+    import filelock
+
+    def fails(self):
+        raise OSError(errno.ENOLCK, "as it is there")
+
+    monkeypatch.setattr(filelock.FileLock, "_acquire", fails)
+    with pytest.warns(UserWarning, match="has no locks"):
+        first = FolderLock(tmp_path)
+    with pytest.raises(sand.BadInput, match="another simulation of this process"):
+        FolderLock(tmp_path)
+    name = (tmp_path / LOCK).read_bytes()
+    first.release()
+    (tmp_path / LOCK).write_bytes(name[:-8] + b"0123456\n")  # of an earlier process
+    with pytest.warns(UserWarning, match="has no locks"):
+        second = FolderLock(tmp_path)
+    assert second.is_held
+    second.release()
+
+
 def test_an_unreadable_process_id(locked_folder, monkeypatch):
     """As on Windows, or while it is being written: the line omits it."""
     monkeypatch.setattr(lock_files, "LOCK", LOCK)

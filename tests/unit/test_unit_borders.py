@@ -59,6 +59,34 @@ def test_what_is_not_an_array_of_lengths(value):
     assert in_unit(value, "m") is None
 
 
+@pytest.mark.parametrize(("unit", "wanted"), [("Hz", "rad/s"), ("rad/s", "Hz"), ("rpm", "Hz"), ("kilohertz", "rad/s")])
+def test_frequencies_are_no_angular_velocities(unit, wanted):
+    """1 Hz are 2π rad/s, which pint takes for 1 rad/s: refused as text and as a quantity."""
+    assert in_unit(f"1 {unit}", wanted) is None
+    assert in_unit(UNIT.Quantity(1.0, unit), wanted) is None
+
+
+def test_units_that_only_the_registry_of_the_user_has():
+    registry = pint.UnitRegistry()
+    registry.define("monomer_size = 0.3 um = mono")
+    assert in_unit(registry.Quantity(2.0, "mono"), "m") == pytest.approx(6e-7, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("package", ["pint", "astropy", "unyt"])
+def test_own_quantities_of_other_packages(package):
+    """An array with a unit, and rows of one, as for the quantities of SAND."""
+    kelvin = pint_rows("mK")[0] if package == "pint" else rows_of(package, "mK")[0]
+    for given in (kelvin, list(kelvin), [kelvin[0], 1e-3, "2 mK"]):
+        own = sand.Grains([*PAIR, [2e-6, 0, 0]], 1e-7, "silica", own={"heat": given}).own
+        assert own["heat"] == pytest.approx([0.0, 1e-3, 2e-3], rel=1e-14, abs=0.0) and own.units == {"heat": "K"}
+
+
+@pytest.mark.parametrize("value", [["300 K", "310 m"], ["300 K", "20 degC"], MASKED, [1.0, np.ma.masked]], ids=str)
+def test_what_is_no_own_quantity(value):
+    with pytest.raises(sand.BadInput, match=r"own: heat = .* is no quantity"):
+        sand.Grains(PAIR, 1e-7, "silica", own={"heat": value})
+
+
 def test_masked_entries_are_named():
     with pytest.raises(sand.BadInput, match="radius has masked entries, 1 of 2; fill them"):
         sand.Grains(PAIR, MASKED, "silica")

@@ -8,6 +8,7 @@ only read: one that was filled before, or that of another user, if nobody else c
 from __future__ import annotations
 
 import atexit
+import contextlib
 import json
 import os
 import shutil
@@ -123,7 +124,8 @@ def write_record(path: Path, content: Any) -> None:
         draft.write_text(json.dumps(content, indent=1), "utf-8")
         draft.replace(path)
     except OSError:
-        draft.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # of a file system that is read-only
+            draft.unlink(missing_ok=True)
 
 
 def unsafe(folder: Path, *, read_only: bool = False) -> str | None:

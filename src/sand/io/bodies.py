@@ -17,7 +17,7 @@ from ..paths import user_path
 from ..units import si
 from .extended_xyz import xyz_text
 from .frame import MODES
-from .grain_files import FileBox, GrainData, is_gsd, open_grains
+from .grain_files import FileBox, GrainData, GrainFile, is_gsd, open_grains
 from .run_folder import replace_file
 from .trajectory import Frames, TrajectoryWriter
 
@@ -83,34 +83,53 @@ def read_grains(
     file = user_path(path)
     if is_gsd(file) and (found := _read_own_gsd(file, frame)) is not None:
         data, contacts = found
-    else:
-        opened, contacts = open_grains(path), None
-        if not -opened.frame_count <= frame < opened.frame_count:
-            raise BadInput(
-                f"{path} has {opened.frame_count} frames, from 0 to {opened.frame_count - 1}; there is no {frame}"
-            )
-        data = opened.frame(frame % opened.frame_count)
-        if data.unit is None and length is None:
-            raise BadInput(
-                f"{path} ({opened.form}) does not state its unit of length; give it: length = '1 um', for example"
-            )
+        return _in_si(path, data, radius, length, (material, materials, otherwise))._replace(contacts=contacts)
+    return read_frame(path, open_grains(path), material, radius, length, materials, otherwise, frame)
+
+
+def read_frame(
+    path: str | Path,
+    opened: GrainFile,
+    material: Material | None = None,
+    radius: Any = None,
+    length: str | None = None,
+    materials: Mapping[str, Material] = PRESETS,
+    otherwise: Material | None = None,
+    frame: int = -1,
+) -> ReadGrains:
+    """Read a frame of an open file of another program; parameters and errors as for `read_grains`."""
+    if not -opened.frame_count <= frame < opened.frame_count:
+        raise BadInput(
+            f"{path} has {opened.frame_count} frames, from 0 to {opened.frame_count - 1}; there is no {frame}"
+        )
+    data = opened.frame(frame % opened.frame_count)
+    if data.unit is None and length is None:
+        raise BadInput(
+            f"{path} ({opened.form}) does not state its unit of length; give it: length = '1 um', for example"
+        )
+    return _in_si(path, data, radius, length, (material, materials, otherwise))
+
+
+Choice = tuple[Material | None, Mapping[str, Material], Material | None]
+"""Parameters of `read_grains`: material, materials, otherwise."""
+
+
+def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: Choice) -> ReadGrains:
+    """Grains and box in SI.  Raises BadInput."""
     if data.refused:
         raise BadInput(data.refused)
     unit = data.unit if length is None else si(length, "m", "length", above=0.0)
     assert unit is not None
-    grains = _grains_of(path, data, unit, radius, (material, materials, otherwise))
-    box, centre = _box_of(data, unit)
-    return ReadGrains(grains, box, centre, contacts, tuple(data.notes), data.time, data.step)
+    grains = _grains_of(path, data, unit, radius, choice)
+    try:
+        box, centre = _box_of(data, unit)
+    except BadInput as error:
+        raise error.at(f"{path}: box") from None
+    return ReadGrains(grains, box, centre, None, tuple(data.notes), data.time, data.step)
 
 
-def _grains_of(
-    path: str | Path,
-    data: GrainData,
-    unit: float,
-    radius: Any,
-    choice: tuple[Material | None, Mapping[str, Material], Material | None],
-) -> Grains:
-    """Grains in SI; `choice` as `read_grains`: material, materials, otherwise.  Raises BadInput."""
+def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: Choice) -> Grains:
+    """Grains in SI.  Raises BadInput."""
     if data.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains: radius = '0.1 um', for example")
     if data.radius is not None and radius is not None and not data.sizes_assumed:

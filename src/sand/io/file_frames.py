@@ -13,7 +13,7 @@ from ..arguments import checked
 from ..errors import BadInput, warn
 from ..grains import ROUNDED
 from ..material import PRESETS, SILICA, Material, as_material
-from .bodies import contacts_of, read_grains
+from .bodies import contacts_of, read_frame
 from .frame import Frame, FrameSequence, stored_frame
 from .grain_files import is_gsd, open_grains
 from .trajectory import Frames
@@ -67,7 +67,8 @@ class FileFrames(FrameSequence):
     """Frames of a file of grains that is no trajectory of SAND, with the interface of `LiveTrajectory`.
 
     Grains that touch, up to the rounding of coordinates, are in contact. Masses of grains of unknown materials are
-    those of silica, unless the file has masses; a note says so. Frames without a time are one second apart.
+    those of silica, unless the file has masses; a note says so. Frames without a time are one second apart. The text of
+    a file is read once, and only one frame is kept, so that a long file takes little more memory than its text.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ class FileFrames(FrameSequence):
 
     @checked
     def __init__(self, path: Path, radius: Any = None, length: str | None = None, material: Any = None):
-        self.path, self._kept = path, dict[int, Frame]()
-        self._count = open_grains(path).frame_count
+        self.path, self._opened = path, open_grains(path)
+        self._kept: tuple[int, Frame] | None = None  # the last one that was asked for, and its number
         self._given = None if material is None else as_material(material), radius, length
         found = self._read(0)
         notes = list(found.notes)
@@ -100,21 +101,21 @@ class FileFrames(FrameSequence):
 
     def _read(self, number: int) -> Any:
         material, radius, length = self._given
-        return read_grains(self.path, material, radius, length, _Known(), SILICA, number)
+        return read_frame(self.path, self._opened, material, radius, length, _Known(), SILICA, number)
 
     def _frame(self, number: int) -> Frame:
-        if number not in self._kept:
+        if self._kept is None or self._kept[0] != number:
             found = self._read(number)
             if found.centre is not None:  # boxes of SAND have their centre at the origin
                 found.grains.arrays.position[...] -= found.centre[:, None]
             time = float(number) if found.time is None else found.time
             contacts = contacts_of(found.grains, found.box, ROUNDED)
             step = number if found.step is None else found.step
-            self._kept[number] = Frame(stored_frame(step, time, found.grains, found.box, contacts, exact=True))
-        return self._kept[number]
+            self._kept = number, Frame(stored_frame(step, time, found.grains, found.box, contacts, exact=True))
+        return self._kept[1]
 
     def __len__(self) -> int:
-        return self._count
+        return self._opened.frame_count
 
     def refresh(self) -> bool:
         """Return False: the file is read once."""
@@ -129,19 +130,24 @@ class FileFrames(FrameSequence):
         return self[index].id
 
     @cached_property
+    def _heads(self) -> list[tuple[float, int, int]]:
+        """Time [s], step and number of contacts of each frame."""
+        return [(frame.time, frame.step, len(frame.pair)) for frame in self]
+
+    @property
     def times(self) -> np.ndarray:
         """Time of each frame [s]."""
-        return np.array([frame.time for frame in self])
+        return np.array([time for time, _, _ in self._heads])
 
-    @cached_property
+    @property
     def steps(self) -> np.ndarray:
         """Step of each frame."""
-        return np.array([frame.step for frame in self])
+        return np.array([step for _, step, _ in self._heads])
 
-    @cached_property
+    @property
     def contacts(self) -> np.ndarray:
         """Number of contacts of each frame."""
-        return np.array([len(frame.pair) for frame in self])
+        return np.array([contacts for _, _, contacts in self._heads])
 
     def close(self) -> None:
         """Do nothing: the file is open only while it is read."""

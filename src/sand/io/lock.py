@@ -22,6 +22,8 @@ LOCK = ".lock"
 """The lock file in a folder."""
 READ_ATTEMPTS, READ_SECONDS = 5, 0.1
 """Attempts to read the pid in a lock file, and the time [s] for all of them."""
+_written: set[str] = set()
+"""What this process has written to the lock files of folders that it holds, where there are no locks."""
 
 
 class FolderLock:
@@ -73,6 +75,8 @@ class FolderLock:
         if write_pid and not (self._path.exists() and self._path.stat().st_nlink > 1):  # in a copy by hard links, too
             self._name = f"{os.getpid():<20} {platform.node() or '-'} {secrets.token_hex(8)}\n"
             self._write(self._name)
+            if self._lock is None:
+                _written.add(self._name)
 
     def _without_locks(self, folder: Path, patience: float) -> None:
         """Warn that there are no locks.  Raises BadInput if a process of this machine writes to the folder."""
@@ -108,6 +112,7 @@ class FolderLock:
             lock.release()
         elif self._name and self.is_held:  # nothing else tells others that this process has finished
             self._write("\n")
+        _written.discard(self._name)
         self._name = ""
 
 
@@ -137,12 +142,19 @@ def _holder(folder: Path) -> int | None:
 
 
 def _runs_here(folder: Path) -> bool:
-    """Whether a lock file names a process of this machine that exists."""
-    words = (_content(folder / LOCK) or "").split()
+    """Whether a lock file names a process of this machine that exists.
+
+    In a container each start may have the same pid and the same name of the machine: an earlier process with those of
+    this one has ended, whatever it has left.
+    """
+    name = _content(folder / LOCK) or ""
+    words = name.split()
     if len(words) < 3 or not words[0].isdecimal() or words[1] != (platform.node() or "-"):
         return False
     if os.name == "nt":  # where there are locks, also in shared folders
         return False
+    if int(words[0]) == os.getpid():
+        return name in _written
     try:
         os.kill(int(words[0]), 0)
     except (ProcessLookupError, OverflowError):

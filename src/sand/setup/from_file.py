@@ -101,8 +101,10 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
     from ..io.bodies import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
-    grains, pairs, notes = _at_rest(found, str(path))
     used = found.box if box is None else box
+    if found.box.is_open:  # grains may touch across the faces of the case's box
+        found = found._replace(box=used)
+    grains, pairs, notes = _at_rest(found, str(path))
     if not found.box.is_open and used != found.box:
         if make_whole(grains, pairs, found.box, str(path)):
             notes.append(f"{path}: clusters that the faces of its box cut are made whole")

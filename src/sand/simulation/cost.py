@@ -162,12 +162,9 @@ def long_range_seconds(simulation: Simulation) -> float:
 
 def outputs(simulation: Simulation, span: float, steps: float) -> float:
     """Number of frames and further rows of a run of a length [s] and of so many steps."""
-    settings = [simulation.frame_every, simulation.row_every]
-    if settings[0] is None and span > 0.0:
-        settings[0] = span / FRAMES
-    return 2.0 + math.fsum(
-        number_in(read_cadence(setting, "frame_every"), span, steps) for setting in settings if setting is not None
-    )
+    given = [setting for setting in (simulation.frame_every, simulation.row_every) if setting is not None]
+    frames = FRAMES if simulation.frame_every is None and span > 0.0 else 0
+    return 2.0 + frames + math.fsum(number_in(read_cadence(each, "frame_every"), span, steps) for each in given)
 
 
 def _speeds(kind: str) -> tuple[dict[str, float], str]:

@@ -10,6 +10,11 @@ from typing import Any, TypeVar
 
 from ..errors import BadInput
 
+LONG = "run"
+"""The call that may take long: others are refused at once while it goes on, and wait for the end of all others."""
+PATIENCE = 10.0
+"""Longest wall time [s] to wait for a call of another thread."""
+
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
@@ -18,24 +23,28 @@ class Exclusive:
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
+        self._calls: list[str] = []  # of the thread that has the right, the outermost first
 
     @contextmanager
     def held(self, what: str) -> Iterator[None]:
-        """Hold the right during the block.
+        """Hold the right during the block, after short calls of other threads have ended.
 
         Raises
         ------
         BadInput
-            If another thread holds it; `what` is the call that is refused.
+            If another thread runs the simulation, or holds the right for long; `what` is the call that is refused.
         """
-        if not self._lock.acquire(blocking=False):
+        free = self._lock.acquire(blocking=False)
+        if not free and (LONG in self._calls or not self._lock.acquire(timeout=PATIENCE)):
             raise BadInput(
                 f"another thread works with this simulation, so that {what} is not possible; call it in that thread, "
                 "such as in an observer, or wait until its call has ended"
             )
+        self._calls.append(what)
         try:
             yield
         finally:
+            self._calls.pop()
             self._lock.release()
 
     def __reduce__(self) -> tuple[Any, ...]:

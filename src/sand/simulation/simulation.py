@@ -192,11 +192,13 @@ class Simulation(ReadOnlySettings):
         self._built = True
 
     @property
+    @exclusive
     def state(self) -> State:
         """State of the simulation at `time`: grains, contacts, box and clock."""
         return self._engine.state
 
     @property
+    @exclusive
     def regular_state(self) -> State:
         """State after the last regular step, not later than `time`: that of checkpoints, from which a run continues."""
         return self._engine.regular_state
@@ -235,6 +237,7 @@ class Simulation(ReadOnlySettings):
         return GIVEN if callable(self._met[0]) else str(self._met[0])
 
     @property
+    @exclusive
     def grains(self) -> Grains:
         """State of the grains at `time`, as read-only arrays; to be read again after each run."""
         return self.state.grains
@@ -254,6 +257,7 @@ class Simulation(ReadOnlySettings):
         return wall_states(self._walls, self.state)
 
     @property
+    @exclusive
     def choices(self) -> dict[str, str]:
         """Automatic choices with their reasons: boundary, cut-offs and neighbour search."""
         follower = self._engine.cutoff

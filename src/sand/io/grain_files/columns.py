@@ -10,7 +10,7 @@ import numpy as np
 from ...arguments import MOST_GRAINS
 from ...errors import BadInput
 from ...units import in_unit
-from .data import NAMED, GrainData, GrainFile, data_of, known_as, numbers
+from .data import LENGTHS, NAMED, GrainData, GrainFile, data_of, known_as, numbers
 
 COMMENTS = "#%!"
 """Characters that begin a comment."""
@@ -40,10 +40,7 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
         names, notes = _unnamed(path, table)
     if len(names) != table.shape[1]:
         raise BadInput(f"{path}, line {first}: {table.shape[1]} columns, but {len(names)} names: {', '.join(names)}")
-    stated = next((units[name] for name in names if name in units and known_as(name) == ("position", 0)), None)
-    unit = 1.0 if stated is None else in_unit(f"1 {stated}", "m")
-    if unit is None:
-        raise BadInput(f"{path}: {stated!r} is not a unit of length")
+    unit = _unit_of_x(path, names, units)
     columns: dict[str, Any] = dict(zip(names, table.T, strict=True)) | texts
     data = data_of(columns, unit, place=str(path), units=units)
     data.notes += notes
@@ -52,6 +49,23 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
         return data
 
     return GrainFile("columns", 1, frame)
+
+
+def _unit_of_x(path: Any, names: list[str], units: dict[str, str]) -> float:
+    """Unit of length [m] of the column x, which is also that of all lengths without one.  Raises BadInput."""
+    stated = next((units[name] for name in names if name in units and known_as(name) == ("position", 0)), None)
+    if stated is None:
+        lengths = [name for name in names if name in units and (known_as(name) or ("",))[0] in LENGTHS]
+        if others := [name for name in lengths if in_unit(f"1 {units[name]}", "m") is not None]:
+            unit = units[others[0]]
+            raise BadInput(
+                f"{path}: {others[0]} has the unit {unit}, but x has none; write x [{unit}], if that is its unit, too"
+            )
+        return 1.0
+    factor = in_unit(f"1 {stated}", "m")
+    if factor is None:
+        raise BadInput(f"{path}: {stated!r} is not a unit of length")
+    return float(factor)
 
 
 def _sphere_block(lines: list[str]) -> list[str]:
@@ -95,7 +109,7 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
             if stated and not rows and number <= stated[1] + 2:  # the title below the number of grains
                 continue
             row = _with_text(words, header[0], texts)
-        if len(row) == 1 and not rows and stated is None and row[0] == int(row[0]) and row[0] >= 1:
+        if len(row) == 1 and not rows and stated is None and row[0].is_integer() and row[0] >= 1:
             stated = (int(row[0]), number)
             continue
         if len(row) < 3 or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):

@@ -172,7 +172,7 @@ def data_of(
     """
     units, own = units or {}, own or {}
     parts: dict[str, dict[int | None, np.ndarray]] = {}
-    problems: list[str] = []
+    problems = _half_stated(columns, units, place)
     carried: dict[str, tuple[np.ndarray, str]] = {}
     unread: list[str] = []
     for name, values in columns.items():
@@ -181,7 +181,7 @@ def data_of(
             carried[name] = (values, own.get(name) or units[name])
             continue
         if known is None or (known[0] in VECTORS) != (known[1] is not None or np.ndim(values) == 2):
-            unread += [name] * (name.lower() not in DERIVED and not name.startswith("column"))
+            unread += [name] * (name.lower() not in {"", *DERIVED} and not name.startswith("column"))
             continue
         quantity, component = known
         have = parts.setdefault(quantity, {})
@@ -208,6 +208,21 @@ def data_of(
     if unread:
         data.notes.append(f"columns that are no quantity of grains, or have no unit, are not read: {', '.join(unread)}")
     return data
+
+
+def _half_stated(columns: Mapping[str, Any], units: Mapping[str, str], place: str) -> list[str]:
+    """Messages about vectors of which some components have a unit and others none, lengths excepted."""
+    found: dict[str, dict[str, str | None]] = {}
+    for name in columns:
+        known = known_as(name)
+        if known is not None and known[0] in VECTORS and known[0] not in LENGTHS:
+            found.setdefault(known[0], {})[name] = units.get(name)
+    return [
+        f"{place}: {', '.join(name for name, unit in parts.items() if not unit)}: no unit, but "
+        f"{', '.join(name for name, unit in parts.items() if unit)} has one; write it behind each component"
+        for parts in found.values()
+        if len({bool(unit) for unit in parts.values()}) > 1
+    ]
 
 
 def _converted(values: np.ndarray, text: str, quantity: str, unit: float | None) -> np.ndarray:

@@ -15,7 +15,7 @@ CENTIMETRE, ANGSTROM, BOHR, FEMTOSECOND = 1e-2, 1e-10, 5.29177210903e-11, 1e-15
 STYLES = {
     "si": (1.0, 1.0, 1.0, 1.0),
     "cgs": (CENTIMETRE, CENTIMETRE, 1e-3, 3.3356409519815204e-10),
-    "micro": (1e-6, 1.0, 1e-18, 1e-12),
+    "micro": (1e-6, 1.0, 1e-15, 1e-12),
     "nano": (1e-9, 1.0, 1e-21, 1.602176634e-19),
     "metal": (ANGSTROM, 100.0, 1.66053906660e-27, 1.602176634e-19),
     "real": (ANGSTROM, 1e5, 1.66053906660e-27, 1.602176634e-19),
@@ -52,8 +52,9 @@ def is_dump(lines: list[str]) -> bool:
 
 
 def is_data(lines: list[str]) -> bool:
-    """Whether a text is a data file: its head states the number of atoms."""
-    return any(re.match(r"^\s*\d+\s+atoms\b", line) for line in lines[:40])
+    """Whether a text is a data file: its head states the number of atoms, and it has a section of them."""
+    has_number = any(re.match(r"^\s*\d+\s+atoms\b", line) for line in lines[1:40])
+    return has_number and any(re.match(r"^\s*Atoms\b", line) for line in lines[1:])
 
 
 def _units(text: str) -> str | None:
@@ -71,8 +72,6 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
         If its style of atoms is not stated or has no spheres, or lines are not numbers (the first ten are named).
     """
     sections, head = _sections(lines)
-    if "Atoms" not in sections:
-        raise BadInput(f"{path} is a LAMMPS data file without a section Atoms")
     stated = next((int(m[1]) for line in head if (m := re.match(r"^\s*(\d+)\s+atoms\b", line))), 0)
     start, style, atoms = sections["Atoms"]
     columns = _numbers(path, atoms, _atom_columns(path, start, style, len(atoms[0][1]) if atoms else 5))
@@ -86,9 +85,11 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
         width = len(rows[0][1]) if rows else 4
         names = ["id", "vx", "vy", "vz", "wx", "wy", "wz"][: 7 if width == 7 else 4]
         moving = _numbers(path, rows, names)
-        turn = np.argsort(moving.pop("id"), kind="stable")
-        if len(turn) != stated:
-            raise BadInput(f"{path}: section Velocities has {len(turn)} lines, but there are {stated} atoms")
+        turn = np.argsort(moving["id"], kind="stable")
+        if not np.array_equal(moving.pop("id")[turn], identity):
+            raise BadInput(
+                f"{path}: section Velocities must have one line for each atom of section Atoms, by its number"
+            )
         columns |= {name: values[turn] for name, values in moving.items()}
     own = BY_SAND.match(lines[0])
     data = _in_si(path, columns, _units(lines[0]), by_sand=own is not None)
@@ -96,7 +97,10 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
     data.names = _labels(sections, columns["type"], listed)
     if own:
         data.step, data.time = int(own[1]), number(own[2])
-    bounds = {m[3]: (float(m[1]), float(m[2])) for line in head if (m := BOUNDS.match(line))}
+    try:
+        bounds = {m[3]: (number(m[1]), number(m[2])) for line in head if (m := BOUNDS.match(line))}
+    except ValueError:
+        raise BadInput(f"{path}: the bounds of its box, such as 'xlo xhi', must be two numbers each") from None
     if len(bounds) == 3:
         low, high = np.array([bounds[axis] for axis in "xyz"]).T
         walls = re.search(r"\bboundary\s+([pfsm]{1,2})\s+([pfsm]{1,2})\s+([pfsm]{1,2})", lines[0])
@@ -155,6 +159,8 @@ def _numbers(path: Any, rows: list[tuple[int, list[str], str]], names: list[str]
             if len(words) != len(names):
                 raise ValueError
             values[k] = [number(word) for word in words]
+            if not np.isfinite(values[k]).all():
+                raise ValueError
         except ValueError:
             problems.append(f"{path}, line {line}: {' '.join(words)[:40]!r} is not {' '.join(names)}")
     if problems:
@@ -208,6 +214,8 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
         raise BadInput(f"{path}, line {first + 1}: a snapshot without its number of atoms or its box") from None
     names = (atoms or "ATOMS").split()[1:]
     begin = items.get(atoms or "", first) + 1
+    if len(set(names)) < len(names):
+        raise BadInput(f"{path}, line {begin}: a column occurs twice among {' '.join(names)}")
     if not names or begin + count > end:
         raise BadInput(
             f"{path}, line {first + 1}: the snapshot lacks some of its {count} atoms, or their columns' names"

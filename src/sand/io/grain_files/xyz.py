@@ -13,6 +13,8 @@ from ..extended_xyz import unlisted
 from .data import NAMED, FileBox, GrainData, GrainFile, data_of, known_as, numbers
 
 ANGSTROM = 1e-10
+PERIODIC = dict.fromkeys(("T", "TRUE", "1"), True) | dict.fromkeys(("F", "FALSE", "0"), False)
+"""Values of pbc."""
 
 
 def is_xyz(lines: list[str]) -> bool:
@@ -107,8 +109,10 @@ def _read_frame(path: Any, lines: list[str], first: int, count: int) -> GrainDat
 def _layout(place: str, text: str) -> list[tuple[str, str, int]]:
     """Name, type and number of each entry of Properties.  Raises BadInput."""
     parts = text.split(":")
-    if len(parts) % 3 or not all(width.isdecimal() for width in parts[2::3]):
+    if len(parts) % 3 or not all(width.isdecimal() and int(width) for width in parts[2::3]):
         raise BadInput(f"{place}: Properties={text[:60]!r} is not made of name:type:number")
+    if len(set(parts[::3])) < len(parts[::3]):
+        raise BadInput(f"{place}: a name occurs twice in Properties={text[:60]!r}")
     return [(name, kind, int(width)) for name, kind, width in zip(parts[::3], parts[1::3], parts[2::3], strict=True)]
 
 
@@ -119,7 +123,7 @@ def _columns(path: Any, rows: list[list[str]], layout: list[tuple[str, str, int]
     at = 0
     for name, kind, width in layout:
         known = known_as(name)
-        is_text = kind.upper() in "SL" or (known is not None and known[0] == "material")
+        is_text = kind.upper() in "SL" if known is None else known[0] == "material"
         if name == "Z":  # atomic numbers, not a coordinate
             known = None
         cells = [words[at : at + width] for words in rows]
@@ -160,8 +164,11 @@ def _box(place: str, head: dict[str, str]) -> FileBox | None:
         origin = np.array(numbers(head.get("Origin", "0 0 0").split())).reshape(3)
     except ValueError:
         raise BadInput(f"{place}: Lattice and Origin must be nine and three numbers") from None
-    flags = head.get("pbc", "T T T").split()
-    x, y, z = (flag.upper() in ("T", "TRUE", "1") for flag in (flags * 3 if len(flags) == 1 else flags[:3]))
+    flags = head.get("pbc", "T").upper().split()
+    flags *= 3 if len(flags) == 1 else 1
+    if len(flags) != 3 or not PERIODIC.keys() >= set(flags):
+        raise BadInput(f"{place}: pbc={head['pbc']!r} must be T or F, for each of the three axes or once for all")
+    x, y, z = (PERIODIC[flag] for flag in flags)
     diagonal = np.diag(cell)
     if any((x, y, z)) and (np.abs(cell - np.diag(diagonal)).max() > 1e-9 * np.abs(cell).max() or (diagonal <= 0).any()):
         raise BadInput(f"{place}: Lattice is not a box with edges along x, y and z, the only one SAND has")
