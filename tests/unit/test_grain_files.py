@@ -111,6 +111,9 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
         ("0 0 0 1 2 3\n1 0 0 4 5 6\n", "6 columns without names; name them in its first line, such as '# x y z r v"),
         ("x y z r\n0 0 0\n", "line 2: 3 columns, but 4 names"),
         ("x y z x\n0 0 0 0\n", "is not x y z"),
+        ("x_nm,y_nm,z_nm,r\n0,0,0,1\n3,0,0,1\n", "line 1: .* nor names of columns with x, y and z once"),
+        ("x,y,z,r\n0,0,0,1\n3,0,0\n", "line 3: '3,0,0' is not 4 finite numbers, as in line 2"),
+        ("x,y,z,r\n1 000,0,0,1\n", "line 2: .* is not 4 finite numbers, one for each of x, y, z, r"),
         ("x y z r radius\n0 0 0 1 1\n", "radius is given twice"),
         ("x y z r d\n0 0 0 1 2\n", "both radius and diameter"),
         ("x y z r vx\n0 0 0 1 2\n", "velocity lacks its component y, z"),
@@ -166,6 +169,45 @@ def test_mistakes_in_files_are_named(tmp_path, text, message):
     with pytest.raises(BadInput, match=message) as caught:
         read_grains(tmp_path / "a", sand.SILICA)
     assert all(problem.startswith(str(tmp_path / "a")) for problem in caught.value.problems)
+    assert len(caught.value.problems) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x [nm],y [nm],z [nm],r [nm]\n0,0,0,100\n",
+        "1\nProperties=species:S:1:pos:R:3:radius:R:1 length_unit=nm\nSi 0 0 0 100\n",
+        LAMMPS.replace("3 atoms", "1 atoms") + "1 1 2e-7 2650 0 0 0\n",
+    ],
+    ids=["columns", "XYZ", "LAMMPS"],
+)
+def test_a_unit_of_length_is_given_once(tmp_path, text):
+    """A unit of the caller that differs from that of the file would change all lengths; the same unit is accepted."""
+    (tmp_path / "a").write_text(text)
+    with pytest.raises(BadInput, match=r"length = '1 um': .* states its unit of length, 1 .*; leave length out"):
+        read_grains(tmp_path / "a", sand.SILICA, length="1 um")
+    same = "1 m" if text.startswith("LAMMPS") else "1 nm"
+    assert read_grains(tmp_path / "a", sand.SILICA, length=same).grains.radius == pytest.approx(R, rel=1e-12, abs=0.0)
+    write_body(tmp_path / "b.gsd", sand.Grains([[0, 0, 0]], R, "silica"))
+    with pytest.raises(BadInput, match="states its unit of length, 1 m; leave length out"):
+        read_grains(tmp_path / "b.gsd", length="1 nm")
+
+
+def test_what_is_assumed_of_columns_is_said(tmp_path):
+    """Velocities without a unit are in SI; a column without a name, as pandas writes its index, is not mentioned."""
+    (tmp_path / "a").write_text(",x [nm],y [nm],z [nm],r [nm],vx,vy,vz\n0,0,0,0,100,1,2,3\n")
+    found, notes = told(read_grains, tmp_path / "a", sand.SILICA)
+    assert found.notes == (f"{tmp_path / 'a'} states no units of velocity: they are taken in SI",) and not notes
+    (tmp_path / "a").write_text("x,y,z,r,vx [m/s],vy [m/s],vz [m/s]\n0,0,0,1e-7,1,2,3\n")
+    assert not told(read_grains, tmp_path / "a", sand.SILICA)[0].notes
+
+
+@pytest.mark.compiled("small")
+def test_how_a_file_is_understood_is_said_also_if_it_is_refused(tmp_path):
+    """The reading `number x y z r` is a note, though the two grains overlap by too much."""
+    (tmp_path / "a").write_text("1 0 0 0 10\n2 19.95 0 0 10\n3 39.8 0 0 10\n")
+    with pytest.warns(UserWarning, match="columns read as"), pytest.raises(BadInput, match="overlap by"):
+        start_from_file(tmp_path / "a", None, sand.SILICA, length="1 um")
 
 
 def test_a_radius_is_given_once(tmp_path):
@@ -285,6 +327,9 @@ def test_gsd_of_others_needs_a_unit(tmp_path):
     assert read_grains(tmp_path / "a.bin", sand.SILICA, R, "200 nm").grains.radius == pytest.approx(R, abs=1e-22)
     start, _ = told(start_from_file, tmp_path / "a.bin", None, sand.SILICA, length="200 nm")
     assert start.box.lengths == pytest.approx([1e-5] * 3, rel=1e-6, abs=0.0)
+    assert "all diameters are 1 unit of length" in read_grains(tmp_path / "a.bin", sand.SILICA, length="1 um").notes[0]
+    of_hoomd(tmp_path / "a.bin", mass=[5, 5, 5], diameter=[1, 1, 1.001])
+    assert "masses are not read" in read_grains(tmp_path / "a.bin", sand.SILICA, length="1 um").notes[0]
     of_hoomd(tmp_path / "a.bin", velocity=[[0, 1, 0]] * 3)
     with pytest.raises(BadInput, match="velocities are in units that the file does not state; set them to 0"):
         read_grains(tmp_path / "a.bin", sand.SILICA, length="200 nm")
@@ -373,6 +418,14 @@ def test_borders_of_rounding(tmp_path, places, message):
     (tmp_path / "a").write_text("".join(f"{x} 0 0 1\n" for x in places))
     with pytest.raises(BadInput, match=message):
         body_from_file(tmp_path / "a", sand.SILICA, length="100 nm")
+
+
+@pytest.mark.compiled("small")
+def test_the_largest_overlap_is_allowed_itself(tmp_path):
+    """20 − 19.99 is above 1e-3 · 10 in double precision, but an overlap of 1e-3 r."""
+    assert 20 - 19.99 > 1e-3 * 10
+    (tmp_path / "a").write_text("0 0 0 10\n19.99 0 0 10\n")
+    assert "1 contact is put at rest" in told(body_from_file, tmp_path / "a", sand.SILICA, length="1 um")[1][0]
 
 
 def test_the_gap_that_is_named_is_that_to_the_nearest_surface(tmp_path):

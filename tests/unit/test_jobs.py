@@ -15,6 +15,7 @@ import pytest
 import tomli_w
 
 import sand
+from sand.cli.job import InterruptObserver
 from sand.cli.main import main
 from sand.cli.streams import Output
 from sand.compiler.stage import Stage
@@ -54,6 +55,17 @@ def content(folder):
 
 
 # --- signals and the wall time ---------------------------------------------------------------------------------------
+
+
+def test_a_signal_whose_exception_was_lost_stops_a_job():
+    """The compiler loses exceptions of its callbacks; a job stops all the same, be it waiting or at work itself."""
+    released = threading.Event()
+    with InterruptObserver() as interrupts, ThreadPoolExecutor(1) as pool:
+        interrupts.received = True
+        for executor in (pool, None):
+            with pytest.raises(KeyboardInterrupt):
+                list(results_of(executor, released.wait, [2.0]))
+        released.set()
 
 
 class Send(sand.Observer):

@@ -33,7 +33,7 @@ class InterruptObserver(Interrupts, Observer):
     """Raises KeyboardInterrupt on all stop signals in the block; during steps `simulation.signals` handles them.
 
     An exception raised while the compiler calls back into Python is lost. It is raised again before the next
-    compilation, or, as this class is an observer, at the first frame.
+    compilation, while a job waits for its tasks, or, as this class is an observer, at the first frame.
 
     Attributes
     ----------

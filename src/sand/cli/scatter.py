@@ -83,10 +83,11 @@ def scatter(
     hidden = quiet or as_json
     with (
         report.progress_bar(1.0, hidden, bar_format=report.LAYOUT) as bar,
-        running_job(folder, quiet=quiet, **execution) as (executor, _),
+        running_job(folder, quiet=quiet, **execution) as (executor, interrupts),
     ):
 
         def progress(text: str, part: float) -> None:
+            interrupts.see(None, {})
             bar.set_description_str(text, refresh=False)
             bar.update(part - bar.n)
 

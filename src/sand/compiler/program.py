@@ -65,7 +65,8 @@ def _python_call(
 
 
 before_first_calls: list[Callable[[], None]] = []
-"""Functions called before a stage is compiled; an exception of theirs, such as KeyboardInterrupt, prevents that."""
+"""Functions called before a stage is compiled, and while a job waits for its tasks; an exception of theirs, such as
+KeyboardInterrupt, prevents that."""
 FAILED = -1
 """Numba's status of a function that has raised a Python exception."""
 NOT_READY, READY = 0, 1

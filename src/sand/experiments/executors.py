@@ -10,12 +10,14 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing.connection import wait
+from queue import Empty, SimpleQueue
 from typing import Any
 
+from ..compiler.program import before_first_calls
 from ..errors import BadInput, import_optional, warn
 from ..forces.own import IMPORTED
 from ..simulation.signals import STOPS
@@ -23,6 +25,8 @@ from .worker import SHIELDED, Item, Result, begin_worker, do_task, done_apart
 
 ANSWER = 10.0
 """Timeout of the connection to a scheduler [s]."""
+LOOK = 0.5
+"""Wall time [s] between two looks for a signal whose exception an import or the compiler has lost."""
 LONGEST_STOP = 60.0
 """Wall time [s] that workers get to write their checkpoints; they need it only on a very slow disk."""
 MOST_ON_WINDOWS = 61
@@ -88,11 +92,17 @@ def results_of(
         Any `concurrent.futures.Executor`; None works through the items in this process, in their order.
     """
     if executor is None:
-        yield from ((item, work(item)) for item in items)
+        for item in items:
+            _look_for_signals()
+            yield item, work(item)
         return
     waiting = {executor.submit(done_apart, os.getpid(), work, item): item for item in items}
+    done = SimpleQueue[Future[Any]]()
     try:
-        for future in as_completed(waiting):
+        for future in waiting:
+            future.add_done_callback(done.put)
+        for _ in waiting:
+            future = _next(done)
             result, warnings = future.result()
             for text in warnings:
                 warn(text)
@@ -100,6 +110,20 @@ def results_of(
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _next(done: SimpleQueue[Future[Any]]) -> Future[Any]:
+    """The next task that is done."""
+    while True:
+        _look_for_signals()
+        with contextlib.suppress(Empty):
+            return done.get(timeout=LOOK)
+
+
+def _look_for_signals() -> None:
+    """Raise KeyboardInterrupt again if an import or the compiler, which call Python from C, has lost it."""
+    for check in before_first_calls:
+        check()
 
 
 class _Pool(ProcessPoolExecutor):

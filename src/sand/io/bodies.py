@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
 from ..paths import user_path
-from ..units import si
+from ..units import format_quantity, si
 from .extended_xyz import xyz_text
 from .frame import MODES
 from .grain_files import FileBox, GrainData, GrainFile, is_gsd, open_grains
@@ -67,6 +68,7 @@ def read_grains(
     length : str or None, optional
         Unit of length of the file, "1 nm" for example. Default: the one that the file states; 1 Å in XYZ; 1 m in
         columns and in LAMMPS files that state no unit. GSD of other programs needs it.
+        A file that states another one is refused.
     materials : Mapping[str, Material], optional
         Materials that the file may name.
     otherwise : Material or None, optional
@@ -120,6 +122,11 @@ def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, c
         raise BadInput(data.refused)
     unit = data.unit if length is None else si(length, "m", "length", above=0.0)
     assert unit is not None
+    if data.states_unit and data.unit is not None and not math.isclose(unit, data.unit, rel_tol=1e-9):
+        stated = format_quantity(data.unit, "m")
+        raise BadInput(f"length = {length!r}: {path} states its unit of length, {stated}; leave length out")
+    if data.sizes_assumed and radius is None:
+        data.notes.append(f"{path}: all diameters are 1 unit of length, the default of GSD; give a radius for others")
     grains = _grains_of(path, data, unit, radius, choice)
     try:
         box, centre = _box_of(data, unit)
@@ -221,6 +228,7 @@ def _read_own_gsd(path: Path, number: int) -> tuple[GrainData, tuple[np.ndarray,
         {name: np.asarray(getattr(frame, name), np.float64) for name in names},
         [frame.materials[k] for k in frame.material],
         {name: (values, frame.own.units[name]) for name, values in frame.own.items()},
+        states_unit=True,
     )
     lengths = np.array(frame.drawn)
     x, y, z = (length is not None for length in frame.box.lengths)

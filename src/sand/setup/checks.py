@@ -11,6 +11,8 @@ from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)
 """Largest initial overlap: the larger of 2 δ0 and 1e-3 of the smaller radius."""
+ROUNDING = 64.0 * np.finfo(float).eps
+"""Error of an overlap by the rounding of positions in double precision, relative to the largest coordinate."""
 SAME_PLACE = 1e-6
 """Distance of centres, in radii of the smallest grain, up to which two grains are at the same place."""
 MOST_MESSAGES = 10
@@ -60,7 +62,7 @@ def refuse_excess(grains: Grains, pairs: np.ndarray, overlap: np.ndarray, rest: 
     if same := at_same_place(grains, Box.open()):
         raise BadInput(f"{origin}: {problem}" for problem in same)
     most = most_overlap(rest, grains.radius[pairs].min(axis=1))
-    wrong = np.flatnonzero(overlap > most)
+    wrong = np.flatnonzero(overlap > most + ROUNDING * np.abs(grains.position).max(initial=0.0))
     problems = [
         f"{origin}: grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m, at most {most[k]:.3g} m is "
         "allowed: move them apart"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from ..io.run_folder import TRAJECTORY
 from ..material import Material
 from ..paths import user_path
 from ..units import format_quantity
-from .checks import cluster_labels, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
+from .checks import ROUNDING, cluster_labels, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
 from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
 from .overlap_fit import fit_overlaps
 
@@ -60,6 +60,7 @@ def body_from_file(path: str | Path, *arguments: Any, **named: Any) -> Grains:
     from ..io.bodies import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
+    _tell(found.notes)  # they tell how the file is understood, also if it is refused
     grains, pairs, notes = _at_rest(found, str(path))
     refuse_pieces(grains, pairs, found.box, str(path))
     if not found.box.is_open:
@@ -101,6 +102,7 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
     from ..io.bodies import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
+    _tell(found.notes)  # they tell how the file is understood, also if it is refused
     used = found.box if box is None else box
     if found.box.is_open:  # grains may touch across the faces of the case's box
         found = found._replace(box=used)
@@ -116,7 +118,7 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
     return Start(grains, None, used, f"{path}, relative to the centre of its box")
 
 
-def _tell(notes: list[str]) -> None:
+def _tell(notes: Iterable[str]) -> None:
     for note in notes:
         warn(note)
 
@@ -129,7 +131,7 @@ def _at_rest(found: ReadGrains, origin: str) -> tuple[Grains, np.ndarray, list[s
     BadInput
         If grains overlap by too much.
     """
-    grains, box, notes = found.grains, found.box, list(found.notes)
+    grains, box, notes = found.grains, found.box, list[str]()
     if found.contacts is not None:
         pairs, overlap = found.contacts
         grains.arrays.position[...] = restore_overlaps(grains.position, grains.radius, box, pairs, overlap).T
@@ -138,19 +140,20 @@ def _at_rest(found: ReadGrains, origin: str) -> tuple[Grains, np.ndarray, list[s
         return grains, pairs, notes
     pairs, overlap, rest = pairs_in_contact(grains, box)
     refuse_excess(grains, pairs, overlap, rest, origin)
-    rounding = 64.0 * np.finfo(float).eps * float(np.abs(grains.position).max())
+    rounding = ROUNDING * float(np.abs(grains.position).max())
     if (np.abs(overlap - rest) <= EXACT * rest + rounding).all():
         return grains, pairs, notes
     fit = fit_overlaps(grains.position, grains.radius, box, pairs, rest)
     grains.arrays.position[...] = fit.position.T
     moved = format_quantity(fit.moved, "m")
-    text = f"{origin}: coordinates are rounded; {len(pairs)} contacts are put at rest, grains move by at most {moved}"
+    contacts = "1 contact is" if len(pairs) == 1 else f"{len(pairs)} contacts are"
+    text = f"{origin}: coordinates are rounded; {contacts} put at rest, grains move by at most {moved}"
     if fit.residue > EXACT * float(rest.max()) + rounding:
         gaps = int((grains.overlaps(pairs, box) < 0.0).sum())
         text += f"; rings do not fit: overlaps differ from those of equilibrium by at most {fit.residue:.2g} m"
         text += f", and {gaps} pairs keep a gap and start without a contact" * bool(gaps)
     pairs = pairs[grains.overlaps(pairs, box) >= -rounding]
-    return grains, pairs, [*notes, text]
+    return grains, pairs, [text]
 
 
 def make_whole(grains: Grains, pairs: np.ndarray, box: Box, origin: str) -> bool:

@@ -43,7 +43,10 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
     unit = _unit_of_x(path, names, units)
     columns: dict[str, Any] = dict(zip(names, table.T, strict=True)) | texts
     data = data_of(columns, unit, place=str(path), units=units)
+    data.states_unit = stated is not None
     data.notes += notes
+    if bare := [q for q in data.given if not any((known_as(name) or ("",))[0] == q for name in units)]:
+        data.notes.append(f"{path} states no units of {' and '.join(bare)}: they are taken in SI")
 
     def frame(number: int) -> GrainData:
         return data
@@ -113,7 +116,11 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
             stated = (int(row[0]), number)
             continue
         if len(row) < 3 or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
-            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} is not x y z or x y z r, as in all lines")
+            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} {_wanted(rows, header, first)}")
+        if not row:
+            if len(problems) == NAMED:
+                break
+            continue
         if not rows:
             first = number
             header = header if len(header[0]) == len(row) or _is_named(lines, header) else ([], {})
@@ -133,6 +140,15 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
     if uneven := [name for name, words in texts.items() if len(words) != len(rows)]:
         raise BadInput(f"{path}: column {uneven[0]!r} has numbers in some lines and text in others")
     return rows, header, first, texts
+
+
+def _wanted(rows: list[list[float]], header: Header, first: int) -> str:
+    """What a line should have held: numbers as the first row has, or else names of columns, or a row."""
+    if rows:
+        return f"is not {len(rows[0])} finite numbers, as in line {first}"
+    if header[0]:
+        return f"is not {len(header[0])} finite numbers, one for each of {', '.join(header[0])}"
+    return "is not x y z or x y z r, nor names of columns with x, y and z once, such as 'x [nm], y [nm], z [nm]'"
 
 
 def _with_text(words: list[str], names: list[str], texts: dict[str, list[str]]) -> list[float]:

@@ -94,6 +94,8 @@ class GrainData:
         (N,), None if the file has no radii.
     unit : float or None
         Unit of length [m]; None if the file does not state it and its format does not define it.
+    states_unit : bool
+        Whether the file itself states the unit of length.
     given : dict
         velocity, spin, moment (N, 3), charge, mass, density (N,), those that the file has.
     names : list of str or None
@@ -126,6 +128,7 @@ class GrainData:
     sizes_assumed: bool = False
     time: float | None = None
     step: int | None = None
+    states_unit: bool = False
 
 
 class GrainFile(NamedTuple):

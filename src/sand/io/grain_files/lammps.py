@@ -287,6 +287,7 @@ def _in_si(path: Any, columns: dict[str, np.ndarray], units: str | None, *, by_s
         "density": mass / length**3,
         "moment": 1.0,
     }
+    data.states_unit = units in STYLES or by_sand
     data.given = {name: values * factors[name] for name, values in data.given.items()}
     kept = [name for name, values in data.given.items() if name != "density" and values.any()]
     if units == "lj":

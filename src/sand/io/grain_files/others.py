@@ -53,7 +53,7 @@ def _of_snapshot(path: Path, stored: Any) -> GrainData:
                 f"{path}: its {name} are in units that the file does not state; set them to 0, or write the grains in "
                 "SI, as columns '# x y z r vx vy vz'"
             )
-    if p.mass is not None and np.ptp(p.mass) > 0.0:
+    if p.mass is not None and np.any(np.asarray(p.mass) != 1.0):  # 1: the default of the format
         data.notes.append(f"{path}: masses are not read, the file states no unit; they follow from radius and material")
     lengths = np.asarray(stored.configuration.box, dtype=np.float64)
     if lengths[:3].all() and not lengths[3:].any():

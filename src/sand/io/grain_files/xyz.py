@@ -97,6 +97,7 @@ def _read_frame(path: Any, lines: list[str], first: int, count: int) -> GrainDat
     if "material" in columns and "materials" in head:
         columns["material"] = _named(path, columns["material"], head["materials"])
     data = data_of(columns, unit, place=place, own=own)
+    data.states_unit = "length_unit" in head
     data.box = _box(place, head)
     if head.get("other_units") == "SI" and _is_number(head.get("Time", "")):
         data.time = numbers([head["Time"]])[0]
