@@ -299,7 +299,7 @@ def test_contacts_across_the_box_of_the_case_are_put_at_rest(tmp_path):
     (tmp_path / "a").write_text(f"{-place!r} 0 0 {R!r}\n{place!r} 0 0 {R!r}\n")
     (start, notes) = told(start_from_file, tmp_path / "a", sand.Box.periodic(length), sand.SILICA)
     across = length - np.ptp(start.grains.position[:, 0])
-    assert across == pytest.approx(D, abs=1e-6 * REST) and "1 contacts are put at rest" in notes[0]
+    assert across == pytest.approx(D, abs=1e-6 * REST) and "1 contact is put at rest" in notes[0]
 
 
 def test_a_file_of_many_frames_is_read_once(tmp_path, monkeypatch):

@@ -40,9 +40,9 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
         names, notes = _unnamed(path, table)
     if len(names) != table.shape[1]:
         raise BadInput(f"{path}, line {first}: {table.shape[1]} columns, but {len(names)} names: {', '.join(names)}")
-    unit = _unit_of_x(path, names, units)
+    stated = _unit_of_x(path, names, units)
     columns: dict[str, Any] = dict(zip(names, table.T, strict=True)) | texts
-    data = data_of(columns, unit, place=str(path), units=units)
+    data = data_of(columns, 1.0 if stated is None else stated, place=str(path), units=units)
     data.states_unit = stated is not None
     data.notes += notes
     if bare := [q for q in data.given if not any((known_as(name) or ("",))[0] == q for name in units)]:
@@ -54,8 +54,8 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
     return GrainFile("columns", 1, frame)
 
 
-def _unit_of_x(path: Any, names: list[str], units: dict[str, str]) -> float:
-    """Unit of length [m] of the column x, which is also that of all lengths without one.  Raises BadInput."""
+def _unit_of_x(path: Any, names: list[str], units: dict[str, str]) -> float | None:
+    """Unit of length [m] of the column x, which is also that of lengths without one, or None.  Raises BadInput."""
     stated = next((units[name] for name in names if name in units and known_as(name) == ("position", 0)), None)
     if stated is None:
         lengths = [name for name in names if name in units and (known_as(name) or ("",))[0] in LENGTHS]
@@ -64,7 +64,7 @@ def _unit_of_x(path: Any, names: list[str], units: dict[str, str]) -> float:
             raise BadInput(
                 f"{path}: {others[0]} has the unit {unit}, but x has none; write x [{unit}], if that is its unit, too"
             )
-        return 1.0
+        return None
     factor = in_unit(f"1 {stated}", "m")
     if factor is None:
         raise BadInput(f"{path}: {stated!r} is not a unit of length")
@@ -117,7 +117,6 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
             continue
         if len(row) < 3 or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
             problems.append(f"{path}, line {number}: {line.strip()[:40]!r} {_wanted(rows, header, first)}")
-        if not row:
             if len(problems) == NAMED:
                 break
             continue
@@ -125,7 +124,7 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
             first = number
             header = header if len(header[0]) == len(row) or _is_named(lines, header) else ([], {})
         rows.append(row)
-        if len(problems) == NAMED or len(rows) > MOST_GRAINS:
+        if len(rows) > MOST_GRAINS:
             break
     if len(rows) > MOST_GRAINS:
         problems.append(f"{path} holds more than {MOST_GRAINS:.0e} grains")
