@@ -112,11 +112,11 @@ def read_frame(
     return _in_si(path, data, radius, length, (material, materials, otherwise))
 
 
-Choice = tuple[Material | None, Mapping[str, Material], Material | None]
-"""Parameters of `read_grains`: material, materials, otherwise."""
+# parameters of `read_grains`: material, materials, otherwise
+_Choice = tuple[Material | None, Mapping[str, Material], Material | None]
 
 
-def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: Choice) -> ReadGrains:
+def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: _Choice) -> ReadGrains:
     """Grains and box in SI.  Raises BadInput."""
     if data.refused:
         raise BadInput(data.refused)
@@ -135,7 +135,7 @@ def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, c
     return ReadGrains(grains, box, centre, None, tuple(data.notes), data.time, data.step)
 
 
-def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: Choice) -> Grains:
+def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: _Choice) -> Grains:
     """Grains in SI.  Raises BadInput."""
     if data.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains: radius = '0.1 um', for example")
