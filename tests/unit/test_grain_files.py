@@ -444,10 +444,11 @@ def test_the_gap_that_is_named_is_that_to_the_nearest_surface(tmp_path):
     ids=["charges", "dipoles", "contact"],
 )
 def test_grains_at_one_place_are_refused(force):
-    """At the start of a simulation with any force: the force between them has no direction."""
+    """At the start of a simulation in which grains interact: the force between them has no direction."""
     grains = sand.Grains([[0, 0, 0], [0, 0, 0]], R, "silica", charge=1e-19, moment=[0, 0, 1e-18])
     with pytest.raises(BadInput, match="grains 0 and 1 are at the same place; leave one of them out"):
         sand.Simulation(grains, [force])
+    assert sand.Simulation(grains, [sand.Field([0, 0, 1e-3])]).steps == 0  # these do not see each other
 
 
 def test_velocities_of_a_body_are_relative_to_its_centre(tmp_path):

@@ -32,7 +32,9 @@ OVERLAP_TOLERANCE = 1e-3
 def _of_a_start(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
     """Errors of positions and cut-offs at a new start."""
     outside = outside_box(grains, box)
-    return [*outside, *([] if outside else at_same_place(grains, box)), *_short_cutoffs(grains, forces, box)]
+    interact = any(isinstance(force, (Contact, LongRangeForce)) for force in forces)
+    together = at_same_place(grains, box) if interact and not outside else []
+    return [*outside, *together, *_short_cutoffs(grains, forces, box)]
 
 
 def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
