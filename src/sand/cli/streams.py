@@ -51,9 +51,9 @@ class Output(io.RawIOBase):
 
 
 def keep_working_without_streams() -> list[Output]:
-    """Put `Output` in place of the standard streams of this process; those that are closed lead to nowhere.
+    """Put `Output` in place of the standard streams of this process; text for a closed stream is discarded.
 
-    A file that is opened later would otherwise get the number of a closed stream, and receive what is written to it.
+    A file that is opened later would otherwise get the number of the closed stream, and receive the text for it.
     """
     for number in range(3):
         try:

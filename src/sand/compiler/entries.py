@@ -13,6 +13,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,10 @@ from ..errors import warn
 from .cache import WRITABLE_BY_OTHERS, remade
 from .progress import acquire_lock
 
-__all__ = ["CodeCache", "Entries", "described"]
+__all__ = ["CodeCache", "Entries", "described", "machine_code"]
+
+machine_code = attrgetter("library")
+"""Machine code of a compilation result of numba."""
 
 _SUM_SIZE = hashlib.sha256().digest_size
 
@@ -189,7 +193,7 @@ class CodeCache(NullCache):
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Write compiled code, unless it contains addresses of this process."""
-        if not (result.library.has_dynamic_globals or result.lifted):
+        if not (machine_code(result).has_dynamic_globals or result.lifted):
             self._entries.write(*self._place(signature, result.codegen), dumps(result._reduce()))
 
     def release(self) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from operator import attrgetter, is_
+from operator import is_
 from types import FunctionType
 from typing import Any
 
@@ -25,6 +25,7 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
+from .entries import machine_code
 from .jit import COMPILED, caller, in_cache, kernel, loop, rare, separate
 from .native_calls import call_from_python
 from .processor import FAST_512_BIT, SLOW_GATHER, target
@@ -89,10 +90,6 @@ _set_attributes(arrays_do_not_overlap, no_overlap=True, long_vectors=False)
 _set_attributes(long_arrays_do_not_overlap, no_overlap=True, long_vectors=True)
 
 
-_machine_code = attrgetter("library")
-"""Machine code of a compilation result of numba."""
-
-
 def _renamed(function: Any, name: str) -> Any:
     """A copy of a function with a name of its own, under which its compiled code is cached."""
     copy = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
@@ -134,7 +131,7 @@ class Stage:
             with making_code:  # also of uncached code
                 dispatcher.compile(signature)
             found = dispatcher.overloads[signature.args]
-            self._compiled[key] = found, _machine_code(found).get_pointer_to_function(found.fndesc.llvm_func_name)
+            self._compiled[key] = found, machine_code(found).get_pointer_to_function(found.fndesc.llvm_func_name)
         return int(self._compiled[key][1])
 
     def _key(self, table: Table, parameters: Any) -> Any:

@@ -147,7 +147,7 @@ class _Pool(ProcessPoolExecutor):
         self._has_started = True
 
     def stop(self) -> None:
-        """Stop all processes: those that write the files of a run write a checkpoint first."""
+        """Stop all processes; a process that runs a simulation with files writes a checkpoint first."""
         manager: Any = self._executor_manager_thread
         self.shutdown(wait=False, cancel_futures=True)
         processes = list(self._workers.values())

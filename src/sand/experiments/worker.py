@@ -68,7 +68,7 @@ def _end_with_parent(reader: int | None) -> None:
         if has_signal or ready != [reader]:
             break
     _stopping.set()
-    if Signals.saving and not has_signal:  # nothing has told the run
+    if Signals.saving and not has_signal:  # the run knows of no signal yet
         signal.raise_signal(signal.SIGTERM)
     end = time.monotonic() + LONGEST_STOP
     while Signals.saving and time.monotonic() < end:

@@ -168,7 +168,7 @@ class Change:
         BadInput
             At the end of the change, if there is no such grain, or no grain would remain.
         """
-        count, given = len(self.grains), np.zeros(1)  # what is not an array is refused below
+        count, given = len(self.grains), np.zeros(1)  # in place of values that are no array, refused below
         if not has_unit_within(which):
             with contextlib.suppress(TypeError, ValueError, OverflowError, RecursionError):
                 given = np.atleast_1d(np.asarray(which))

@@ -97,7 +97,7 @@ class GrainData:
     states_unit : bool
         Whether the file itself states the unit of length.
     given : dict
-        velocity, spin, moment (N, 3), charge, mass, density (N,), those that the file has.
+        Arrays by name, as far as the file has them: velocity, spin, moment (N, 3), charge, mass, density (N,).
     names : list of str or None
         Name of the material of each grain.
     own : dict
@@ -105,11 +105,11 @@ class GrainData:
     box : FileBox or None
         The box.
     notes : list of str
-        What was not read, and what was assumed.
+        Columns that were not read, and assumptions about units, radii and masses.
     refused : list of str
         Messages about quantities that cannot be kept.
     sizes_assumed : bool
-        Whether the radii are those that the format defines for a file without any.
+        Whether the radii are the default of the format, because the file has none.
     time : float or None
         Time [s], if the file states it.
     step : int or None
