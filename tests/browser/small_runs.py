@@ -15,7 +15,7 @@ import numpy as np
 
 from sand.box import Box
 from sand.io.damage import sealed
-from sand.io.frame import MODES
+from sand.io.frame_chunks import MODES
 from sand.io.ledger_table import LedgerFile
 from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
 from sand.io.trajectory import TrajectoryWriter

@@ -370,7 +370,7 @@ def test_frames_give_tables_starts_and_pages(run):
 def five_frame(index=slice(None)):
     """A frame of grains of `five`."""
     from sand.io.bodies import contacts_of
-    from sand.io.frame import stored_frame
+    from sand.io.frame_chunks import stored_frame
 
     grains = five()[index]
     return Frame(stored_frame(0, 0.0, grains, Box.open(), contacts_of(grains)))

@@ -16,7 +16,7 @@ from sand.analysis.clusters import cluster_labels
 from sand.analysis.internal_motion import internal_kinetic_energy
 from sand.cli.main import main
 from sand.constants import BOLTZMANN, MAGNETIC
-from sand.io.frame import code_of
+from sand.io.frame_chunks import code_of
 from sand.simulation.ledger import kinetic_energies
 from sand.state.state import BODIES, CONTACT_STEPS, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 

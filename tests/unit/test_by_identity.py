@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.box import Box
-from sand.io.frame import MODES
+from sand.io.frame_chunks import MODES
 from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import TrajectoryWriter, read_frames
 from sand.simulation.changed_state import joined, subset

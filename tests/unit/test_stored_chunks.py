@@ -6,7 +6,7 @@ import numpy as np
 
 import sand
 from sand.box import Box
-from sand.io.frame import stored_frame
+from sand.io.frame_chunks import stored_frame
 from sand.io.trajectory import TrajectoryWriter, read_frames
 
 from .synthetic_trajectories import contacts_of

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
-from ..io.frame import MODES as SHARES
-from ..io.frame import REST
+from ..io.frame_chunks import MODES as SHARES
+from ..io.frame_chunks import REST
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 

@@ -17,7 +17,7 @@ from ..material import PRESETS, Material
 from ..paths import user_path
 from ..units import format_quantity, si
 from .extended_xyz import xyz_text
-from .frame import MODES
+from .frame_chunks import MODES
 from .grain_files import FileBox, GrainData, GrainFile, is_gsd, open_grains
 from .run_folder import replace_file
 from .trajectory import Frames, TrajectoryWriter

@@ -14,7 +14,8 @@ from ..errors import BadInput, warn
 from ..grains import ROUNDED
 from ..material import PRESETS, SILICA, Material, as_material
 from .bodies import contacts_of, read_frame
-from .frame import Frame, FrameSequence, stored_frame
+from .frame import Frame, FrameSequence
+from .frame_chunks import stored_frame
 from .grain_files import is_gsd, open_grains
 from .trajectory import Frames
 

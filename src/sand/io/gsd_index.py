@@ -14,7 +14,8 @@ import numpy as np
 
 from ..errors import BadInput
 from .damage import DAMAGED, set_aside
-from .frame import Frame, code_of, read_stored
+from .frame import Frame
+from .frame_chunks import code_of, read_stored
 
 ENTRY = np.dtype(
     [

@@ -21,9 +21,8 @@ from ..paths import user_path
 from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
-from .frame import (
-    Frame,
-    FrameSequence,
+from .frame import Frame, FrameSequence
+from .frame_chunks import (
     append_frame,
     code_of,
     first_chunks,

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..analysis.ledger_columns import LedgerColumns
 from ..errors import BadInput
-from ..io.frame import Frame, stored_frame
+from ..io.frame import Frame
+from ..io.frame_chunks import stored_frame
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import TRAJECTORY, VIEW
 from ..paths import user_path
