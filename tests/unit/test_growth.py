@@ -229,3 +229,12 @@ def test_temperatures_are_pooled_at_equal_times():
     assert found[:, 1] == pytest.approx([200.0] * 3, rel=1e-12, abs=0.0)
     assert found[:, 2] == pytest.approx([400.0] * 3, rel=1e-12, abs=0.0)
     assert temperatures_over_time([box([], 1.0)]).shape == (0, 4)
+
+
+@pytest.mark.parametrize("odd", ["seeds = 3", 'seeds = [1, "two"]', "seeds = [1.5]", "seeds = [-1]", "seeds = [true]"])
+def test_edited_seeds_of_a_folder_of_boxes(tmp_path, odd):
+    """One line for seeds that are no list of whole numbers; nothing is run."""
+    (tmp_path / "case.toml").write_text(f"# Written by SAND: a test\n[grow]\n{odd}\n")
+    with pytest.raises(sand.BadInput, match="must be a list of whole numbers") as caught:
+        grow(CASE, [1], tmp_path)
+    assert len(caught.value.problems) == 1 and not list(tmp_path.glob("seed-*"))

@@ -20,6 +20,7 @@ from sand.cli.main import main
 from sand.cli.streams import Output
 from sand.compiler.stage import Stage
 from sand.errors import warn
+from sand.experiments import executors
 from sand.experiments.executors import results_of
 from sand.experiments.growth_boxes import grow
 from sand.experiments.worker import done_apart
@@ -379,3 +380,21 @@ def test_a_run_goes_on_without_a_reader(workdir):
     while not (workdir / "code").exists() and time.monotonic() < end:
         time.sleep(0.05)
     assert (workdir / "code").read_text().strip() == "0" and (workdir / "d" / "summary.json").exists()
+
+
+def test_several_threads_start_processes():
+    """Each block begins with the environment of new processes, and the last one restores that of this process."""
+    found, before = [], dict(os.environ)
+
+    def start():
+        for _ in range(20):
+            with executors.starting_processes():
+                time.sleep(1e-3)  # another thread is active meanwhile
+                found.append(os.environ.get(executors.SAFE_PATH))
+
+    threads = [threading.Thread(target=start) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == ["1"] * 80 and dict(os.environ) == before

@@ -33,6 +33,8 @@ MOST_ON_WINDOWS = 61
 """Largest number of processes of a pool on Windows, a limit of `concurrent.futures`."""
 SAFE_PATH = "PYTHONSAFEPATH"
 """Environment variable by which Python leaves the current folder out of its path."""
+_ENVIRONMENT = threading.RLock()
+"""Held while the environment is that of new processes: several threads may start some."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
@@ -70,7 +72,7 @@ def executor_for(
     elif workers > MOST_ON_WINDOWS and sys.platform == "win32":
         raise BadInput(f"workers = {workers}; on Windows Python starts at most {MOST_ON_WINDOWS} processes")
     else:
-        with _starting():  # the first lock of a pool starts a process, too
+        with starting_processes():  # the first lock of a pool starts a process, too
             pool = _Pool(workers, threads or 1)
         with pool:
             try:
@@ -137,7 +139,7 @@ class _Pool(ProcessPoolExecutor):
 
     def submit(self, work: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Submit a task; starts a process if there are fewer than `workers`."""
-        with _starting():
+        with starting_processes():
             return super().submit(do_task, work, *given, **named)
 
     def start(self, workers: int) -> None:
@@ -179,25 +181,26 @@ def _only_ctrl_c() -> Iterator[None]:
 
 
 @contextmanager
-def _starting() -> Iterator[None]:
+def starting_processes() -> Iterator[None]:
     """In the block new processes begin without the current folder on their path, and with blocked signals.
 
     A terminal or a batch system sends signals to all processes; workers wait for the one of this process instead.
     Later they get the path of this process.
     """
-    before = os.environ.get(SAFE_PATH)
     can_block = hasattr(signal, "pthread_sigmask")
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {*SHIELDED, signal.SIGTERM}) if can_block else set()
-    os.environ[SAFE_PATH] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[SAFE_PATH]
-        else:
-            os.environ[SAFE_PATH] = before
-        if can_block:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    with _ENVIRONMENT:
+        before = os.environ.get(SAFE_PATH)
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {*SHIELDED, signal.SIGTERM}) if can_block else set()
+        os.environ[SAFE_PATH] = "1"
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ[SAFE_PATH]
+            else:
+                os.environ[SAFE_PATH] = before
+            if can_block:
+                signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..config.build import resume, simulation_of
 from ..config.case import check_case
-from ..errors import BadInput, warn
+from ..errors import BadInput, shown, warn
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
@@ -72,7 +72,7 @@ def grow(
         _describe(place, content, seeds)
     _run_all(content, places, executor, on_result, observers)
     with writing(place, patience=PATIENCE):
-        all_seeds = files.read_toml(place / files.CASE)["grow"]["seeds"]  # also those of other processes
+        all_seeds = _seeds_in(place / files.CASE)  # also those of other processes
         ends = {seed: _finished_summary(place / f"seed-{seed}") for seed in all_seeds}
         if all(ends.values()):
             named = {f"seed-{seed}": end for seed, end in ends.items()}
@@ -145,12 +145,23 @@ def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> Non
             raise BadInput(
                 f"{path} is not from SAND, and the case file of the job would replace it; give another folder"
             )
-        before = files.read_toml(path).get("grow", {}).get("seeds", [])
+        before = _seeds_in(path)
         if not before:
             raise BadInput(f"{place} contains a run; give another folder for the boxes")
     (place / files.GROWTH).unlink(missing_ok=True)  # written when all boxes are finished
     all_seeds = sorted({*before, *seeds})
     files.write_toml(path, {**content, "grow": {"seeds": all_seeds}}, "settings of sand grow, read by sand resume")
+
+
+def _seeds_in(path: Path) -> list[int]:
+    """Seeds in the case file of a folder of boxes, none in that of a run.  Raises BadInput for anything else."""
+    section = files.read_toml(path).get("grow", {})
+    seeds = section.get("seeds", []) if isinstance(section, dict) else section
+    if not isinstance(seeds, list) or not all(type(seed) is int and seed >= 0 for seed in seeds):
+        raise BadInput(
+            f"{path}: grow: seeds = {shown(seeds)} must be a list of whole numbers from 0, such as [1, 2, 3]"
+        )
+    return seeds
 
 
 def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence[Any] = ()) -> str:
