@@ -1,11 +1,15 @@
 """Chunks of trajectory.gsd: what is left out of a frame, against frames that gsd.hoomd writes."""
 
+import tracemalloc
+
 import gsd.fl
 import gsd.hoomd
 import numpy as np
+import pytest
 
 import sand
 from sand.box import Box
+from sand.io.bodies import read_grains
 from sand.io.frame_chunks import stored_frame
 from sand.io.trajectory import TrajectoryWriter, read_frames
 
@@ -97,3 +101,28 @@ def test_what_stays_is_written_once(tmp_path):
         assert {"particles/mass", "particles/charge", "particles/velocity", "configuration/box"} <= first
         assert last == {"configuration/step", "particles/position"}
         assert not file.chunk_exists(2, "log/lengths") and file.chunk_exists(2, "log/time")
+
+
+@pytest.mark.parametrize("part", ["particles", "bonds", "angles"])
+@pytest.mark.parametrize("own", [True, False], ids=["of SAND", "of others"])
+def test_numbers_without_rows_are_refused(tmp_path, part, own):
+    """A number of grains or bonds that the arrays do not have: the reader would fill arrays of that length.
+
+    3 GB for 2³¹ types; the memory in use stays below 20 MB.
+    """
+    path, many = tmp_path / "trajectory.gsd", 2**31
+    pair = sand.Grains([[0, 0, 0], [3e-8, 0, 0]], 1e-8, "iron")
+    log = stored_frame(0, 0.0, pair, Box.open(), contacts_of([(0, 1)])).log if own else {}
+    arrays = {"particles/position": np.array([[0, 0, 0], [3, 0, 0]], np.float32)}
+    arrays |= {"bonds/group": np.array([[0, 1]], np.uint32)} | {f"log/{name}": values for name, values in log.items()}
+    numbers = {"particles/N": 2, "bonds/N": 1} | {f"{part}/N": many}
+    with gsd.fl.open(path, "w", application="a test", schema="hoomd", schema_version=[1, 4]) as file:
+        for name, chunk in ({name: np.array([k], np.uint32) for name, k in numbers.items()} | arrays).items():
+            file.write_chunk(name, chunk)
+        file.end_frame()
+    tracemalloc.start()
+    with pytest.raises(sand.BadInput, match=f"{part}/N is {many}, but .* has . rows"):
+        read_frames(path) if own else read_grains(path, sand.SILICA, length="10 nm")
+    largest = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert largest < 2e7

@@ -210,9 +210,38 @@ def first_chunks(file: Any) -> dict[str, bytes]:
     return {name: file.file.read_chunk(0, name).tobytes() for name in names if file.file.chunk_exists(0, name)}
 
 
+def read_number(file: Any, frame: int, chunk: str) -> int:
+    """An integer of a frame; GSD omits values equal to those of the first frame, and zeros in the first."""
+    at = next((k for k in (frame, 0) if file.chunk_exists(k, chunk)), None)
+    return 0 if at is None else int(file.read_chunk(at, chunk)[0])
+
+
+_GROUPS = ("angles", "dihedrals", "impropers", "constraints", "pairs")
+OF_OTHERS = {"particles/N": "particles/position", **{f"{name}/N": f"{name}/group" for name in ("bonds", *_GROUPS)}}
+OF_SAND = OF_OTHERS | {"particles/N": "log/particles/moment", "bonds/N": "log/bonds/overlap"}
+"""Arrays by the chunk with their number of rows, in files of other programs and of SAND."""
+
+
+def read_snapshot(file: Any, number: int, arrays: Mapping[str, str]) -> Any:
+    """A frame as gsd.hoomd reads it, after a check of its numbers: it fills arrays that a frame lacks to any length.
+
+    Raises
+    ------
+    ValueError
+        If a number is not that of the rows of its array in `arrays`, of this frame or the first.
+    """
+    for chunk, array in arrays.items():
+        count = read_number(file.file, number, chunk)
+        at = next((k for k in (number, 0) if file.file.chunk_exists(k, array)), None)
+        rows = min(count, 1) if at is None else len(file.file.read_chunk(at, array))
+        if rows != count:
+            raise ValueError(f"{chunk} is {count}, but {array} has {rows} rows")
+    return file[number]
+
+
 def read_stored(file: Any, number: int) -> Any:
-    """A frame as it was given to `append_frame`."""
-    stored = file[number]
+    """A frame as it was given to `append_frame`.  Raises ValueError, or an exception of the reader, if it is broken."""
+    stored = read_snapshot(file, number, OF_SAND)
     for name in SOMETIMES:
         if file.file.chunk_exists(number, LATE + name):
             stored.log[name] = file.file.read_chunk(number, LATE + name)

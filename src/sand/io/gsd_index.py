@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import BadInput
 from .damage import DAMAGED, set_aside
 from .frame import Frame
-from .frame_chunks import code_of, read_stored
+from .frame_chunks import code_of, read_number, read_stored
 
 ENTRY = np.dtype(
     [
@@ -216,12 +216,6 @@ def _frames_until(file: Any, time: float) -> int:
     while number > 0 and time_of(file, number - 1) > time:
         number -= 1
     return number
-
-
-def read_number(file: Any, frame: int, chunk: str) -> int:
-    """An integer of a frame; GSD omits values equal to those of the first frame, and zeros in the first."""
-    at = next((k for k in (frame, 0) if file.chunk_exists(k, chunk)), None)
-    return 0 if at is None else int(file.read_chunk(at, chunk)[0])
 
 
 def step_of(file: Any, frame: int) -> int:

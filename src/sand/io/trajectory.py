@@ -23,11 +23,14 @@ from . import gsd_index
 from .damage import set_aside
 from .frame import Frame, FrameSequence
 from .frame_chunks import (
+    OF_OTHERS,
     append_frame,
     code_of,
     first_chunks,
     read_identities,
     read_materials,
+    read_number,
+    read_snapshot,
     read_stored,
     stored_frame,
 )
@@ -286,7 +289,7 @@ class Frames(FrameSequence):
     def stored(self, index: int) -> Any:
         """A frame as stored by GSD.  Raises BadInput if it is incomplete."""
         with self._reading(index, "cannot be read"):
-            return self._file[index % len(self._file)]
+            return read_snapshot(self._file, index % len(self._file), OF_OTHERS)
 
     def pairs(self, index: int) -> np.ndarray:
         """Grain indices (C, 2) of the contacts in a frame ≥ 0; reads nothing else and does not verify the checksum.
@@ -298,24 +301,24 @@ class Frames(FrameSequence):
         """
         file = self._file.file
         with self._reading(index):
-            count = gsd_index.read_number(file, index, "bonds/N")
+            count = read_number(file, index, "bonds/N")
             at = index if file.chunk_exists(index, "bonds/group") else 0
             pair = file.read_chunk(at, "bonds/group").reshape(count, 2) if count else np.zeros((0, 2), np.uint32)
-            if pair.size and int(pair.max()) >= (grains := gsd_index.read_number(file, index, "particles/N")):
+            if pair.size and int(pair.max()) >= (grains := read_number(file, index, "particles/N")):
                 raise ValueError(f"a contact of grain {pair.max()}, of {grains} grains")
             return pair
 
     def identities(self, index: int) -> np.ndarray:
         """Identities (N,) of the grains of a frame ≥ 0, ascending; reads nothing else.  Raises BadInput."""
         with self._reading(index):
-            count = gsd_index.read_number(self._file.file, index, "particles/N")
+            count = read_number(self._file.file, index, "particles/N")
             return read_identities(self._file, index, count)
 
     def head(self, index: int) -> tuple[float, int, int]:
         """Time [s], step and number of contacts of a frame ≥ 0.  Raises BadInput if it is incomplete."""
         with self._reading(index):
             time = gsd_index.time_of(self._file, index)
-            contacts = gsd_index.read_number(self._file.file, index, "bonds/N")
+            contacts = read_number(self._file.file, index, "bonds/N")
             return time, gsd_index.step_of(self._file, index), contacts
 
     def __repr__(self) -> str:
