@@ -151,7 +151,7 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box, refuse_percolat
         raise BadInput(f"position has shape {whole.shape} but must be (N, 3)")
     ends = checked_pairs(len(whole), pairs)
     whole = in_one_piece(whole, ends, box)
-    if refuse_percolating and (found := _closes_through_boundary(whole, ends, box)).any():
+    if refuse_percolating and (found := closes_through_boundary(whole, ends, box)).any():
         grain = ends[found][0, 0]
         raise BadInput(
             f"the cluster of grain {grain} touches its own periodic image: it has no size, radius of gyration or "
@@ -181,11 +181,11 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
     labels = labels_of(len(position), ends)
     whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
     found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
-    found[labels[ends[_closes_through_boundary(whole, ends, box), 0]]] = True
+    found[labels[ends[closes_through_boundary(whole, ends, box), 0]]] = True
     return found
 
 
-def _closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+def closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     """Contacts (C,) whose grains, in clusters that are in one piece, touch across a periodic boundary all the same."""
     return np.asarray(box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1))
 

@@ -150,9 +150,9 @@ def is_used(folder: Path) -> bool:
     return folder.is_dir() and any(one.name != LOCK for one in folder.iterdir())
 
 
-def replace_file(path: Path, content: bytes) -> None:
-    """Replace a file atomically.  Raises FilesFailed, as `replacing`."""
-    with replacing(path) as file:
+def replace_file(path: str | Path, content: bytes) -> None:
+    """Replace a file, named as by a user (`~`), atomically.  Raises FilesFailed, as `replacing`."""
+    with replacing(user_path(path)) as file:
         file.write(content)
 
 

@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
-from ..paths import user_path
 from .panels import (
     draw_balance,
     draw_clusters,
@@ -247,7 +246,7 @@ def save(figure: Figure, path: str | Path) -> None:
     FilesFailed
         If the file cannot be written.
     """
-    replace_file(user_path(path), figure_bytes(figure))
+    replace_file(path, figure_bytes(figure))
 
 
 def show(figure: Figure) -> Figure:

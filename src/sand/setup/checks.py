@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..analysis.clusters import labels_of
 from ..box import Box
 from ..errors import BadInput, first_problems
 from ..grains import ROUNDED, Grains
@@ -80,7 +81,7 @@ def refuse_pieces(grains: Grains, pairs: np.ndarray, box: Box, origin: str) -> N
     BadInput
         One line for each of the first ten other clusters, with the gap between the two nearest grains.
     """
-    label = cluster_labels(pairs, len(grains))
+    label = labels_of(len(grains), pairs)
     sizes = np.bincount(label)
     others = [int(k) for k in dict.fromkeys(label.tolist()) if k != sizes.argmax()]
     problems = []
@@ -109,16 +110,7 @@ def _nearest_outside(grains: Grains, inside: np.ndarray, box: Box) -> tuple[int,
     return best
 
 
-def cluster_labels(pairs: np.ndarray, count: int) -> np.ndarray:
-    """Number of the cluster of each of `count` grains, (N,)."""
-    from scipy.sparse import csr_array  # slow to import
-    from scipy.sparse.csgraph import connected_components
-
-    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
-
-
 def largest_cluster(pairs: np.ndarray, count: int) -> np.ndarray:
     """Indices of the largest connected cluster among the first `count` grains."""
-    label = cluster_labels(pairs[(pairs < count).all(axis=1)], count)
+    label = labels_of(count, pairs[(pairs < count).all(axis=1)])
     return np.flatnonzero(label == np.bincount(label).argmax())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.clusters import closes_through_boundary, in_one_piece
 from ..box import Box
 from ..errors import BadInput, warn
 from ..grains import Grains
@@ -16,7 +17,7 @@ from ..io.run_folder import TRAJECTORY
 from ..material import Material
 from ..paths import user_path
 from ..units import format_quantity
-from .checks import ROUNDING, cluster_labels, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
+from .checks import ROUNDING, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
 from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
 from .overlap_fit import fit_overlaps
 
@@ -164,31 +165,14 @@ def make_whole(grains: Grains, pairs: np.ndarray, box: Box, origin: str) -> bool
     BadInput
         If a cluster touches its own periodic image: it has no end.
     """
-    from scipy.sparse import csr_array  # slow to import
-    from scipy.sparse.csgraph import breadth_first_order
-
-    count, position = len(grains), grains.position.copy()
-    label = cluster_labels(pairs, count)
-    first = np.unique(label, return_index=True)[1]
-    root = np.column_stack([np.full(len(first), count), first])  # a further node that joins all clusters
-    links = np.concatenate([pairs, root])
-    graph = csr_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count + 1, count + 1))
-    order, before = breadth_first_order(graph, count, directed=False)
-    for k in order[1:]:  # nearest image of each grain to its predecessor
-        if before[k] != count:
-            position[k] = position[before[k]] + box.nearest(position[k] - position[before[k]])
-    apart = position[pairs[:, 0]] - position[pairs[:, 1]]
-    if (
-        wrong := np.flatnonzero(
-            np.abs(apart - box.nearest(apart)).max(axis=1, initial=0.0) > 1e-6 * grains.radius.max()
-        )
-    ).size:
-        i, j = pairs[wrong[0]]
+    position = in_one_piece(grains.position.copy(), pairs, box)
+    if (closing := pairs[closes_through_boundary(position, pairs, box)]).size:
+        i, j = closing[0]
         raise BadInput(
             f"{origin}: the cluster of grains {i} and {j} touches its own image across the box, {box.describe()}, and "
             "has no end; start it in this box, with the key [box]"
         )
-    is_cut = bool((np.abs(position - grains.position).max(axis=1) > 1e-6 * grains.radius).any())
+    is_cut = bool((position != grains.position).any())
     if is_cut:
         grains.arrays.position[...] = position.T
     return is_cut
