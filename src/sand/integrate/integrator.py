@@ -28,6 +28,9 @@ class Integrator(Protocol):
         The stage that takes one step of grains without contacts, such as `forest_ruth.symplectic_flight`; None for
         velocity Verlet. It takes parts of a simulation by name (`parts.PARTS`) and calls the forces by `force_calls`.
         Such steps are limited by the skin of the lists.
+
+    A class may have two further attributes: `moves_bodies` = True, if clusters at rest move as bodies, whose steps are
+    long, and `clusters`, a word that selects it in the [stepping] table instead of `method`.
     """
 
     name: ClassVar[str]
@@ -49,6 +52,17 @@ class Integrator(Protocol):
 
 INTEGRATORS: dict[str, type] = {}
 """Registered integrators by name."""
+
+
+def moves_bodies(stepping: Any) -> bool:
+    """Whether clusters at rest move as bodies: steps are long, and contact steps are taken within them."""
+    return bool(getattr(stepping, "moves_bodies", False))
+
+
+def methods_of_clusters() -> dict[str, str]:
+    """Words for `clusters` in the [stepping] table, and the names of the integrators that they stand for."""
+    return {each.clusters: name for name, each in INTEGRATORS.items() if hasattr(each, "clusters")}
+
 
 T = TypeVar("T", bound=type)
 

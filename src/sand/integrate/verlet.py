@@ -65,6 +65,7 @@ class Verlet:
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "verlet"
+    clusters: ClassVar[str] = "grains"
     flight: ClassVar[Stage | None] = None
 
     def __post_init__(self) -> None:

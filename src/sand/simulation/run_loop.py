@@ -7,8 +7,8 @@ import time as wall
 from collections.abc import Mapping
 from typing import Any
 
+from ..integrate.integrator import moves_bodies
 from ..integrate.parts import Stop
-from ..integrate.rigid.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
 from .cost.cost import StepTimer
@@ -36,7 +36,7 @@ def run_loop(simulation: Simulation, criteria: StopCriteria, signals: Signals, t
         return Outcome.CONDITION_MET
     started = wall.monotonic()
     frames, rows, saves = _schedules(simulation)
-    every = EVERY_LONG if isinstance(simulation.stepping, RigidClusters) else EVERY
+    every = EVERY_LONG if moves_bodies(simulation.stepping) else EVERY
     checks = Schedule(None if condition is None else Cadence("steps", every), simulation.time, simulation.steps)
     updates = UpdateSchedule(simulation)
     if condition is not None and simulation.steps == 0.0 == simulation.time and _is_met(simulation, condition):

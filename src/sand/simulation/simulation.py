@@ -149,7 +149,7 @@ class Simulation(ReadOnlySettings):
         self.ledger = Ledger(
             [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)],
             wall_columns(self._walls),
-            rigid=self._engine.state.at_rest is not None,
+            awake=self._engine.state.at_rest is not None,
         )
         written = None if restart is None else restart[1].get("case_in_file")
         self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
@@ -247,7 +247,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.law, self._engine._current_table(self.state))
+        return ContactTable(self.state, self._engine.law, self._engine.table_of(self.state))
 
     @property
     @exclusive

@@ -74,6 +74,8 @@ class RigidClusters:
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "rigid-clusters"
+    clusters: ClassVar[str] = "rigid"
+    moves_bodies: ClassVar[bool] = True
     flight: ClassVar[Stage | None] = None
 
     def __post_init__(self) -> None:
