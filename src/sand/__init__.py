@@ -78,8 +78,6 @@ if TYPE_CHECKING:
     from .forces.pair.inverse_square import Charges as Charges
     from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
     from .grains import Grains as Grains
-    from .integrate.adaptive import Adaptive as Adaptive
-    from .integrate.forest_ruth import ForestRuth as ForestRuth
     from .integrate.rigid_clusters import RigidClusters as RigidClusters
     from .integrate.verlet import Verlet as Verlet
     from .material import FORSTERITE as FORSTERITE
