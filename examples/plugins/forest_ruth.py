@@ -8,8 +8,8 @@ for the command:      sand run CASE.toml --import examples/plugins/forest_ruth.p
 The orbit of `main`:  python examples/plugins/forest_ruth.py
 
 The scheme is the position-extended Forest–Ruth-like one of Omelyan, I. P., Mryglod, I. M. & Folk, R. 2002, Comput.
-Phys. Commun. 146, 188.  One step of h seconds has five drifts and four kicks, with torques, spins and orientations as with
-forces, velocities and positions, and each kick at the time that the drifts before it have reached:
+Phys. Commun. 146, 188.  One step of h seconds has five drifts and four kicks, with torques, spins and orientations as
+with forces, velocities and positions, and each kick at the time that the drifts before it have reached:
 
     x += ξhv,  v += (1−2λ)hF/2m,  x += χhv,  v += λhF/m,  x += (1−2(χ+ξ))hv,  v += λhF/m,  x += χhv,
     v += (1−2λ)hF/2m,  x += ξhv
@@ -28,17 +28,19 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 import sand
-from sand.arguments import checked
-from sand.box import nearest_image
+from sand.basics.arguments import checked
+from sand.basics.box import nearest_image
+from sand.basics.state import FLIGHT, LONG_RANGE_SUMS, NEEDED, REJECTED, STEPS, TIME
+from sand.basics.units import is_word, si
 from sand.compiler.jit import caller, formula, loop, rare
 from sand.compiler.program import call_stage, has_stage
 from sand.compiler.stage import stage
 from sand.errors import FORBID_EXTRA, BadInput
 from sand.forces.external.formulas import stiffness_of_field
-from sand.integrate.base import register
 from sand.integrate.flight import finish_flight_step, refresh_verlet_list, sum_free_loads
 from sand.integrate.force_calls import sum_external
 from sand.integrate.force_stages import ENERGY, POWER
+from sand.integrate.integrator import register
 from sand.integrate.motion import kick
 from sand.integrate.parts import DRIVER_PARTS, Stop
 from sand.integrate.stages import StageNumber
@@ -46,8 +48,6 @@ from sand.integrate.step_control import is_close, is_past, quantise_step
 from sand.integrate.step_parts import MAX_TURN
 from sand.numerics.quaternion import turn, turned
 from sand.numerics.vec import add, axpy, dot, load, load4, norm, put, put4, scale, sub
-from sand.state.state import FLIGHT, LONG_RANGE_SUMS, NEEDED, REJECTED, STEPS, TIME
-from sand.units import is_word, si
 
 XI, LAMBDA, CHI = 0.1786178958448091, -0.2123418310626054, -0.06626458266981849
 DRIFTS = np.array([XI, CHI, 1.0 - 2.0 * (CHI + XI), CHI, XI])

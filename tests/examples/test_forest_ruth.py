@@ -10,13 +10,13 @@ from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
 
 import sand
+from sand.basics.constants import COULOMB
+from sand.basics.state import CONTACTS, FLIGHT, LONG_RANGE_SUMS, MADE, REJECTED, STEPS
 from sand.config.build import simulation_of
 from sand.config.case import check_case
-from sand.constants import COULOMB
 from sand.errors import BadInput
 from sand.integrate.registry import INTEGRATORS
 from sand.simulation.serialise import case_of
-from sand.state.state import CONTACTS, FLIGHT, LONG_RANGE_SUMS, MADE, REJECTED, STEPS
 
 from ..generic.test_integrators import SIZE, SPEED, R, scattering_pair
 from ..plugins import ForestRuth, forest_ruth

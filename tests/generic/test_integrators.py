@@ -7,14 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sand
+from sand.basics.constants import MAGNETIC
+from sand.basics.state import LONG_RANGE_SUMS
 from sand.config.case import Case
-from sand.config.errors import validate
+from sand.config.key_errors import validate
 from sand.config.sections import with_integrator
-from sand.constants import MAGNETIC
-from sand.integrate.base import MEMBERS, register
+from sand.integrate.integrator import MEMBERS, register
 from sand.integrate.registry import INTEGRATORS
 from sand.integrate.verlet import Verlet
-from sand.state.state import LONG_RANGE_SUMS
 
 from ..plugins import STEPPINGS
 

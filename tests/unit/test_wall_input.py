@@ -4,7 +4,7 @@ import pytest
 
 import sand
 from sand.config.case import check_case
-from sand.simulation.walls import check_walls
+from sand.engine.walls import check_walls
 
 from ..plugins import ForestRuth
 

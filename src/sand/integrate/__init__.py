@@ -2,6 +2,6 @@
 
 BUILT_IN = {
     "Verlet": "integrate.verlet",
-    "RigidClusters": "integrate.rigid_clusters",
+    "RigidClusters": "integrate.rigid.rigid_clusters",
 }
 """Names in `sand` of the integrators, and their modules; a line here registers an integrator (`registry`)."""

@@ -5,11 +5,11 @@
 
 import math
 
+from ..basics.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
 from ..compiler.jit import caller, rare
 from ..compiler.program import call_stage
 from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement
 from ..numerics.vec import put
-from ..state.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
 from .force_calls import add_external_loads, sum_external, sum_pair_forces
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
