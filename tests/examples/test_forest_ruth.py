@@ -1,6 +1,7 @@
 """The example of an integrator of the user: energy error, work of fields, first contact, same bits, case files."""
 
 import math
+import sys
 import tomllib
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.integrate import solve_ivp
 import sand
 from sand.basics.constants import COULOMB
 from sand.basics.state import CONTACTS, FLIGHT, LONG_RANGE_SUMS, MADE, REJECTED, STEPS
+from sand.cli.main import main
 from sand.config.build import simulation_of
 from sand.config.case import check_case
 from sand.errors import BadInput
@@ -423,3 +425,16 @@ def test_case_file_round_trip(registered):
         assert all(part in caught.value.problems[0] for part in expected), caught.value.problems
     with pytest.raises(BadInput, match="did you mean 'forest-ruth'"):
         check_case(tomllib.loads(CASE.replace('"forest-ruth"', '"forestruth"')), "some.toml")
+
+
+def test_the_command_imports_the_module(registered, tmp_path, monkeypatch, capsys):
+    """`sand info CASE --import FILE` knows the method; without the import one line says what to do."""
+    monkeypatch.delitem(INTEGRATORS, ForestRuth.name)
+    monkeypatch.delitem(sys.modules, "forest_ruth")
+    case = tmp_path / "case.toml"
+    case.write_text(CASE, "utf-8")
+    assert main(["info", str(case)]) == 2
+    advice = "allowed: verlet, rigid-clusters; one of your own needs --import MODULE"
+    assert f"stepping: method = 'forest-ruth'; {advice}" in capsys.readouterr().err
+    assert main(["info", str(case), "--import", forest_ruth.__file__]) == 0
+    assert "a valid case" in capsys.readouterr().out

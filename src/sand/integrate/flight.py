@@ -1,6 +1,6 @@
 """What an integrator with steps of its own for grains without contacts builds on.
 
-`examples/plugins/forest_ruth.py` is such an integrator: its stage (`base.Integrator.flight`) calls these functions.
+`examples/plugins/forest_ruth.py` is such an integrator: its stage, `Integrator.flight`, calls these functions.
 """
 
 import math

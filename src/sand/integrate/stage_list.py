@@ -38,7 +38,7 @@ class Components(NamedTuple):
     law: ContactLaw
     pair_forces: Sequence[tuple[LongRangeSums, Any]]  # loops and parameters of each
     external_forces: Sequence[tuple[Callable, Any]]  # formula and parameters of each
-    flight: Stage | None  # takes one step while there are no contacts (base.Integrator); None: velocity Verlet
+    flight: Stage | None  # takes one step while there are no contacts (integrator.Integrator); None: velocity Verlet
     gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
