@@ -13,7 +13,7 @@ from ..contact.damping import DASHPOTS, NONE, THERMAL
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..forces.pair.long_range_loops import LongRangeSums
-from . import stages
+from . import stages, taylor
 from .driven import DrivenArrays, drive
 from .force_stages import (
     EXTERNAL_STAGES,
@@ -62,9 +62,9 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     if parameters.settings.on:
         found |= _contact_stages(given, parameters)
     if respa.taylor:
-        found[StageNumber.PREPARE_RATES] = stages.prepare_rates
-        found[StageNumber.STORE_POSITIONS] = stages.store_summation_positions
-        found[StageNumber.EXTRAPOLATE] = stages.extrapolate
+        found[StageNumber.PREPARE_RATES] = taylor.prepare_rates
+        found[StageNumber.STORE_POSITIONS] = taylor.store_summation_positions
+        found[StageNumber.EXTRAPOLATE] = taylor.extrapolate
     if given.gas:
         found[StageNumber.GAS_KICK] = stages.kick_by_gas
     if given.flight is not None:
