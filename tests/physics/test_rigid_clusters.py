@@ -855,7 +855,7 @@ def test_contradictory_words_in_a_case_file_are_refused(tmp_path, capsys):
     """`clusters` and `method` that contradict each other, and an unknown word: one line each."""
     case = tmp_path / "case.toml"
     for text, words in (
-        ('clusters = "rigid", method = "adaptive"', "clusters = 'rigid' contradicts method = 'adaptive'"),
+        ('clusters = "rigid", method = "verlet"', "clusters = 'rigid' contradicts method = 'verlet'"),
         ('clusters = "soft"', "clusters = 'soft'"),
     ):
         case.write_text(f'run = {{ until = "1 ns" }}\ngrains = {{ number = 2 }}\nstepping = {{ {text} }}\n', "utf-8")

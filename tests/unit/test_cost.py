@@ -16,8 +16,8 @@ from sand.cli.main import main
 from sand.compiler.cache import write_record
 from sand.experiments.templates import TEMPLATES
 from sand.simulation.cadence import number_in, read_cadence
-from sand.simulation.cost import coagulation, cost
-from sand.simulation.cost import expected_steps as steps
+from sand.simulation.cost.cost import coagulation, cost
+from sand.simulation.cost.cost import expected_steps as steps
 from sand.theory.contact import contact
 from sand.theory.kinetics import brownian, capture
 

@@ -80,10 +80,15 @@ SOURCE = """
 from numba import njit
 from sand.compiler.jit import formula
 import math
+import numpy as np
+from enum import IntEnum
+class Power(IntEnum):
+    SQUARE = 2
 FACTOR = 2.0
 AXIS = (0.0, 1.0)
+WEIGHTS = np.array([0.25, 0.5])
 def half(x):
-    return 0.5 * x + math.sin(x - AXIS[0])
+    return WEIGHTS[1] * x**Power.SQUARE + math.sin(x - AXIS[0])
 @formula
 def force(x):
     return FACTOR * half(x)
@@ -95,9 +100,12 @@ def force(x):
     ("old", "new", "differs"),
     [
         ("FACTOR = 2.0", "FACTOR = 3.0", True),
-        ("0.5 * x", "0.25 * x", True),
+        ("WEIGHTS[1] * x", "WEIGHTS[0] * x", True),
+        ("[0.25, 0.5]", "[0.25, 1.5]", True),
+        ("[0.25, 0.5]", "[0.25, 'half'], dtype=object", None),
+        ("SQUARE = 2", "SQUARE = 3", True),
         ("def half", "@njit\ndef half", False),
-        ("    return 0.5", "    # half of it\n    return 0.5", False),
+        ("    return WEIGHTS", "    # half of it\n    return WEIGHTS", False),
         ("FACTOR *", "-FACTOR *", True),
         ("math.sin", "math.cos", True),
         ("x - AXIS[0]", "AXIS[0] - x", True),

@@ -89,7 +89,8 @@ def _without_method(value: Any) -> Any:
     value = dict(value)
     method, clusters = value.pop("method", None), value.pop("clusters", None)
     if method is not None and str(method) not in INTEGRATORS:
-        raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
+        advice = f"{did_you_mean(str(method), list(INTEGRATORS))}; one of your own needs --import MODULE"
+        raise ValueError(f"method = {method!r}; {advice}")
     words = methods_of_clusters()
     if clusters is not None and str(clusters) not in words:
         raise ValueError(f"clusters = {clusters!r}; {did_you_mean(str(clusters), list(words))}")

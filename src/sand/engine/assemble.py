@@ -125,7 +125,7 @@ def build_engine(
     if follower is not None:
         cutoffs[follower.index] = float(follower.values[CUT_RADIUS])
     flights = stepping.flight is not None
-    found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], adaptive_steps=flights)
+    found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], long_steps=flights)
     listed = [found.search.listed and r is not None for r in cutoffs]
     long_range = _long_range_loops(by_type, grains, box, listed)
     if follower is not None:
@@ -142,7 +142,7 @@ def build_engine(
         _external_work(by_type.external, box),
         _gas_settings(by_type.gas, grains, seed),
         control,
-        stepping.flight_limits(_longest_displacement(grains, box, found)),
+        stepping.flight_limits(grains, _longest_displacement(grains, box, found)),
         ForceNumbers(len(long_range), len(by_type.external)),
     )
     parameters = parameters._replace(flight_limits=kind.flight_limits(parameters, by_type, grains))
@@ -256,11 +256,13 @@ def _respa_settings(
 
 
 def _longest_displacement(grains: Grains, box: Box, found: ChosenSearch) -> float:
-    """Longest displacement [m] of a grain in one Runge–Kutta step for which no pair can be missed.
+    """Longest displacement [m] of a grain in one step of an integrator's `flight` for which no pair can be missed.
 
-    With a Verlet list: Δr/4, derived in `integrate.event_location.first_contact_time`. In a periodic box, two grains
-    must also not touch through an image other than the nearest, which is half a box side away: together they may
-    approach by that distance minus r1 + r2. A tenth is subtracted for positions between two stages.
+    With a Verlet list: Δr/4. Pairs that are not listed were farther apart than the reach, at least r1 + r2 plus Δr, and
+    a grain moves by at most Δr/4 between the construction of the list and the start of a step
+    (`integrate.flight.refresh_verlet_list`), and by at most Δr/4 in the step. In a periodic box, two grains must also
+    not touch through an image other than the nearest, which is half a box side away: together they may approach by that
+    distance minus r1 + r2. A tenth is subtracted for positions within a step.
     """
     images = 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
     return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images

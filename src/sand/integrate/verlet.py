@@ -111,7 +111,7 @@ class Verlet:
         """These settings: the driver chooses the automatic step."""
         return self
 
-    def flight_limits(self, longest_displacement: float) -> tuple[()]:
+    def flight_limits(self, grains: Grains, longest_displacement: float) -> tuple[()]:
         """None: grains without contacts are moved in the same way."""
         return ()
 

@@ -112,7 +112,7 @@ class RigidClusters:
         """These settings: the driver chooses the automatic step."""
         return self
 
-    def flight_limits(self, longest_displacement: float) -> RigidLimits:
+    def flight_limits(self, grains: Grains, longest_displacement: float) -> RigidLimits:
         """Run-time numbers; the engine, which knows contacts, gas and grains, sets all but the first three."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
         return RigidLimits(

@@ -197,7 +197,7 @@ def _pairs_per_grain(simulation: Simulation) -> float:
 
 def _bytes(simulation: Simulation, pairs: float) -> float:
     state = simulation._engine.regular_state
-    groups = [state.grains.arrays, state.contacts, state.pair_list, state.long_range, state.runge_kutta, state.clusters]
+    groups = [state.grains.arrays, state.contacts, state.pair_list, state.long_range, state.clusters]
     listed = 4.0 * pairs * len(simulation.start) if simulation._engine.parameters.search.listed else 0.0
     return COPIES * float(sum(array.nbytes for group in groups for array in group)) + listed
 
