@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked
 from ..compiler.stage import Stage
-from ..errors import FORBID_EXTRA
 from ..grains import Grains
+from ..settings import Number, Table
 from .adaptive_driver import free_flight
-from .base import register
-from .flight import FlightSettings
+from .base import IntegratorSettings, register
 from .step_control import StepCriteria
 from .verlet import Verlet
 
-ERRORS = {"position_error": "m", "velocity_error": "m/s", "turn_error": "rad", "spin_error": "rad/s"}
-"""Error limits and their units."""
+ERRORS = ("position_error", "velocity_error", "turn_error", "spin_error")
+"""Error limits."""
 
 
 class ErrorLimits(NamedTuple):
@@ -35,7 +34,7 @@ class ErrorLimits(NamedTuple):
 @register
 @checked
 @dataclass(frozen=True)
-class Adaptive(FlightSettings):
+class Adaptive(IntegratorSettings):
     """Dormand–Prince Runge–Kutta pair 5(4) with error control while there are no contacts, velocity Verlet otherwise.
 
     A step is repeated with a shorter length if the error of any quantity of any grain exceeds its limit, and ends at
@@ -64,16 +63,14 @@ class Adaptive(FlightSettings):
         If a parameter is out of range.
     """
 
-    tolerance: Any = 1e-9
-    position_error: Any = "auto"
-    velocity_error: Any = "auto"
-    turn_error: Any = "auto"
-    spin_error: Any = "auto"
-    contact_stepping: Verlet = field(default_factory=Verlet)
+    tolerance: Annotated[Any, Number(above=0.0, below=1.0)] = 1e-9
+    position_error: Annotated[Any, Number("m", above=0.0, auto=True)] = "auto"
+    velocity_error: Annotated[Any, Number("m/s", above=0.0, auto=True)] = "auto"
+    turn_error: Annotated[Any, Number("rad", above=0.0, auto=True)] = "auto"
+    spin_error: Annotated[Any, Number("rad/s", above=0.0, auto=True)] = "auto"
+    contact_stepping: Annotated[Verlet, Table(Verlet)] = field(default_factory=Verlet)
 
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "adaptive"
-    UNITS: ClassVar[dict[str, str]] = {"tolerance": "1", **ERRORS}
     flight: ClassVar[Stage | None] = free_flight
 
     def resolved(self, grains: Grains, criteria: StepCriteria) -> Adaptive:

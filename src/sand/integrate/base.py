@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 from ..compiler.stage import Stage
 from ..errors import BadInput
 from ..grains import Grains
+from ..settings import Settings
 
 MEMBERS = ("name", "flight", "parameters", "contact_stepping", "resolved", "flight_limits")
 
@@ -45,6 +46,17 @@ class Integrator(Protocol):
 
     def flight_limits(self, longest_displacement: float) -> Any:
         """Run-time numbers of `flight`, after `resolved`; no step may move a grain farther than this [m]."""
+
+
+class IntegratorSettings(Settings):
+    """Base class of the settings of integrators, keys of the table [stepping] of case files."""
+
+    name: ClassVar[str]
+    place: ClassVar[str] = "stepping"
+
+    def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
+        return {"method": self.name} | super().parameters()
 
 
 INTEGRATORS: dict[str, type] = {}

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -25,11 +25,11 @@ from ..box import nearest_image
 from ..compiler.jit import caller, loop, rare
 from ..compiler.program import call_stage, has_stage
 from ..compiler.stage import Stage, stage
-from ..errors import FORBID_EXTRA
 from ..forces.external.formulas import stiffness_of_field
 from ..grains import Grains
 from ..numerics.quaternion import turn, turned
 from ..numerics.vec import axpy, dot, load, load4, norm, put, put4, scale, sub
+from ..settings import Number, Table
 from ..state.state import (
     FLIGHT,
     LONG_RANGE_SUMS,
@@ -39,9 +39,9 @@ from ..state.state import (
     TIME,
 )
 from .adaptive_driver import MAX_ATTEMPTS, STRIDE_FRACTION, refresh_verlet_list
-from .base import register
+from .base import IntegratorSettings, register
 from .event_location import NEVER, first_contact_time
-from .flight import FlightSettings, finish_flight_step
+from .flight import finish_flight_step
 from .force_calls import sum_external
 from .force_stages import ENERGY, POWER
 from .motion import kick
@@ -286,7 +286,7 @@ def symplectic_flight(s):
 @register
 @checked
 @dataclass(frozen=True)
-class ForestRuth(FlightSettings):
+class ForestRuth(IntegratorSettings):
     """Symplectic scheme of fourth order while there are no contacts, velocity Verlet otherwise.
 
     The position-extended Forest–Ruth-like scheme of Omelyan, Mryglod & Folk (2002): four sums of the forces per step;
@@ -312,13 +312,11 @@ class ForestRuth(FlightSettings):
         If a parameter is out of range.
     """
 
-    accuracy: Any = 1e-8
-    step: Any = "auto"
-    contact_stepping: Verlet = field(default_factory=Verlet)
+    accuracy: Annotated[Any, Number(above=0.0, below=1.0)] = 1e-8
+    step: Annotated[Any, Number("s", above=0.0, auto=True)] = "auto"
+    contact_stepping: Annotated[Verlet, Table(Verlet)] = field(default_factory=Verlet)
 
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "forest-ruth"
-    UNITS: ClassVar[dict[str, str]] = {"accuracy": "1", "step": "s"}
     flight: ClassVar[Stage | None] = symplectic_flight
 
     def resolved(self, grains: Grains, criteria: StepCriteria) -> ForestRuth:

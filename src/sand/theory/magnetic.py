@@ -12,8 +12,8 @@ from ..arguments import checked
 from ..constants import BOLTZMANN, MAGNETIC
 from ..errors import BadInput
 from ..forces.pair import dipole_formulas as dipole
-from ..forces.vectors import three
 from ..units import si
+from ..vectors import three
 
 
 @checked

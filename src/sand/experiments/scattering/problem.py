@@ -11,11 +11,11 @@ import numpy as np
 from ...arguments import checked
 from ...constants import BOLTZMANN
 from ...errors import BadInput, ErrorCollector, did_you_mean
-from ...forces.vectors import three
 from ...grains import Grains
 from ...material import Material, as_material
 from ...theory.magnetic import thermal_speed
 from ...units import dimensions, format_quantity, in_unit, is_word, si
+from ...vectors import three
 from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 
