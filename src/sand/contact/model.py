@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material
+from ..basics.ramps import rampable
+from ..basics.settings import For, Number, Settings, Word
+from ..basics.units import format_quantity
 from ..errors import BadInput
-from ..grains import Grains
-from ..material import Material
-from ..ramps import rampable
-from ..settings import For, Number, Settings, Word
-from ..units import format_quantity
 from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
 from .law import LAWS, ContactLaw, Pairing
 from .mixing import MIXING, pairing_between

@@ -8,12 +8,12 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.settings import Number, Table
 from ..compiler.stage import Stage
-from ..grains import Grains
-from ..settings import Number, Table
 from .adaptive_driver import free_flight
-from .base import IntegratorSettings, register
+from .integrator import IntegratorSettings, register
 from .step_control import StepCriteria
 from .verlet import Verlet
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from ..basics.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
 from ..compiler.jit import caller
 from ..neighbours.skin import invalidate_skins, invalidate_speeds
-from ..state.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
 from .force_calls import sum_external
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all

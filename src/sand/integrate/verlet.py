@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.settings import Number, Whole, Word
 from ..compiler.stage import Stage
-from ..grains import Grains
-from ..settings import Number, Whole, Word
-from .base import IntegratorSettings, register
+from .integrator import IntegratorSettings, register
 
 IMPULSE_PERIODS = 0.48
 """Longest r-RESPA cycle in fastest contact periods; the first resonance of the impulses is at half a period."""

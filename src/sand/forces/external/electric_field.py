@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...arguments import checked
-from ...box import Box
-from ...grains import Grains
-from ...ramps import rampable
-from ...settings import AlongZ, Settings
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import AlongZ, Settings
 from .formulas import UniformElectric, uniform_electric
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import Reading, Settings
+from ...basics.vectors import along_z, components
 from ...errors import BadInput, shown
-from ...grains import Grains
-from ...ramps import rampable
-from ...settings import Reading, Settings
-from ...vectors import along_z, components
 from .formulas import UniformGravity, uniform_gravity
 
 

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import force_at, forces_at_points, rampable, ramps_of
+from ...basics.settings import AlongZ, Direction, For, Number, Reading, Settings, Word
+from ...basics.units import si
 from ...errors import BadInput
-from ...grains import Grains
 from ...numerics.vec import across, add, cross, dot, norm, scale, sub
-from ...ramps import force_at, forces_at_points, rampable, ramps_of
-from ...settings import AlongZ, Direction, For, Number, Reading, Settings, Word
-from ...units import si
 from .formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
 
 _WAVE = "oscillating", "rotating"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from ...box import Box
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.settings import Number, Settings, Word
+from ...basics.units import format_quantity, is_word
 from ...errors import BadInput
-from ...grains import Grains
-from ...settings import Number, Settings, Word
-from ...units import format_quantity, is_word
 from .dipole_formulas import Cutoff
 
 SHELL = 0.2

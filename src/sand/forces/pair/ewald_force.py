@@ -6,10 +6,10 @@ from collections.abc import Set
 from dataclasses import fields, replace
 from typing import Annotated, Any, ClassVar
 
-from ...box import Box
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.settings import Number, Word
 from ...errors import BadInput, ErrorCollector, shown
-from ...grains import Grains
-from ...settings import Number, Word
 from .cutoff import CutoffChoice, CutoffForce
 from .ewald import EwaldChoice, choose_ewald, sides
 from .ewald_fit import Sources
