@@ -112,7 +112,7 @@ def problems_of(content):
         ({"grains__classes": [{"number": 5}, {"number": 4}]}, ["number = 8", "have the sum 9"]),
         ({"grains__classes": [{"share": 0.99}, {"share": 0.01}]}, ["classes.1", "0.01 of number = 8 is no member"]),
         ({"grains__classes": [{}]}, ["grains.classes.0", "either share", "or number"]),
-        ({"grains__classes": [{"share": 1.5}]}, ["grains.classes.0", "share = 1.5 must be at most 1"]),
+        ({"grains__classes": [{"share": 1.5}]}, ["grains.classes.0", "share = 1.5 must be above 0 and at most 1"]),
         ({"grains__classes": [{"share": 1, "chrge": 0}]}, ["grains.classes.0.chrge", "did you mean 'charge'?"]),
         ({"grains__classes": [{"share": 1, "charge": "1 V"}]}, ["grains.classes.0", "charge = '1 V'"]),
         (
