@@ -364,7 +364,10 @@ GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
             lambda: sand.Dipoles(periodic="ewald", accuracy=1e-9),
             "dipoles: accuracy = 1e-09 must be at least 1e-08 and at most 0.1",
         ),
-        (lambda: sand.Dipoles(periodic="ewald", accuracy=0.2), "dipoles: accuracy = 0.2 must be at least 1e-08 and at most 0.1"),
+        (
+            lambda: sand.Dipoles(periodic="ewald", accuracy=0.2),
+            "dipoles: accuracy = 0.2 must be at least 1e-08 and at most 0.1",
+        ),
         (
             lambda: sand.Dipoles(periodic="ewald", cutoff="0.1 um"),
             "dipoles: cutoff = 1e-07 cannot be given with periodic = 'ewald'",

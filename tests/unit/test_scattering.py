@@ -279,7 +279,10 @@ def test_impossible_impact_parameters():
         (("speed = [1, 2]", "sped = 1"), "did you mean 'speed'"),
         (("seed = 3", 'job = "mapp"'), "measure.job"),
         (("seed = 3", 'job = "trajectories"'), "a single speed"),
-        (("seed = 3", 'spins = ["none"]'), "is for job = 'trajectories'"),
+        (
+            ("seed = 3", 'spins = ["none"]'),
+            "spins = ['none'] is not used by job = 'cross-section'; leave it out, or give job = 'trajectories'",
+        ),
         (("seed = 3", "seed = 18446744073709551616"), "seed"),
         (("relative_error = 0.05", "relative_error = 5"), "relative_error"),
         (('start = "4 b_max"', 'start = "12 nm"'), "is inside r1"),

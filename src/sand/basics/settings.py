@@ -22,9 +22,12 @@ from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
 from .units import is_word, si, whole_number
 from .vectors import along_z, components, three
 
+MOST_LISTED = 3
+"""Words that a message lists; with more of them it says only what they are for."""
+
 
 class Setting:
-    """What a field takes; subclasses read a value of the user and write it as in a case file."""
+    """What a field takes; subclasses read a value of the user. This one takes any, to be checked where it is used."""
 
     unit = ""
     """SI unit of numbers; empty if there are none, "1" for pure numbers."""
@@ -33,7 +36,7 @@ class Setting:
 
     def read(self, value: Any, name: str) -> Any:
         """The value in SI; `name` begins the message. Raises BadInput."""
-        raise NotImplementedError
+        return value
 
     def write(self, value: Any) -> Any:
         """The value as in a case file."""
@@ -99,7 +102,7 @@ class Word(Setting):
     @property
     def allowed(self) -> tuple[str, ...]:
         """The words."""
-        return (*self.words, *self.among)
+        return (*self.among, *self.words)
 
     def has(self, value: Any) -> bool:
         """Whether a value is one of the words."""
@@ -219,10 +222,12 @@ class For:
     def unused(self, key: str, value: Any, present: str) -> str:
         """Message about a field that is given in vain; `key` is its name, `present` the value of the other field."""
         others = " or ".join(map(repr, self.values))
-        return (
-            f"{key} = {shown(value)} is not used by {self.word} = {present!r}; leave it out, "
-            f"or give {self.word} = {others}"
-        )
+        other = f"give {self.word} = {others}" if len(self.values) <= MOST_LISTED else f"change {self.word}"
+        return f"{key} = {shown(value)} is not used by {self.word} = {present!r}; leave it out, or {other}"
+
+    def missing(self, key: str, present: str) -> str:
+        """Message about a field that is missing; the arguments are those of `unused`."""
+        return f"{key} is missing: {self.word} = {present!r} needs {self.needed}"
 
 
 class Declared(NamedTuple):
@@ -245,9 +250,9 @@ def _declared(kind: type) -> dict[str, Declared]:
     found = {}
     for name in names:
         about = getattr(hints[name], "__metadata__", ())
-        setting = next((each for each in about if isinstance(each, Setting)), None)
+        condition = next((each for each in about if isinstance(each, For)), None)
+        setting = next((each for each in about if isinstance(each, Setting)), Setting() if condition else None)
         if setting is not None:
-            condition = next((each for each in about if isinstance(each, For)), None)
             found[name] = Declared(setting, condition, setting.none or getattr(kind, name, setting) is None)
     return found
 
@@ -277,8 +282,7 @@ class Settings:
                 if present in condition.values:
                     value = condition.default if value is None else value
                     if value is None and condition.needed:
-                        missing = f"{where} is missing: {condition.word} = {present!r} needs {condition.needed}"
-                        errors.problems.append(missing)
+                        errors.problems.append(condition.missing(where, present))
                 elif value is not None:
                     errors.problems.append(condition.unused(where, value, present))
                     value = None
