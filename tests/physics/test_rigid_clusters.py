@@ -813,7 +813,7 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     [
         ({"vibration": 0.2}, "stepping: vibration = 0.2 must be above 0 and at most 0.1"),
         ({"vibration": 0.0}, "stepping: vibration"),
-        ({"step_fraction": 1.0}, "stepping: step_fraction = 1 must be above 0 and at most 0.2"),
+        ({"step_fraction": 1.0}, "stepping: step_fraction = 1.0 must be above 0 and at most 0.2"),
         ({"longest_step": "1 m"}, "stepping: longest_step"),
         ({"contact_stepping": sand.Verlet(far="taylor")}, "far = 'taylor' is not possible with rigid clusters"),
     ],

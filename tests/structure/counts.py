@@ -89,7 +89,8 @@ def files_that_name(what: re.Pattern[str], folder: str = "") -> list[str]:
     """Source files with an identifier of a feature; those that it has for itself have it in their name, or a folder."""
     found = []
     for path in trees():
-        own = folder in path.parts or what.search(path.stem) or any(what.search(part) for part in path.relative_to(SOURCE).parts[:-1])
+        folders = path.relative_to(SOURCE).parts[:-1]
+        own = folder in folders or any(what.search(name) for name in (path.stem, *folders))
         if not own and any(what.search(name) and not NO_WALL.search(name) for name in _names(path)):
             found.append(str(path.relative_to(SOURCE)))
     return found

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from ..basics.grains import Grains
+from ..basics.settings import Settings
 from ..compiler.stage import Stage
 from ..errors import BadInput
 
@@ -51,6 +52,17 @@ class Integrator(Protocol):
 
         No step may move a grain farther than `longest_displacement` [m].
         """
+
+
+class IntegratorSettings(Settings):
+    """Base class of the settings of integrators, keys of the table [stepping] of case files."""
+
+    name: ClassVar[str]
+    place: ClassVar[str] = "stepping"
+
+    def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
+        return {"method": self.name} | super().parameters()
 
 
 INTEGRATORS: dict[str, type] = {}
