@@ -81,20 +81,27 @@ def check_updaters(given: Any, updaters: Iterable[Updater], saved: Sequence[str]
 
 
 class UpdateSchedule:
-    """When the updaters of a run act, and their calls."""
+    """When the updaters of a run act, and their calls.
+
+    Attributes
+    ----------
+    acting : bool
+        Whether an updater acts now.
+    stops : bool
+        Whether the updater that acts ends the run.
+    """
 
     def __init__(self, simulation: Simulation):
         self._simulation = simulation
+        self.acting = self.stops = False
         self._updaters = [(each, cadence_of(each)) for each in simulation.updaters]
         self._is_near = False  # whether the next step reaches the moment of an update
-        self._schedules: list[Schedule] = []
+        self._schedules = [Schedule(None, 0.0)] * len(self._updaters)
         self._plan(range(len(self._updaters)))
 
     def _plan(self, which: Iterable[int]) -> None:
         """Find the next moment of updaters after the present regular state: a function of this state alone."""
         engine = self._simulation._engine
-        while len(self._schedules) < len(self._updaters):
-            self._schedules.append(Schedule(None, 0.0))
         for k in which:
             self._schedules[k] = Schedule(self._updaters[k][1], engine.regular_time, engine.steps)
         self._is_near = False
@@ -133,26 +140,26 @@ class UpdateSchedule:
 
     def act_again(self) -> str:
         """Call the updaters that have not acted at this step, because one raised an exception; returns as `act`."""
-        step, owed = self._simulation._owed
+        step, owed = self._simulation._continuation.owed
         return self._call(owed) if owed and step == self._simulation._engine.steps else ""
 
     def _call(self, due: list[int]) -> str:
         """Call these updaters; returns and raises as `act`."""
         simulation, ended = self._simulation, ""
         for number, k in enumerate(due):
-            updater, simulation._stops, simulation._updating = self._updaters[k][0], False, True
-            simulation._owed = (simulation._engine.steps, due[number:])
+            updater, self.stops, self.acting = self._updaters[k][0], False, True
+            simulation._continuation.owed = (simulation._engine.steps, due[number:])
             try:
                 found = updater.act(simulation)
             finally:
-                simulation._updating = False
+                self.acting = False
             if found is not None and not isinstance(found, bool):
                 raise BadInput(
                     f"{name_of(updater)}.act returned {shown(found)}; return True to end the run, or nothing"
                 )
-            if (found or simulation._stops) and not ended:
+            if (found or self.stops) and not ended:
                 ended = name_of(updater)
         if due:
-            simulation._owed = (-1, [])
+            simulation._continuation.owed = (-1, [])
             self._plan(due)
         return ended
