@@ -2,9 +2,9 @@
 
 import functools
 
+from ..basics.state import CONTACTS
 from ..compiler.stage import Stage, stage
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 
 

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.state import LATE
 from ..errors import Interrupted
 from ..integrate.parts import Stop
-from ..integrate.rigid_clusters import RigidClusters
-from ..state.state import LATE
+from ..integrate.rigid.rigid_clusters import RigidClusters
 from .cadence import Cadence, Chosen, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
 from .ledger import COUNTED, kinetic_energies

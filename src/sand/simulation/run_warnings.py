@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ..engine.engine import Engine
 from ..errors import warn
-from .engine import Engine
-from .solid_limits import extreme_warnings
+from ..limits.solid_limits import extreme_warnings
 
 
 class RunWarnings:

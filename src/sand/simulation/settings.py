@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any, ClassVar
 
-from ..arguments import objects_with
+from ..basics.arguments import objects_with
+from ..basics.schema import CHANGEABLE, FIELDS
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
 from ..forces.registry import FORCES
-from ..schema import CHANGEABLE, FIELDS
 from .cadence import read_cadence
 from .observers import Observer
 from .updater import read_updaters
