@@ -182,11 +182,7 @@ class Simulation(ReadOnlySettings):
         )
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
-        self.ledger = Ledger(
-            [*(f.column for f, _, _ in engine.long_range), *(f.name for f in engine.external)],
-            wall_columns(walls),
-            rigid=engine.state.at_rest is not None,
-        )
+        self.ledger = Ledger(engine.columns(), wall_columns(walls), rigid=engine.state.at_rest is not None)
         self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
         self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None
@@ -311,8 +307,7 @@ class Simulation(ReadOnlySettings):
         """
         self._begin()
         row = self._log_row()
-        own = [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
-        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *own))
+        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.columns()))
         return {
             "force": self.grains.force.copy(),
             "torque": self.grains.torque.copy(),
@@ -539,8 +534,8 @@ class Simulation(ReadOnlySettings):
             f"largest {row['largest_cluster']}",
             f"energy error {self.ledger.with_row(row).drift:.2g}",
         ]
-        if self._clock.stepping > 0.0 and self.steps:
-            parts.append(f"{self.steps / self._clock.stepping:.2g} steps/s")
+        if (seconds := self.wall_times["stepping"]) > 0.0 and self.steps:
+            parts.append(f"{self.steps / seconds:.2g} steps/s")
         return ", ".join(parts)
 
     def __repr__(self) -> str:

@@ -85,6 +85,8 @@ class UpdateSchedule:
 
     Attributes
     ----------
+    is_near : bool
+        Whether the next step may pass the moment of an update, so that steps are taken one by one.
     acting : bool
         Whether an updater acts now.
     stops : bool
@@ -95,7 +97,7 @@ class UpdateSchedule:
         self._simulation = simulation
         self.acting = self.stops = False
         self._updaters = [(each, cadence_of(each)) for each in simulation.updaters]
-        self._is_near = False  # whether the next step reaches the moment of an update
+        self.is_near = False
         self._schedules = [Schedule(None, 0.0)] * len(self._updaters)
         self._plan(range(len(self._updaters)))
 
@@ -104,7 +106,7 @@ class UpdateSchedule:
         engine = self._simulation._engine
         for k in which:
             self._schedules[k] = Schedule(self._updaters[k][1], engine.regular_time, engine.steps)
-        self._is_near = False
+        self.is_near = False
 
     @property
     def step_due(self) -> float:
@@ -113,18 +115,13 @@ class UpdateSchedule:
 
     def limit(self, goal: float, most_steps: float) -> tuple[float, float]:
         """Time [s] and number of steps for the engine, given those of the output, that pass no update."""
-        if self._is_near:
+        if self.is_near:
             return goal, min(most_steps, 1)
         return min([goal, *(each.due for each in self._schedules)]), most_steps
 
     def approach(self, time: float) -> None:
         """Note that the next step would pass this time [s], which may be that of an update."""
-        self._is_near = self._is_near or time in [each.due for each in self._schedules]
-
-    @property
-    def is_near(self) -> bool:
-        """Whether the next step may pass the moment of an update, so that steps are taken one by one."""
-        return self._is_near
+        self.is_near = self.is_near or time in [each.due for each in self._schedules]
 
     def act(self) -> str:
         """Call the updaters that are due; returns the name of the first that ends the run, or "".
