@@ -1,12 +1,12 @@
 """Clusters of rigid-body runs that are awake: rigid kicks by other bodies, and what tells whether they are at rest."""
 
-import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ..box import nearest_image
+from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..constants import MAGNETIC
 from ..contact.columns import column_loops
@@ -79,7 +79,7 @@ def kick_clusters(grains, contacts, clusters, span, scratch, parameters):
     return 0
 
 
-@functools.cache
+@factory
 def measure_clusters_stage(law: ContactLaw) -> Stage:
     """The stage that fills `ClusterMeasures`, its parameters, and `clusters.offset`, from the centres of mass."""
     constants_at, at_break = column_loops(law).at, law.at_break

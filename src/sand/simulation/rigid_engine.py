@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..box import Box
-from ..compiler.stage import Stage
+from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw, Pairing, contact_constants
@@ -151,6 +151,18 @@ class RigidEngine(Engine):
     def _drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of the inner engine are the ones of this engine with other loops over pairs."""
         return [*super()._drivers(), (advance_bodies, ()), (mark_near_bodies, ())]
+
+    def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """As `Engine.stages`, with those of awake clusters."""
+        assert self.inner is not None
+        inner, measures = self.inner._call_table(math.inf, 1, False)[0], cluster_measures(1)
+        own: list[tuple[Stage, Any]] = [
+            (measure_clusters_stage(self.law), measures),
+            (kick_clusters, (self._remainder,)),
+        ]
+        own += [(resort_contacts_by_grain, ())] + ([(finish_gas, ())] if self.parameters.gas.gas.on else [])
+        of_inner = [*self.inner.stages(inner), *((inner, *each) for each in own)]
+        return [*super().stages(table), (table, store_rest, ()), *of_inner]
 
     def begin(self) -> None:
         """As `Engine.begin`; clusters start awake, single grains as bodies."""
