@@ -7,9 +7,9 @@ import pytest
 
 import sand
 from sand.config.case import Case
-from sand.config.errors import validate
+from sand.config.key_errors import validate
 from sand.config.sections import with_integrator
-from sand.integrate.base import MEMBERS, register
+from sand.integrate.integrator import MEMBERS, register
 from sand.integrate.registry import INTEGRATORS
 from sand.integrate.verlet import Verlet
 

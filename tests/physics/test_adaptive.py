@@ -9,12 +9,12 @@ import tomli_w
 from scipy.integrate import solve_ivp
 
 import sand
+from sand.basics.constants import MAGNETIC
+from sand.basics.state import CONTACTS, FLIGHT, MADE, REJECTED
 from sand.config.build import simulation_of
 from sand.config.case import check_case
-from sand.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.simulation.serialise import case_of
-from sand.state.state import CONTACTS, FLIGHT, MADE, REJECTED
 
 R = 1e-8
 SIZE = 200 * sand.IRON.density * 4 / 3 * math.pi * R**3

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import CONTACTS
 from sand.errors import BadInput
-from sand.state.state import CONTACTS
 
 
 def warm_gas(damped=True, **options):

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand import threads
-from sand.constants import BOLTZMANN, MAGNETIC
+from sand.basics import threads
+from sand.basics.constants import BOLTZMANN, MAGNETIC
+from sand.basics.state import COMPARED, CONTACTS, CUT_RADIUS, CUT_TIME
+from sand.engine import engine
 from sand.integrate import task_queue
 from sand.integrate.parts import Stop
-from sand.simulation import engine
-from sand.state.state import COMPARED, CONTACTS, CUT_RADIUS, CUT_TIME
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:contacts of iron"),

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import DAMPING, LOST, RECORDED
 from sand.contact.law import LAWS, contact_constants
 from sand.contact.mixing import MIXING
-from sand.state.state import DAMPING, LOST, RECORDED
 
 from .setups import random_aggregate, rest_distance
 

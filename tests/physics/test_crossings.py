@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import State
 from sand.io.checkpoint import newest_checkpoint
-from sand.state.state import State
 
 L = 1e-6
 BOX = sand.Box.periodic(L, L, None)

@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.constants import COULOMB
+from sand.basics.constants import COULOMB
+from sand.basics.state import CONTACTS, FLIGHT, LONG_RANGE_SUMS, MADE, REJECTED, STEPS
 from sand.errors import BadInput
 from sand.integrate.adaptive_driver import MAX_ATTEMPTS
-from sand.state.state import CONTACTS, FLIGHT, LONG_RANGE_SUMS, MADE, REJECTED, STEPS
 
 from .test_adaptive import (
     SIZE,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import BROKEN, CONTACTS, CYCLE, LISTED, LONG_RANGE_SUMS, SLIPPED
+from sand.basics.threads import set_threads
 from sand.integrate.registry import INTEGRATORS
-from sand.state.state import BROKEN, CONTACTS, CYCLE, LISTED, LONG_RANGE_SUMS, SLIPPED
-from sand.threads import set_threads
 
 from .setups import random_aggregate, rest_distance, struck_chain
 
@@ -117,9 +117,9 @@ def test_restart_with_an_old_pair_list_is_bit_for_bit():
 @pytest.mark.compiled("contacts")
 def test_array_sizes_change_no_bit():
     """Initial room for 16 or 4096 contacts and pairs, constants shared or per contact: the same bits."""
-    from sand.contact.columns import constant_names
+    from sand.basics.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
+    from sand.contact.constants_table import constant_names
     from sand.contact.jkr import LAW
-    from sand.state.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
 
     ends = []
     for room, uniform in ((16, True), (4096, True), (16, False), (4096, False)):
@@ -231,7 +231,7 @@ def test_compiled_and_interpreted_runs_agree_to_rounding(tmp_path):
 def test_kernels_against_plain_python_loops():
     """Pair list, contact loads and gather against double loops in NumPy, to 1e-9 of the largest load."""
     from sand.contact import jkr, mechanics
-    from sand.contact.columns import column_loops
+    from sand.contact.constants_table import column_loops
 
     grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])

@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 import sand
 from sand.analysis.clusters import cluster_labels
 from sand.analysis.internal_motion import internal_kinetic_energy
+from sand.basics.constants import BOLTZMANN, MAGNETIC
+from sand.basics.state import BODIES, CONTACT_STEPS, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 from sand.cli.main import main
-from sand.constants import BOLTZMANN, MAGNETIC
 from sand.io.frame_chunks import code_of
 from sand.simulation.ledger import kinetic_energies
-from sand.state.state import BODIES, CONTACT_STEPS, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 
 from .setups import different, momenta, rest_distance
 
@@ -226,7 +226,7 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
     before, arrays = state.copy(), state.grains.arrays
     engine._inner_state()
     engine._finish_step = None  # no step is taken below
-    from sand.integrate.awake_clusters import cluster_measures, measure_clusters_stage
+    from sand.integrate.rigid.awake_clusters import cluster_measures, measure_clusters_stage
 
     engine._measures = cluster_measures(6)
     present = engine.inner._state

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sand
+from sand.basics.constants import MAGNETIC
 from sand.cli.main import main
-from sand.constants import MAGNETIC
 from sand.experiments.scattering import cross_sections as scattering
 from sand.experiments.scattering.flights import BOUNCE, COLUMNS, fly
 from sand.experiments.scattering.maps import probability_map

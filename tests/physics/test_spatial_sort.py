@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 from sand.contact.events import inner_list_overflowed
+from sand.engine import engine as engines
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
-from sand.simulation import engine as engines
-from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 
 from .test_reproducibility import state
 

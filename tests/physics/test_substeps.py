@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.integrate.parts import Stop
-from sand.simulation.substeps import SubstepEngine
-from sand.state.state import (
+from sand.basics.state import (
     IMPACT_SPEED,
     LARGEST_IMPACT,
     LARGEST_OVERLAP,
@@ -23,6 +21,8 @@ from sand.state.state import (
     WOKEN,
     State,
 )
+from sand.engine.rigid.quick_bodies import SubstepEngine
+from sand.integrate.parts import Stop
 
 from .setups import different, momenta, rest_distance
 

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand import threads
+from sand.basics import threads
+from sand.basics.state import CONTACTS, OUTSIDE, SLIPPED
+from sand.engine import engine
 from sand.errors import BadInput
 from sand.integrate import task_queue
 from sand.integrate.task_queue import (
@@ -22,8 +24,6 @@ from sand.integrate.task_queue import (
     take_blocks,
     uses_task_queue,
 )
-from sand.simulation import engine
-from sand.state.state import CONTACTS, OUTSIDE, SLIPPED
 
 pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import CONTACTS
 from sand.errors import BadInput
-from sand.state.state import CONTACTS
 
 from .test_change import warm_gas
 

@@ -6,15 +6,15 @@ import pytest
 import sand
 from sand.analysis.ledger_columns import LedgerColumns
 from sand.analysis.quantities import measured
-from sand.box import Box
+from sand.basics.box import Box
 from sand.cli.main import main
+from sand.engine.changed_state import subset
 from sand.io.gsd_index import read_index
 from sand.io.trajectory import Frames, TrajectoryWriter
 from sand.plotting.palettes import REST_COLOURS
 from sand.plotting.plots import grains_figure, history_figure
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import rgb
-from sand.simulation.changed_state import subset
 from sand.simulation.ledger import Ledger
 from sand.viewer.dataset import run_dataset
 from sand.viewer.series import series_from_ledger

@@ -12,7 +12,7 @@ from sand.cli.main import main
 from sand.experiments.collision import approach, collide, collide_many
 from sand.experiments.collision_case import read_collision, run_seeds
 from sand.experiments.collision_outcome import collision_title
-from sand.io.bodies import read_body
+from sand.io.read_grains import read_body
 from sand.setup import chain, grain, pca
 from sand.theory import contact
 

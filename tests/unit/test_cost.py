@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
+from sand.basics.state import CONTACTS
 from sand.cli.main import main
 from sand.compiler.cache import write_record
-from sand.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.experiments.templates import TEMPLATES
-from sand.simulation import coagulation, cost
-from sand.simulation import expected_steps as steps
 from sand.simulation.cadence import number_in, read_cadence
-from sand.state.state import CONTACTS
+from sand.simulation.cost import coagulation, cost
+from sand.simulation.cost import expected_steps as steps
 from sand.theory.contact import contact
 from sand.theory.kinetics import brownian, capture
 

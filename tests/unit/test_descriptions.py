@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.descriptions import changed_arguments, units_of
+from sand.basics.descriptions import changed_arguments, units_of
+from sand.basics.units import exact_quantity, in_unit
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
-from sand.units import exact_quantity, in_unit
 
 OBJECTS = [
     sand.Box(),

@@ -5,9 +5,9 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import sand
+from sand.basics.arrays import runge_kutta_arrays
 from sand.integrate.event_location import curve_at, first_crossing, separation_curve
 from sand.integrate.runge_kutta import STAGES, V, X
-from sand.state.arrays import runge_kutta_arrays
 
 STEP = 0.3
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import erfc
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.forces.pair.dipole_formulas import pair_load
 from sand.forces.pair.ewald import DEGREES, half_of_vectors

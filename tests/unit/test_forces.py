@@ -9,12 +9,12 @@ import pytest
 import sand
 from sand.compiler.jit import formula
 from sand.compiler.user_code import code_digest
+from sand.forces.external.external_loops import external_energies_for
 from sand.forces.external.formulas import GrainState, uniform_field
-from sand.forces.external.loops import external_energies_for
 from sand.integrate.force_calls import add_external_loads, sum_external
 from sand.integrate.force_stages import ENERGY, external_force_stages, pair_force_stages
 from sand.integrate.parts import ExternalWork
-from sand.integrate.program import build_program
+from sand.integrate.stage_list import build_program
 
 
 class Weight(NamedTuple):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.constants import BOLTZMANN
 from sand.compiler.jit import kernel
-from sand.constants import BOLTZMANN
 from sand.forces.base import ExternalForce, Force
 from sand.forces.gas import drag as law
-from sand.forces.gas.loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
+from sand.forces.gas.gas_loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
 from sand.forces.gas.model import Gas
 
 SPEED = math.sqrt(8.0 / math.pi)

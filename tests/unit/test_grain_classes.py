@@ -5,9 +5,9 @@ import pytest
 from scipy import stats
 
 import sand
+from sand.basics.constants import BOLTZMANN
 from sand.config.build import simulation_of
 from sand.config.case import check_case
-from sand.constants import BOLTZMANN
 from sand.setup import GrainClass, gas, gas_with_contacts
 from sand.simulation.serialise import case_of
 

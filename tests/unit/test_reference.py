@@ -23,7 +23,7 @@ from sand.config.sections import INTEGRATORS
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
 from sand.experiments.scattering import flight
-from sand.experiments.scattering.case import FlightSection, ScatterCase
+from sand.experiments.scattering.scatter_case import FlightSection, ScatterCase
 
 PAGES = Path(__file__).parents[2] / "docs" / "reference"
 PACKAGES = ("setup", "theory", "analysis", "experiments", "io")
@@ -69,7 +69,7 @@ def test_public_names():
     for name in sand.__all__:
         if name == "__version__" or name in PACKAGES:
             continue
-        full = f"sand.{name}" if not name.isupper() else f"sand.material.{name}"
+        full = f"sand.{name}" if not name.isupper() else f"sand.basics.material.{name}"
         if full not in documented() or f"sand.{name}" not in text():
             missing.append(name)
     assert not missing
@@ -176,5 +176,5 @@ def test_columns_of_the_ledger():
 
 def test_tables_that_follow_the_source():
     """Quantities of a grain, preset materials and outcomes are tables and members made from the source itself."""
-    assert "{records} sand.schema.FIELDS" in text() and "{records} sand.material.PRESETS" in text()
+    assert "{records} sand.basics.schema.FIELDS" in text() and "{records} sand.basics.material.PRESETS" in text()
     assert re.search(r"autoclass:: sand\.Outcome\n   :undoc-members:", text())

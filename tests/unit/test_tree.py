@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.forces.pair import tree, tree_cells, tree_loops
 from sand.forces.pair.dipole_formulas import pair_load

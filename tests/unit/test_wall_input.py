@@ -4,7 +4,7 @@ import pytest
 
 import sand
 from sand.config.case import check_case
-from sand.simulation.walls import check_walls
+from sand.engine.walls import check_walls
 
 ONE = sand.Grains([[0, 0, 1e-6]], 5e-7, "silica")
 FLOOR = sand.Wall([0, 0, 0], [0, 0, 1], "silica", name="floor")

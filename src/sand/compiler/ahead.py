@@ -23,7 +23,6 @@ from multiprocessing import spawn
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..threads import cores, threads
 from .jit import COMPILE_TIMES, COMPILED, cache_folder, compile_if_free, in_cache
 from .memory import free_memory
 from .program import before_first_calls
@@ -65,13 +64,15 @@ def share_compilation() -> None:
     _is_one_of_several[0] = True
 
 
-def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]]) -> None:
+def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], processes: int) -> None:
     """Compile what is missing of the stages of a program, if that takes long enough for several processes.
 
     Parameters
     ----------
     stages : iterable of (Table, Stage, parameters)
         The stages that a run may call.
+    processes : int
+        Most processes at work, this one included.
 
     Raises
     ------
@@ -84,7 +85,7 @@ def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]]) -> N
     total = sum(each.seconds for each in tasks)
     if total < WORTH_HELPERS:
         return
-    helpers = 0 if _is_one_of_several[0] else number_of_helpers(total, max(each.seconds for each in tasks))
+    helpers = 0 if _is_one_of_several[0] else number_of_helpers(processes, total, max(each.seconds for each in tasks))
     if not (helpers or _is_one_of_several[0]):
         return
     began = time.perf_counter()
@@ -141,14 +142,13 @@ def kernel_from(recipe: Any) -> tuple[Any, Any]:
     return made_from(recipe["stage"]).to_compile(places.__getitem__, made_from(recipe["parameters"]))
 
 
-def number_of_helpers(total: float, longest: float) -> int:
+def number_of_helpers(processes: int, total: float, longest: float) -> int:
     """How many helpers shorten a compilation of so many seconds, `longest` of them for one stage.
 
-    No more than processor cores, threads that the user allows, memory, and work for them.
+    With this process no more than `processes`, and no more than fit into the memory.
     """
-    free = free_memory()
-    allowed = [cores() - 1, threads() - 1, math.ceil(total / longest) - 1]
-    return max(min(allowed if free is None else [*allowed, int(free / HELPER_BYTES)]), 0)
+    free, useful = free_memory(), min(processes, math.ceil(total / longest)) - 1
+    return max(useful if free is None else min(useful, int(free / HELPER_BYTES)), 0)
 
 
 @contextmanager

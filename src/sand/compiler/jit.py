@@ -126,8 +126,8 @@ def compiled_form(function: Callable) -> Callable:
 
 
 _COMPILED = (
-    "analysis/projection.py", "box.py", "compiler", "contact", "experiments/scattering", "forces", "grains.py",
-    "integrate", "neighbours", "numerics", "setup/_kernels", "state",
+    "analysis/projection.py", "basics/arrays.py", "basics/box.py", "basics/grains.py", "basics/state.py", "compiler",
+    "contact", "experiments/scattering", "forces", "integrate", "neighbours", "numerics", "setup/_kernels",
 )  # fmt: skip
 """Packages and files with compiled functions, or with named tuples that compiled functions take."""
 

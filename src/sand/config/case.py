@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, create_model, field_validator, model_validator
 
-from ..box import Box, as_box
+from ..basics.box import Box, as_box
+from ..basics.material import PRESETS, Material, like_preset
+from ..engine.driven import Driven
+from ..engine.walls import Wall, read_walls, wall_columns
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
-from ..material import PRESETS, Material, like_preset
-from ..neighbours.settings import Neighbours
+from ..neighbours.search import Neighbours
 from ..setup.gas import SPINS
 from ..setup.grain_classes import GrainClass, class_numbers
 from ..simulation.condition import GIVEN, read_condition
-from ..simulation.driven import Driven
 from ..simulation.ledger import Ledger
-from ..simulation.walls import Wall, read_walls, wall_columns
 from .commands import BODIES, refuse_other_command
-from .errors import validate
+from .key_errors import validate
 from .sections import (
     CLUSTERS,
     Cadence,

@@ -8,16 +8,16 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
 
-from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..basics.arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..basics.grains import moment_size
+from ..basics.paths import checked_name
+from ..basics.units import si
 from ..errors import did_you_mean
-from ..grains import moment_size
 from ..integrate.registry import INTEGRATORS
-from ..integrate.rigid_clusters import RigidClusters
+from ..integrate.rigid.rigid_clusters import RigidClusters
 from ..integrate.verlet import Verlet
-from ..paths import checked_name
 from ..setup.grain_classes import material_as_given, radius_as_given
 from ..simulation.cadence import duration, read_cadence
-from ..units import si
 
 
 class Section(BaseModel):

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import tomli_w
 from pydantic import BaseModel
 
-from ..descriptions import docstring, parameter_docs
+from ..basics.descriptions import docstring, parameter_docs
+from ..basics.material import PRESETS, Material
+from ..engine.driven import Driven
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
-from ..material import PRESETS, Material
-from ..neighbours.settings import Neighbours
+from ..neighbours.search import Neighbours
 from ..setup.grain_classes import GrainClass
-from ..simulation.driven import Driven
 from .case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection
 
 WIDTH = 110

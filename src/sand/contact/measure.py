@@ -2,11 +2,11 @@
 
 import math
 
+from ..basics.state import CONTACTS
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..numerics.vec import across, add, cross, dot, load, norm, scale, sub
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .damping import loads_on_grains, measured_load
 from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material
+from ..basics.ramps import rampable
+from ..basics.units import format_quantity, si
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
-from ..grains import Grains
-from ..material import Material
-from ..ramps import rampable
-from ..units import format_quantity, si
 from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
 from .law import LAWS, ContactLaw, Pairing
 from .mixing import MIXING, pairing_between

@@ -1,9 +1,9 @@
 """The constants of existing contacts, computed anew after parameters of the contact model have changed."""
 
+from ..basics.state import CONTACTS
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 
 

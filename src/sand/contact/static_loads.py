@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..basics.state import CONTACTS
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..numerics.vec import across
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 from .mechanics import displacements_of, scaled_stiffness
 from .tangential import sliding

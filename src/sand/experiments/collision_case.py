@@ -10,15 +10,15 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from ..arguments import MOST_GRAINS
+from ..basics.arguments import MOST_GRAINS
+from ..basics.grains import Grains
+from ..basics.material import PRESETS, Material
 from ..config.case import ForcesSection, MaterialSection, material_errors, with_absolute_files
 from ..config.commands import refuse_other_command
-from ..config.errors import validate
+from ..config.key_errors import validate
 from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, quantity, with_integrator, word
-from ..grains import Grains
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
-from ..material import PRESETS, Material
 from ..setup.aggregates import build
 from ..setup.encounters import offset_of
 from ..setup.from_file import body_from_file

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ..constants import COULOMB, GRAVITATION, MAGNETIC
+from ..basics.constants import COULOMB, GRAVITATION, MAGNETIC
+from ..basics.grains import Grains
 from ..contact.model import Contact
-from ..grains import Grains
 from ..simulation.simulation import Simulation
 
 MARGIN = 0.01

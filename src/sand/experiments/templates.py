@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..basics.descriptions import parameter_docs
 from ..config.template import (
     EXAMPLES,
     REQUIRED,
@@ -18,11 +19,10 @@ from ..config.template import (
     summary,
     template,
 )
-from ..descriptions import parameter_docs
 from .collision_case import BodySection, ImpactSection
 from .growth_case import GrowSection
-from .scattering.case import FlightSection, MeasureSection, ScatterBody
 from .scattering.problem import flight
+from .scattering.scatter_case import FlightSection, MeasureSection, ScatterBody
 
 BODY = {"kind": "bpca", "grains": 16, "radius": "0.1 um", "material": "silica"}
 COLLISION: Values = {

@@ -16,16 +16,16 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from ..box import Box
+from ..basics.box import Box
+from ..basics.descriptions import described
+from ..basics.grains import Grains
+from ..basics.units import finite_number
 from ..compiler.jit import compile_error, formula
-from ..descriptions import described
 from ..errors import BadInput, did_you_mean
-from ..grains import Grains
-from ..units import finite_number
 from .external.formulas import GrainState
 from .pair.cutoff import CutoffForce, cutoff_for
 from .pair.generic_loops import PairGrain, PairParameters, pair_sums
-from .pair.loops import LongRangeSums
+from .pair.long_range_loops import LongRangeSums
 from .pair.pair_force import contact_energy, energy_at
 from .registry import FORCES, column_of
 from .vectors import components, three

@@ -8,13 +8,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
 from ..compiler.stage import Stage
 from ..errors import FORBID_EXTRA
-from ..grains import Grains
 from .adaptive_driver import free_flight
-from .base import register
 from .flight import FlightSettings
+from .integrator import register
 from .step_control import StepCriteria
 from .verlet import Verlet
 

@@ -7,18 +7,18 @@ external forces.  A first contact ends the step; the second half of a Verlet ste
 
 import math
 
-from ..compiler.jit import caller, loop
-from ..compiler.program import call_stage, has_stage
-from ..compiler.stage import stage
-from ..neighbours.skin import largest_displacement
-from ..numerics.vec import dot, load
-from ..state.state import (
+from ..basics.state import (
     FLIGHT,
     GRAIN1,
     GRAIN2,
     REJECTED,
     TIME,
 )
+from ..compiler.jit import caller, loop
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import stage
+from ..neighbours.skin import largest_displacement
+from ..numerics.vec import dot, load
 from .event_location import NEVER, first_contact_time
 from .flight import finish_flight_step
 from .force_calls import sum_external

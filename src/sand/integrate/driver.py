@@ -13,14 +13,7 @@ The driver is compiled once, for all forces and contact laws: it calls their sta
 
 import math
 
-from ..compiler.jit import caller, loop, rare
-from ..compiler.program import call_stage, has_stage
-from ..compiler.stage import stage
-from ..contact.events import count_new_contacts
-from ..contact.update import load_contact_sums, log_contact_sums
-from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
-from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
-from ..state.state import (
+from ..basics.state import (
     BROKEN,
     COMPARED,
     CONTACTS,
@@ -42,6 +35,13 @@ from ..state.state import (
     STEPS,
     TIME,
 )
+from ..compiler.jit import caller, loop, rare
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import stage
+from ..contact.events import count_new_contacts
+from ..contact.update import load_contact_sums, log_contact_sums
+from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
+from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from .driven import HOLD, HOLD_IN_EVENTS, RELEASE, RELEASE_FROM_EVENTS, RESET
 from .force_calls import (
     add_external_loads,

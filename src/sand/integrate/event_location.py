@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..box import nearest_image
+from ..basics.box import nearest_image
 from ..compiler.jit import formula, loop, rare
 from ..numerics.vec import add, axpy, dot, load, norm, scale, sub
 from .runge_kutta import STAGES, V, X, rows3

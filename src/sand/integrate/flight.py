@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
+from ..basics.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
+from ..basics.units import is_word, si
 from ..compiler.jit import caller
 from ..errors import BadInput, shown
 from ..neighbours.skin import invalidate_skins, invalidate_speeds
-from ..state.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
-from ..units import is_word, si
 from .force_calls import sum_external
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all

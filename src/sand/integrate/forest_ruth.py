@@ -20,17 +20,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import nearest_image
-from ..compiler.jit import caller, loop, rare
-from ..compiler.program import call_stage, has_stage
-from ..compiler.stage import Stage, stage
-from ..errors import FORBID_EXTRA
-from ..forces.external.formulas import stiffness_of_field
-from ..grains import Grains
-from ..numerics.quaternion import turn, turned
-from ..numerics.vec import axpy, dot, load, load4, norm, put, put4, scale, sub
-from ..state.state import (
+from ..basics.arguments import checked
+from ..basics.box import nearest_image
+from ..basics.grains import Grains
+from ..basics.state import (
     FLIGHT,
     LONG_RANGE_SUMS,
     NEEDED,
@@ -38,12 +31,19 @@ from ..state.state import (
     STEPS,
     TIME,
 )
+from ..compiler.jit import caller, loop, rare
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import Stage, stage
+from ..errors import FORBID_EXTRA
+from ..forces.external.formulas import stiffness_of_field
+from ..numerics.quaternion import turn, turned
+from ..numerics.vec import axpy, dot, load, load4, norm, put, put4, scale, sub
 from .adaptive_driver import MAX_ATTEMPTS, STRIDE_FRACTION, refresh_verlet_list
-from .base import register
 from .event_location import NEVER, first_contact_time
 from .flight import FlightSettings, finish_flight_step
 from .force_calls import sum_external
 from .force_stages import ENERGY, POWER
+from .integrator import register
 from .motion import kick
 from .parts import DRIVER_PARTS, Stop
 from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads

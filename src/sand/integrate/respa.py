@@ -13,11 +13,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..box import nearest_image
+from ..basics.box import nearest_image
+from ..basics.state import CONTACTS
 from ..compiler.jit import loop
 from ..contact.update import BROKEN_FLAG, padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
-from ..state.state import CONTACTS
 
 CONSTANT_PART_CHANGE = 0.5
 """Relative change of a grain's long-range load at which its constant part is set to the present load.

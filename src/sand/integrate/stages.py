@@ -9,6 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from ..basics.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from ..compiler.jit import loop
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
@@ -21,12 +22,11 @@ from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import contact_pass_loop, contact_step, store_contact_sums
 from ..contact.wall_loops import FULL as WALLS_FULL
 from ..contact.wall_loops import add_wall_loads, wall_loops, wall_step_loop
-from ..forces.gas.loops import gas_kick
+from ..forces.gas.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
-from ..state.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from .motion import UNBOUNDED, drift_for, gather_and_kick
 from .parts import CYCLE_LENGTH, DT, SINCE, Stop
 from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions

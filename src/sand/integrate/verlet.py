@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.units import is_word, si, whole_number
 from ..compiler.stage import Stage
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
-from ..grains import Grains
-from ..units import is_word, si, whole_number
-from .base import register
+from .integrator import register
 
 IMPULSE_PERIODS = 0.48
 """Longest r-RESPA cycle in fastest contact periods; the first resonance of the impulses is at half a period."""

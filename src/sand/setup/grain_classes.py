@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.grains import Grains, moment_size, vector_for_all
+from ..basics.material import PRESETS, Material, as_material
+from ..basics.paths import checked_name
+from ..basics.units import dimensions, si, whole_number
 from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown, warn
-from ..grains import Grains, moment_size, vector_for_all
-from ..material import PRESETS, Material, as_material
-from ..paths import checked_name
-from ..units import dimensions, si, whole_number
 from .aggregates import KINDS, build
 from .encounters import combined, turned
 from .from_file import body_from_file, from_trajectory, is_own_trajectory, largest_body

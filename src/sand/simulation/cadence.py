@@ -7,9 +7,9 @@ import re
 from decimal import Decimal
 from typing import Any, Literal, NamedTuple
 
-from ..arguments import MOST_STEPS
+from ..basics.arguments import MOST_STEPS
+from ..basics.units import LONGEST_TEXT, format_quantity, si, whole_number
 from ..errors import BadInput
-from ..units import LONGEST_TEXT, format_quantity, si, whole_number
 
 SHORTEST_DURATION = 1e-21
 """Shortest accepted time span [s]; light travels less than a picometre in it."""

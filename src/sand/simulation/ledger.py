@@ -11,13 +11,13 @@ import numpy as np
 from ..analysis.body_motion import BodyMotion, temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
-from ..constants import BOLTZMANN
+from ..basics.constants import BOLTZMANN
+from ..basics.grains import Grains
+from ..basics.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from ..contact.measure import ENERGIES
+from ..engine.walls import wall_row
 from ..errors import BadInput
-from ..grains import Grains
 from ..io.ledger_table import TEMPERATURES
-from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
-from .walls import wall_row
 
 KINETIC = "translation", "rotation"
 """Columns of kinetic energies."""

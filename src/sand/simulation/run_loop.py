@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..integrate.parts import Stop
-from ..integrate.rigid_clusters import RigidClusters
+from ..integrate.rigid.rigid_clusters import RigidClusters
 from .cadence import Cadence, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
-from .cost import StepTimer
+from .cost.cost import StepTimer
 from .ledger import COUNTED
 from .observers import call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome

@@ -12,18 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import cache_folder
-from ..errors import BadInput, FilesFailed
-from ..io import run_folder as files
-from ..io.checkpoint import write_checkpoint
-from ..io.checkpoint_files import checkpoint_files
-from ..io.damage import sealed
-from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
-from ..io.lock import FolderLock
-from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
-from ..io.trajectory import TrajectoryWriter
-from ..paths import user_path
-from ..state.state import (
+from ..basics.paths import user_path
+from ..basics.state import (
     BODIES,
     CLOCK,
     CONTACT_STEPS,
@@ -40,6 +30,16 @@ from ..state.state import (
     SUBSTEPS,
     WOKEN,
 )
+from ..compiler.jit import cache_folder
+from ..errors import BadInput, FilesFailed
+from ..io import run_folder as files
+from ..io.checkpoint import write_checkpoint
+from ..io.checkpoint_files import checkpoint_files
+from ..io.damage import sealed
+from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
+from ..io.lock import FolderLock
+from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
+from ..io.trajectory import TrajectoryWriter
 from ..version import __version__
 from .cadence import read_cadence
 from .contact_table import measured_columns

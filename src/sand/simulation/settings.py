@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
-from ..arguments import objects_with
+from ..basics.arguments import objects_with
+from ..basics.schema import CHANGEABLE, FIELDS
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
 from ..forces.registry import FORCES
-from ..schema import CHANGEABLE, FIELDS
 from .cadence import read_cadence
 from .observers import Observer
 from .updater import read_updaters

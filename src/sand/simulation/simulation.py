@@ -11,28 +11,31 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import as_box
+from ..basics.arguments import checked
+from ..basics.box import as_box
+from ..basics.grains import Grains
+from ..basics.state import BROKEN, CONTACTS, LATE, MADE, OUTSIDE, State
+from ..basics.units import format_quantity, seed_given
 from ..contact.model import Contact
+from ..engine.assemble import build_engine, fitting_forces
+from ..engine.driven import read_driven
+from ..engine.walls import Wall, WallState, read_walls, wall_columns, wall_states
 from ..errors import BadInput, FilesFailed, Interrupted, warn
 from ..forces.base import Force
 from ..forces.pair.dipoles import kinetic_temperature
-from ..grains import Grains
-from ..integrate.base import Integrator
+from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
-from ..neighbours.settings import Neighbours
+from ..limits.solid_limits import extreme_warnings, grain_warnings
+from ..limits.truncation import truncation_warnings
+from ..neighbours.search import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import BROKEN, CONTACTS, LATE, MADE, OUTSIDE, State
-from ..units import format_quantity, seed_given
-from .assemble import build_engine, fitting_forces
 from .cadence import Chosen, chosen_cadence
 from .change import Change, as_chosen, changed_engine
 from .condition import GIVEN, OwnCondition
 from .contact_table import ContactTable
-from .cost import StepTimer
+from .cost.cost import StepTimer
 from .displays import DISPLAYS
-from .driven import read_driven
 from .exclusive import Exclusive, exclusive
 from .ledger import Ledger, cluster_numbers, count_row, kinetic_energies, log_row
 from .observers import Observer
@@ -41,13 +44,10 @@ from .run_loop import run_loop
 from .run_writer import RunWriter, is_mostly_awake
 from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
-from .solid_limits import extreme_warnings, grain_warnings
 from .stop import StopCriteria, stop_criteria
-from .truncation import truncation_warnings
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
 from .wall_clock import WallClock
-from .walls import Wall, WallState, read_walls, wall_columns, wall_states
 
 ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting")
 """Columns of a contact's elastic energy."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..arguments import objects_with
+from ..basics.arguments import objects_with
 from ..errors import BadInput, shown, warn
 from .cadence import Cadence, Schedule, read_cadence
 

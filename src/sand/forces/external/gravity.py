@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
 from ...errors import FORBID_EXTRA, BadInput
-from ...grains import Grains
-from ...ramps import rampable
 from ..vectors import along_z, components
 from .formulas import UniformGravity, uniform_gravity
 

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import force_at, forces_at_points, rampable, ramps_of
+from ...basics.units import si
 from ...errors import FORBID_EXTRA, BadInput, did_you_mean, shown
-from ...grains import Grains
 from ...numerics.vec import across, add, cross, dot, norm, scale, sub
-from ...ramps import force_at, forces_at_points, rampable, ramps_of
-from ...units import si
 from ..vectors import along_z, three
 from .formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
 

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ...arguments import checked
-from ...box import Box
-from ...constants import BOLTZMANN, LIGHT
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import BOLTZMANN, LIGHT
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.units import MELTED, format_quantity, si
 from ...errors import FORBID_EXTRA, BadInput
-from ...grains import Grains
-from ...ramps import rampable
-from ...units import MELTED, format_quantity, si
 from ..vectors import three
 from . import drag as law
-from .loops import GasParameters, shortest_stopping_time
+from .gas_loops import GasParameters, shortest_stopping_time
 
 MIN_KNUDSEN = 10.0
 """Least mean free path in radii for free molecular flow."""

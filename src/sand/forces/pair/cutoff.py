@@ -6,10 +6,10 @@ import math
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
-from ...box import Box
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.units import format_quantity, is_word, si
 from ...errors import FORBID_EXTRA, BadInput, did_you_mean, shown
-from ...grains import Grains
-from ...units import format_quantity, is_word, si
 from .dipole_formulas import Cutoff
 
 CUTS = ("smooth", "sharp")

@@ -8,12 +8,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...arguments import checked
-from ...box import Box
-from ...constants import BOLTZMANN, MAGNETIC
-from ...grains import Grains
-from ...ramps import rampable
-from ...units import format_quantity
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import BOLTZMANN, MAGNETIC
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.units import format_quantity
 from .cutoff import HALF_BOX_RATIO, CutoffChoice, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
 from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParameters
@@ -21,7 +21,7 @@ from .ewald import degree_for, ewald_parameters
 from .ewald_fit import DIPOLES, Sources
 from .ewald_force import DEFAULT_ACCURACY, EwaldForce
 from .ewald_loops import EwaldParameters, MeshEwaldParameters, ewald_sums
-from .loops import LongRangeSums
+from .long_range_loops import LongRangeSums
 from .tree import TREE_FROM, TreeChoice, choose_tree, tree_parameters
 from .tree_loops import TREE, TreeParameters
 

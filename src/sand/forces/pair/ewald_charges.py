@@ -19,7 +19,7 @@ from ...numerics.vec import accrue, dot
 from .ewald_formulas import real_part_of_charges
 from .ewald_loops import with_waves
 from .generic_loops import ZERO, sums_of
-from .loops import LongRangeSums, all_blocks
+from .long_range_loops import LongRangeSums, all_blocks
 from .mesh_loops import MESH_CHARGES, add_mesh_forces, mesh_rounds, remove_self_waves
 
 

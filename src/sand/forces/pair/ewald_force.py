@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any, ClassVar
 
-from ...box import Box
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.units import si
 from ...errors import BadInput, ErrorCollector, did_you_mean, shown
-from ...grains import Grains
-from ...units import si
 from .cutoff import CutoffChoice, CutoffForce
 from .ewald import EwaldChoice, choose_ewald, sides
 from .ewald_fit import Sources

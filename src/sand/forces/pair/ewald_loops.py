@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...box import nearest_image
+from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
 from ...numerics.turns import cosine_and_sine
@@ -40,7 +40,7 @@ from .dipole_loops import (
     separation_if,
 )
 from .ewald_formulas import real_part
-from .loops import LongRangeSums, all_blocks, listed_blocks
+from .long_range_loops import LongRangeSums, all_blocks, listed_blocks
 from .mesh_loops import MESH_DIPOLES, Mesh, add_mesh_field, add_mesh_forces, mesh_rounds, remove_self_waves
 
 

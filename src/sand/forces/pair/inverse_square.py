@@ -8,20 +8,20 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import COULOMB, GRAVITATION
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.units import format_quantity
 from ...compiler.jit import formula
-from ...constants import COULOMB, GRAVITATION
 from ...errors import ErrorCollector
-from ...grains import Grains
 from ...numerics.vec import axpy, dot, scale
-from ...ramps import rampable
-from ...units import format_quantity
 from .ewald import degree_for, ewald_parameters, mean_field
 from .ewald_charges import ewald_charge_sums
 from .ewald_fit import CHARGES, Sources
 from .ewald_force import DEFAULT_ACCURACY, EwaldForce
-from .loops import LongRangeSums
+from .long_range_loops import LongRangeSums
 from .pair_force import PairForce
 
 NEUTRAL = 1e-9

@@ -29,7 +29,7 @@ from ...compiler.recipes import factory
 from ...numerics.simd import SIMD_WIDTH
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
-from .loops import Round
+from .long_range_loops import Round
 
 ORDERS = 5, 6, 7, 8
 """Orders of the splines that are compared; at most `SIMD_WIDTH`."""

@@ -12,15 +12,15 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import COULOMB
+from ...basics.grains import Grains
+from ...basics.ramps import forces_at_points, rampable
+from ...basics.units import format_quantity, si
 from ...compiler.jit import formula
-from ...constants import COULOMB
 from ...errors import ErrorCollector
-from ...grains import Grains
 from ...numerics.vec import dot, scale
-from ...ramps import forces_at_points, rampable
-from ...units import format_quantity, si
 from .cutoff import HALF_BOX_RATIO, CutoffChoice
 from .pair_force import PairForce
 
