@@ -12,8 +12,8 @@ import numpy as np
 
 from ..basics.state import LATE
 from ..errors import Interrupted
-from ..integrate.parts import Stop
 from ..integrate.integrator import moves_bodies
+from ..integrate.parts import Stop
 from .cadence import Cadence, Chosen, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
 from .ledger import COUNTED, kinetic_energies
