@@ -33,6 +33,9 @@ from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_fini
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
 
+HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)
+"""What the stage DRIVE does: masses before and after kicks, and around contact events; velocities after drag."""
+
 
 class StageNumber(IntEnum):
     """Entries of the program of a simulation."""
