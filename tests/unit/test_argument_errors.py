@@ -87,8 +87,7 @@ ARGUMENTS = [
     ("sand.ElectricField(field='1 V/m')", "no argument 'field'"),
     ("sand.Verlet(step=np.array([1e-9, 2e-9]))", "stepping: step = array of shape (2,) is not a quantity in s"),
     ("sand.Verlet(dt='1 ns')", "there is no argument 'dt'"),
-    ("sand.Adaptive(tolerance=np.ones(2))", "tolerance = array of shape (2,) is not a number"),
-    ("sand.Adaptive(position_error=np.ones(2))", "position_error = array of shape (2,) is not a quantity"),
+    ("sand.RigidClusters(vibration=np.ones(2))", "vibration = array of shape (2,) is not a number"),
     ("sand.Neighbours(margin=np.ones(2))", "margin = array of shape (2,) is not a quantity"),
     ("sand.Neighbours(search=np.ones(2))", "search = array of shape (2,) must be text"),
     ("sand.set_threads(threads=2)", "set_threads: there is no argument 'threads'"),
@@ -106,7 +105,7 @@ SIMULATIONS = [
     ("sand.Simulation(grains, ['contact'])", "'contact' is not a force"),
     (
         "sand.Simulation(grains, stepping='verlet')",
-        "stepping = 'verlet'; give sand.Verlet(…) or sand.Adaptive(…) or sand.ForestRuth(…)",
+        "stepping = 'verlet'; give sand.Verlet(…) or sand.RigidClusters(…)",
     ),
     ("sand.Simulation(grains, stepping=sand.Verlet)", "stepping = sand.Verlet is a class; write sand.Verlet(…)"),
     ("sand.Simulation(grains, neighbours='cells')", "neighbours = 'cells'; give sand.Neighbours(…)"),
@@ -351,7 +350,7 @@ def test_all_wrong_settings_are_reported_together():
         sand.Contact(slip=3, slide_factor=-1.0, roll_factor="x")
     assert len(caught.value.problems) == 3
     with pytest.raises(sand.BadInput) as caught:
-        sand.Adaptive(tolerance=-1.0, contact_stepping="verlet")
+        sand.RigidClusters(step_fraction=-1.0, contact_stepping="verlet")
     assert len(caught.value.problems) == 2
     with pytest.raises(sand.BadInput) as caught:
         sand.Grains([[0, 0, 0]], 1e-8, "iron", velocty=1, spim=2)

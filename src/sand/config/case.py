@@ -18,6 +18,7 @@ from ..engine.walls import Wall, read_walls, wall_columns
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
+from ..integrate.integrator import INTEGRATORS, moves_bodies
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
 from ..neighbours.search import Neighbours
@@ -28,7 +29,6 @@ from ..simulation.ledger import Ledger
 from .commands import BODIES, refuse_other_command
 from .key_errors import validate
 from .sections import (
-    CLUSTERS,
     Cadence,
     Count,
     Duration,
@@ -319,8 +319,9 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     except BadInput:  # reported by the validation of the whole file
         return []
     try:
-        rigid = isinstance(table := content.get("stepping"), dict) and method_of(table) == CLUSTERS["rigid"]
-        condition.check([*Ledger(rigid=rigid).columns, *columns, *_wall_names(content.get("walls"))])
+        table = content.get("stepping")
+        awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
+        condition.check([*Ledger(awake=awake).columns, *columns, *_wall_names(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []

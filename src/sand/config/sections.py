@@ -25,8 +25,8 @@ from ..basics.grains import moment_size
 from ..basics.paths import checked_name
 from ..basics.settings import For, Reading, Setting
 from ..errors import did_you_mean
+from ..integrate.integrator import methods_of_clusters, moves_bodies
 from ..integrate.registry import INTEGRATORS
-from ..integrate.rigid.rigid_clusters import RigidClusters
 from ..integrate.verlet import Verlet
 from ..simulation.cadence import duration, read_cadence
 
@@ -130,13 +130,9 @@ Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
 """Seed of random numbers."""
 
 
-CLUSTERS = {"grains": Verlet.name, "rigid": RigidClusters.name}
-"""`clusters` of the [stepping] table, and the `method` that it stands for."""
-
-
 def method_of(table: dict[str, Any]) -> str:
     """The integrator that a [stepping] table selects by `method`, or by `clusters`."""
-    return str(table.get("method", CLUSTERS.get(str(table.get("clusters", "grains")), "")))
+    return str(table.get("method", methods_of_clusters().get(str(table.get("clusters", Verlet.clusters)), "")))
 
 
 def _without_method(value: Any) -> Any:
@@ -149,10 +145,13 @@ def _without_method(value: Any) -> Any:
     value = dict(value)
     method, clusters = value.pop("method", None), value.pop("clusters", None)
     if method is not None and str(method) not in INTEGRATORS:
-        raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
-    if clusters is not None and str(clusters) not in CLUSTERS:
-        raise ValueError(f"clusters = {clusters!r}; {did_you_mean(str(clusters), list(CLUSTERS))}")
-    if None not in (method, clusters) and (clusters == "rigid") != (method == CLUSTERS["rigid"]):
+        advice = f"{did_you_mean(str(method), list(INTEGRATORS))}; one of your own needs --import MODULE"
+        raise ValueError(f"method = {method!r}; {advice}")
+    words = methods_of_clusters()
+    if clusters is not None and str(clusters) not in words:
+        raise ValueError(f"clusters = {clusters!r}; {did_you_mean(str(clusters), list(words))}")
+    bodies = [moves_bodies(INTEGRATORS[name]) for name in (method, words.get(str(clusters))) if name is not None]
+    if None not in (method, clusters) and len(set(bodies)) > 1:
         raise ValueError(f"clusters = {clusters!r} contradicts method = {method!r}; leave one of them out")
     return value
 

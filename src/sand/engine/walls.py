@@ -138,7 +138,7 @@ def check_walls(
     if walls and ramps_of(contact):
         problems.append("walls: ramps of sand.Contact do not reach contacts with walls; give constant values")
     if walls and stepping.flight is not None:
-        problems.append(f"walls: sand.{type(stepping).__name__} does not know walls; use stepping=sand.Verlet()")
+        problems.append(f"walls: {type(stepping).__name__} does not know walls; use stepping=sand.Verlet()")
     for wall in walls:
         problems += _material_problems(wall, grains, contact)
         axes = [axis for axis, v, length in zip("xyz", wall.normal, box.lengths, strict=True) if v and length]

@@ -62,6 +62,7 @@ class Verlet(IntegratorSettings):
     far_steps: Annotated[Any, Whole(1, MAX_FAR_STEPS, auto=True)] = "auto"
 
     name: ClassVar[str] = "verlet"
+    clusters: ClassVar[str] = "grains"
     flight: ClassVar[Stage | None] = None
 
     @property
@@ -73,7 +74,7 @@ class Verlet(IntegratorSettings):
         """These settings: the driver chooses the automatic step."""
         return self
 
-    def flight_limits(self, longest_displacement: float) -> tuple[()]:
+    def flight_limits(self, grains: Grains, longest_displacement: float) -> tuple[()]:
         """None: grains without contacts are moved in the same way."""
         return ()
 

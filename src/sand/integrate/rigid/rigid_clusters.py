@@ -72,6 +72,8 @@ class RigidClusters(IntegratorSettings):
     contact_stepping: Annotated[Verlet, Table(Verlet)] = field(default_factory=Verlet)
 
     name: ClassVar[str] = "rigid-clusters"
+    clusters: ClassVar[str] = "rigid"
+    moves_bodies: ClassVar[bool] = True
     flight: ClassVar[Stage | None] = None
 
     def contradictions(self, wrong: Set[str]) -> Iterator[str]:
@@ -84,7 +86,7 @@ class RigidClusters(IntegratorSettings):
         """These settings: the driver chooses the automatic step."""
         return self
 
-    def flight_limits(self, longest_displacement: float) -> RigidLimits:
+    def flight_limits(self, grains: Grains, longest_displacement: float) -> RigidLimits:
         """Run-time numbers; the engine, which knows contacts, gas and grains, sets all but the first three."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
         return RigidLimits(
