@@ -23,6 +23,7 @@ from sand.basics.settings import (
     Word,
     declared,
 )
+from sand.config.case import WallSection
 from sand.config.sections import Section, with_keys
 from sand.config.template import REQUIRED, keys_of
 from sand.errors import BadInput
@@ -169,6 +170,8 @@ def test_a_section_has_the_keys_of_a_class():
 
     found = {key.name: (key.meaning, key.default) for key in keys_of(Outer)}
     assert found["size"] == ("Size [m].", 0.5)
+    required = {key.name for key in keys_of(WallSection) if key.default is REQUIRED}
+    assert required == {"material", "point", "normal"}
     assert Outer(length="1 um").length == 1e-6
     for given, line in (
         ({"kind": "file"}, "file is missing: kind = 'file' needs a name"),
