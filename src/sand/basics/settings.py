@@ -68,6 +68,11 @@ class Whole(Setting):
     def __init__(self, least: int, most: int | None = None, *, auto: bool = False):
         self.least, self.most, self.auto = least, most, auto
 
+    @property
+    def range(self) -> str:
+        """What is allowed, in words."""
+        return f"a whole number{f' of at least {self.least}' if self.most is None else f', {self.least} … {self.most}'}"
+
     def read(self, value: Any, name: str) -> Any:
         """The number, as given."""
         if self.auto and is_word(value, "auto"):
