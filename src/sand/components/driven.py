@@ -10,7 +10,7 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.grains import Grains
-from ..basics.settings import Settings, Vector, Wholes
+from ..basics.settings import List, Settings, Vector, Whole
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
 from ..errors import BadInput, shown
@@ -44,7 +44,7 @@ class Driven(Settings):
         If there is no index, or a value is invalid; one line each.
     """
 
-    grains: Annotated[Sequence[int], Wholes(0, "indices of grains, such as [0, 1]")]
+    grains: Annotated[Sequence[int], List(Whole(0), "indices of grains, such as [0, 1]")]
     velocity: Annotated[Sequence[Any], Vector("m/s")] = AT_REST
     spin: Annotated[Sequence[Any], Vector("rad/s")] = AT_REST
 

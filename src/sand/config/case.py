@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, create_model, model_validator
 
+from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
 from ..basics.material import PRESETS, Material, like_preset
-from ..basics.settings import For, Number, Reading, Word
+from ..basics.settings import Flag, For, Number, Reading, Whole, Word
 from ..components.driven import Driven
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
@@ -29,7 +30,6 @@ from .commands import BODIES, refuse_other_command
 from .key_errors import validate
 from .sections import (
     Cadence,
-    Count,
     Duration,
     Moment,
     PathName,
@@ -37,7 +37,6 @@ from .sections import (
     Section,
     Seed,
     Stepping,
-    Steps,
     method_of,
     with_integrator,
     with_keys,
@@ -57,7 +56,7 @@ class RunSection(Section):
 
     until: Duration = None
     """End of the run [s], simulated time; this, `steps` or `stop` is required; with several, the first one reached."""
-    steps: Steps | None = None
+    steps: Annotated[int | None, Whole(1, MOST_STEPS)] = None
     """End of the run as a number of steps, completed to the end of the cycle."""
     stop: Annotated[str | None, Reading(_condition)] = None
     """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
@@ -116,7 +115,7 @@ class GrainsSection(Section):
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
-    number: Annotated[Count | None, For("kind", "gas", "given")] = None
+    number: Annotated[int | None, Whole(1, MOST_GRAINS), For("kind", "gas", "given")] = None
     """Number of grains; with `classes` of grains and aggregates."""
     radius: Radii = None
     """Radius [m]: a length, `lognormal(MEDIAN, SIGMA, LEAST, MOST)`, `power law(EXPONENT, LEAST, MOST)`, or a list with
@@ -132,7 +131,7 @@ class GrainsSection(Section):
     """Temperature of velocities and spins [K]."""
     spins: Annotated[str, Word(among=SPINS), For("kind", "gas", "given")] = "kT/2"
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
-    exact_temperature: Annotated[bool, Field(strict=True), For("kind", "gas", "given")] = True
+    exact_temperature: Annotated[bool, Flag(), For("kind", "gas", "given")] = True
     """Whether velocities and spins are scaled to exactly this temperature; otherwise they are random draws."""
     classes: Annotated[list[GrainClass], For("kind", "gas")] = Field(default_factory=list)
     """Classes of grains and aggregates, each a table [[grains.classes]]; see below."""
@@ -142,7 +141,7 @@ class GrainsSection(Section):
     file: Annotated[PathName | None, For("kind", "file", needed="one, such as file = 'run/trajectory.gsd'")] = None
     """Run folder, trajectory or body of SAND, or a file of another program: XYZ, columns, CSV, LAMMPS data and dump,
     GSD; its content tells the format."""
-    frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True), For("kind", "file")] = -1
+    frame: Annotated[int, Whole(-(2**31), 2**31 - 1), For("kind", "file")] = -1
     """Index of the frame; −1 is the last."""
     length: Annotated[str | None, For("kind", "file")] = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""

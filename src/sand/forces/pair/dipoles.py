@@ -47,7 +47,7 @@ class CapturingPair(NamedTuple):
 
 
 @checked
-@rampable()
+@rampable
 @dataclass(frozen=True)
 class Dipoles(EwaldForce):
     """Forces and torques between magnetic moments.
