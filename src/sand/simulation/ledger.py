@@ -131,13 +131,13 @@ class Ledger(LedgerColumns):
         Names of the energy columns of long-range and per-grain forces.
     walls : Sequence[str], optional
         Columns of the walls, see `walls.wall_columns`.
-    rigid : bool, optional
-        Whether clusters at rest are rigid: with the column `awake`.
+    awake : bool, optional
+        Whether clusters may be at rest: with the column `awake`.
     """
 
-    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, rigid: bool = False):
+    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, awake: bool = False):
         others = [name for name in forces if name != MAGNETIC]
-        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if rigid else NUMBERS
+        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if awake else NUMBERS
         own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..basics.state import LATE
 from ..errors import Interrupted
+from ..integrate.integrator import moves_bodies
 from ..integrate.parts import Stop
-from ..integrate.rigid.rigid_clusters import RigidClusters
 from .cadence import Cadence, Chosen, Schedule, read_cadence
 from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
 from .ledger import COUNTED, kinetic_energies
@@ -109,7 +109,7 @@ class RunLoop:
             for name in ("frame_every", "row_every", "checkpoint_every")
             for setting in [getattr(simulation, name)]
         )
-        every = EVERY_LONG if isinstance(simulation.stepping, RigidClusters) else EVERY
+        every = EVERY_LONG if moves_bodies(simulation.stepping) else EVERY
         self._checks = Schedule(None if self._condition is None else Cadence("steps", every), *now)
         self._energy_checks = Schedule(Cadence("steps", ENERGY_CHECK_EVERY), *now)
         self.updates = UpdateSchedule(simulation)

@@ -204,7 +204,7 @@ class RunWriter:
     def _frame(self, simulation: Simulation) -> None:
         assert self._trajectory is not None
         w, engine = simulation.state, simulation._engine
-        contacts = measured_columns(w, engine.law, engine._current_table(w))
+        contacts = measured_columns(w, engine.law, engine.table_of(w))
         self._trajectory.write(w.steps, w.time, w.grains, w.box, contacts, at_rest=w.at_rest)
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:

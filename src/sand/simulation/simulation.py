@@ -182,7 +182,7 @@ class Simulation(ReadOnlySettings):
         )
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
-        self.ledger = Ledger(engine.columns(), wall_columns(walls), rigid=engine.state.at_rest is not None)
+        self.ledger = Ledger(engine.columns(), wall_columns(walls), awake=engine.state.at_rest is not None)
         self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
         self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None
@@ -265,7 +265,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.law, self._engine._current_table(self.state))
+        return ContactTable(self.state, self._engine.law, self._engine.table_of(self.state))
 
     @property
     @exclusive
