@@ -66,13 +66,13 @@ class Cadence(NamedTuple):
         return texts[self.kind]
 
 
-def read_cadence(value: Any, name: str, *, wall: bool = False) -> Cadence:
+def read_cadence(value: Any, name: str, *, wall_time: bool = False) -> Cadence:
     """Read a cadence from the setting `name`.
 
     Parameters
     ----------
     value : float or str
-        A time (1e-9 or "1 ns"), "1000 steps", "log(10 per decade, from 1 ns)", or, with `wall`, "30 s wall".
+        A time (1e-9 or "1 ns"), "1000 steps", "log(10 per decade, from 1 ns)", or, with `wall_time`, "30 s wall".
 
     Raises
     ------
@@ -81,7 +81,7 @@ def read_cadence(value: Any, name: str, *, wall: bool = False) -> Cadence:
     """
     text = value.strip() if isinstance(value, str) and len(value) <= LONGEST_TEXT else ""
     if match := _WALL.fullmatch(text):
-        if not wall:
+        if not wall_time:
             raise BadInput(
                 f"{name} = {value!r}: wall time is for checkpoint_every only, as results must not depend on it; "
                 "give a simulated time, '1000 steps' or 'log(10 per decade, from 1 ns)'"
