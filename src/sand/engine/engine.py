@@ -47,14 +47,16 @@ from ..basics.state import (
     WALL_CONTACTS,
     State,
 )
+from ..basics.threads import cores, threads
+from ..compiler.ahead import compile_ahead
 from ..compiler.program import Program
-from ..compiler.stage import Stage
+from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import THERMAL
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
-from ..contact.measure import BODY_ROWS, ENERGIES, energies_stage, measure_bodies, wall_energies_stage
+from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies, wall_energies_stage
 from ..contact.model import Contact
 from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
@@ -119,6 +121,10 @@ class GrainSteps:
     def drivers(self) -> list[tuple[Stage, Any]]:
         """Stages that are called during a run besides those of the program, with their parameters."""
         return [(advance, ())]
+
+    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Further stages that a run may call, each with a table of parts and its parameters."""
+        return []
 
     def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
         """Take steps up to a time [s] or a step; returns why no more were taken."""
@@ -525,18 +531,37 @@ class Engine:
 
     def uncompiled(self) -> list[str]:
         """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
-        (table, _), shares = self._call_table(math.inf, 1, False), np.zeros(len(self._state.grains))
-        program = build_program(self.components, self.parameters, table)
-        table.set("program", program)
-        stages: list[tuple[Any, Any]] = [*self.taken.drivers(), *program.stages.values()]
-        stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+        stages = self.stages(self.first_table())
+        missing = [
+            each.purpose for table, each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)
+        ]
+        return list(dict.fromkeys(missing))
+
+    def first_table(self) -> Table:
+        """The table as for a call of the driver, with all parts that stages take."""
+        return self._call_table(math.inf, 1, False)[0]
+
+    def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """All stages that a run may call, each with a table of parts, by default this one, and its parameters."""
+        shares = np.zeros(len(self._state.grains))
+        stages: list[tuple[Any, Any]] = [*self.taken.drivers(), *self._program_for(table).stages.values()]
+        if self.parameters.settings.on:
+            stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+            stages.append((contacts_stage(self.law), (np.zeros((1, 1)),)))
         stages.append((measure_bodies, (np.zeros((BODY_ROWS, 1)), cluster_arrays(1))))
         stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in self.long_range]
         stages += [
             (external_energies_for(outer.formula), (outer.numbers(), self.time, shares)) for outer in self.external
         ]
-        missing = [each.purpose for each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)]
-        return list(dict.fromkeys(missing))
+        return [*((table, *each) for each in stages), *self.taken.stages_within(self, table)]
+
+    def _program_for(self, table: Table) -> Program:
+        """The program, made for the present parameters if there is none."""
+        if self._program is None:
+            self._program = build_program(self.components, self.parameters, table)
+        for each in (self._table, table):
+            each.set("program", self._program)
+        return self._program
 
     def run_driver(self, driver: Stage, until: float, last: float, shorten: bool = False) -> Stop:
         """Run a driver with the stages of the simulation, in the present order of the arrays.
@@ -564,9 +589,7 @@ class Engine:
         table, queue = self._call_table(until, last, shorten)
         try:
             if self._program is None:
-                self._program = build_program(self.components, self.parameters, table)
-                for each in (self._table, table):
-                    each.set("program", self._program)
+                compile_ahead(self.stages(table), min(cores(), threads()))
             alone = shorten and len(state.grains) < ALONE  # threads start later than one step ends
             if (
                 not alone
@@ -574,7 +597,7 @@ class Engine:
                 and benefits_from_workers(len(self.components.pair_forces), int(state.count[CONTACTS]))
             ):
                 self._workers.start(table)
-            return Stop(self._program.run(driver, table))
+            return Stop(self._program_for(table).run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(queue)
             raise

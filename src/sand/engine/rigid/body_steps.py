@@ -30,7 +30,9 @@ from ...basics.state import (
     WOKEN,
     State,
 )
-from ...compiler.stage import Stage
+from ...compiler.stage import PythonStage, Stage
+from ...compiler.table import Table
+from ...contact.gather import resort_contacts_by_grain
 from ...integrate.parts import DT, Stop
 from ...integrate.rigid.awake_clusters import (
     ClusterMeasures,
@@ -135,6 +137,18 @@ class BodySteps(GrainSteps):
         """Stages of bodies; those of awake grains are the ones of all grains with other loops over pairs."""
         quick = [] if self.quick is None else self.quick.drivers()
         return [*super().drivers(), (advance_bodies, ()), (mark_near_bodies, ()), *quick]
+
+    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Stages of awake clusters."""
+        inner = self.awake.engine
+        own: list[tuple[Stage, Any]] = [
+            (measure_clusters_stage(inner.law), cluster_measures(1)),
+            (kick_clusters, (self._remainder,)),
+            (resort_contacts_by_grain, ()),
+        ]
+        own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
+        of_inner = inner.first_table()
+        return [(table, store_rest, ()), *inner.stages(of_inner), *((of_inner, *each) for each in own)]
 
     def begin(self, engine: Engine) -> None:
         """Make a body of each grain without contacts; clusters are awake."""
