@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..analysis.body_motion import BodyMotion, temperatures_of
+from ..analysis.body_motion import temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..basics.constants import BOLTZMANN
@@ -38,49 +38,9 @@ NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size
 LOST_WALLS = "lost_walls"
 """Column of the energy that moving walls took from grains and contacts; only with walls."""
 COUNTED = {"step", "time", *NUMBERS, AWAKE}
-"""Columns that need no energies, see `count_row`."""
+"""Columns that need no energies, see `Ledger.counts_of`."""
 WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
 """Columns of whole numbers."""
-
-
-def log_row(
-    state: State,
-    lost: Sequence[float],
-    clusters: Mapping[str, float],
-    bodies: BodyMotion,
-    of_contacts: Sequence[float],
-    forces: dict[str, float],
-    walls: Sequence[str] = (),
-) -> dict[str, float]:
-    """Compute one row of the ledger: energies, losses [J], momenta (SI), temperatures of bodies [K], counts.
-
-    Parameters
-    ----------
-    lost : Sequence[float]
-        Losses [J] up to this time, see `Engine.losses`.
-    clusters : Mapping[str, float]
-        Numbers of clusters, see `cluster_numbers`.
-    bodies : BodyMotion
-        Motion of the bodies.
-    of_contacts : Sequence[float]
-        Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
-    forces : dict[str, float]
-        Energy [J] of each long-range and per-grain force by column.
-    walls : Sequence[str], optional
-        Columns of the walls, see `walls.wall_columns`.
-    """
-    energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *of_contacts]
-    counts = count_row(state, clusters)
-    row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
-    row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
-    row |= dict(zip(LOSSES, lost, strict=True))
-    moved = {LOST_WALLS: -math.fsum(state.walls.work)} if walls else {}
-    row |= moved
-    row["total"] = math.fsum([*energies, *forces.values(), *lost, *moved.values()])
-    row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
-    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
-    row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
-    return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
 def cluster_numbers(state: State) -> dict[str, float]:
@@ -88,21 +48,6 @@ def cluster_numbers(state: State) -> dict[str, float]:
     pairs = state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64)
     sizes = np.bincount(labels_of(len(state.grains), pairs))
     return {"clusters": len(sizes), "mean_cluster_size": mean_size(sizes), "largest_cluster": int(sizes.max())}
-
-
-def count_row(state: State, clusters: Mapping[str, float]) -> dict[str, float]:
-    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, which are given."""
-    at_rest = state.at_rest
-    return {
-        "step": state.steps,
-        "time": state.time,
-        "contacts": int(state.count[CONTACTS]),
-        "made": int(state.count[MADE]),
-        "moved": int(state.count[SLIPPED]),
-        "broken": int(state.count[BROKEN]),
-        **clusters,
-        **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
-    }
 
 
 def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:
@@ -165,14 +110,25 @@ class Ledger(LedgerColumns):
         return True
 
     def row_of(self, engine: Engine) -> dict[str, float]:
-        """The row of the present state of an engine."""
-        found = engine.losses().tolist(), self._cluster_numbers(engine), engine.body_motion()
-        row = log_row(engine.state, *found, engine.contact_energies(), engine.force_energies(), self.walls)
-        return dict.fromkeys(self.columns, 0.0) | row  # 0 for forces that a change left out
+        """The row of the present state of an engine: energies, losses [J], momenta (SI), temperatures [K], counts."""
+        lost, bodies, state = engine.losses().tolist(), engine.body_motion(), engine.state
+        energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *engine.contact_energies()]
+        forces, moved = engine.force_energies(), {LOST_WALLS: -math.fsum(state.walls.work)} if self.walls else {}
+        row = dict.fromkeys(self.columns, 0.0)  # 0 for forces that a change left out
+        row |= self.counts_of(engine) | dict(zip((*KINETIC, *ENERGIES, *LOSSES), (*energies, *lost), strict=True))
+        row |= forces | moved | {"total": math.fsum([*energies, *forces.values(), *lost, *moved.values()])}
+        row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
+        row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
+        row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
+        return row | wall_row(state, self.walls)
 
     def counts_of(self, engine: Engine) -> dict[str, float]:
-        """The part of the row of the present state that needs no energies."""
-        return count_row(engine.state, self._cluster_numbers(engine))
+        """The part of the row of the present state that needs no energies: step, time [s], contacts and clusters."""
+        state, at_rest = engine.state, engine.state.at_rest
+        numbers = {"contacts": CONTACTS, "made": MADE, "moved": SLIPPED, "broken": BROKEN}
+        row: dict[str, float] = {"step": state.steps, "time": state.time}
+        row |= {name: int(state.count[k]) for name, k in numbers.items()} | self._cluster_numbers(engine)
+        return row | ({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))})
 
     def _cluster_numbers(self, engine: Engine) -> dict[str, float]:
         """Numbers of clusters, found anew after contacts have formed or broken."""
