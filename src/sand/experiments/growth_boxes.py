@@ -16,7 +16,7 @@ from ..errors import BadInput, shown, warn
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
-from ..simulation.serialise import case_of
+from ..simulation.serialise import case_of, changed_tables
 from .executors import results_of
 from .growth_case import DEFAULT_SEEDS, read_growth
 from .job import Job, Progress, ignored
@@ -222,8 +222,7 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     until = case.run.until
     if checkpoint_files(place):
         simulation = resume(place, observers=own)
-        requested, stored = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
-        if changed := [name for name in requested if name != "run" and requested[name] != stored[name]]:
+        if changed := changed_tables(simulation_of(case, None), simulation):
             raise BadInput(
                 f"{place} contains a run with different [{changed[0]}]; give another folder, or the same case"
             )

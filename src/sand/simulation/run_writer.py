@@ -41,7 +41,6 @@ from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
 from ..version import __version__
-from .cadence import read_cadence
 from .contact_table import measured_columns
 from .displays import DISPLAYS
 from .ledger import Ledger
@@ -209,13 +208,10 @@ class RunWriter:
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
         """Write a checkpoint if it is due by the cadence of the simulation, or if the last one is old enough."""
-        if simulation.checkpoint_every is not None:
-            cadence = read_cadence(simulation.checkpoint_every, "checkpoint_every", wall_time=True)
-            if due or (cadence.kind == "wall" and monotonic() - self._saved > cadence.every):
-                self.save(simulation)
-            return
-        cheap = max(AT_OUTPUT_EVERY, self._took / COST)
-        if monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY):
+        if simulation.checkpoint_every is None:
+            cheap = max(AT_OUTPUT_EVERY, self._took / COST)
+            due = monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY)
+        if due:
             self.save(simulation)
 
     def save(self, simulation: Simulation) -> None:
