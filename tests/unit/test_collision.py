@@ -10,7 +10,8 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.experiments.collision import approach, collide, collide_many
-from sand.experiments.collision_case import read_collision, run_seeds
+from sand.experiments.collision_case import read_collision
+from sand.experiments.collision_job import CollisionJob
 from sand.experiments.collision_outcome import collision_title
 from sand.io.read_grains import read_body
 from sand.setup import chain, grain, pca
@@ -96,12 +97,9 @@ def test_a_case_in_processes(tmp_path):
     """Worker processes read the case themselves and give the results of the parent."""
     path = tmp_path / "hit.toml"
     path.write_text(CASE)
-    read_collision(path)
-    from sand.io.run_folder import read_toml
-
-    here = run_seeds(read_toml(path), [1, 2])
+    here = CollisionJob(path, tmp_path / "here").run()["collisions"]
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        assert run_seeds(read_toml(path), [1, 2], pool) == here
+        assert CollisionJob(path, tmp_path / "there").run(pool)["collisions"] == here
 
 
 @pytest.mark.compiled("contacts", "small")

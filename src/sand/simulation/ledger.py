@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..analysis.body_motion import BodyMotion, temperatures_of
+from ..analysis.body_motion import temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..basics.constants import BOLTZMANN
@@ -36,49 +36,9 @@ OF_MOTION = (*MOMENTA, CORRECTION, INTERNAL, *TEMPERATURES)
 """Columns of the motion that are not part of the total energy."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 COUNTED = {"step", "time", *NUMBERS, AWAKE}
-"""Columns that need no energies, see `count_row`."""
+"""Columns that need no energies, see `Ledger.counts_of`."""
 WHOLE = {"step", *NUMBERS, AWAKE} - {"mean_cluster_size"}
 """Columns of whole numbers."""
-
-
-def log_row(
-    state: State,
-    lost: Sequence[float],
-    clusters: Mapping[str, float],
-    bodies: BodyMotion,
-    of_contacts: Sequence[float],
-    forces: dict[str, float],
-    extra: Sequence[Component] = (),
-) -> dict[str, float]:
-    """Compute one row of the ledger: energies, losses [J], momenta (SI), temperatures of bodies [K], counts.
-
-    Parameters
-    ----------
-    lost : Sequence[float]
-        Losses [J] up to this time, see `Engine.losses`.
-    clusters : Mapping[str, float]
-        Numbers of clusters, see `cluster_numbers`.
-    bodies : BodyMotion
-        Motion of the bodies.
-    of_contacts : Sequence[float]
-        Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
-    forces : dict[str, float]
-        Energy [J] of each long-range and per-grain force by column.
-    extra : Sequence[Component], optional
-        Components, such as walls, which may have columns of their own.
-    """
-    energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *of_contacts]
-    counts = count_row(state, clusters)
-    row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
-    row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
-    row |= dict(zip(LOSSES, lost, strict=True))
-    own = {name: value for each in extra for name, value in each.row(state).items()}
-    further = [own[name] for each in extra for name in each.losses()]
-    row["total"] = math.fsum([*energies, *forces.values(), *lost, *further])
-    row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
-    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
-    row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
-    return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | own
 
 
 def cluster_numbers(state: State) -> dict[str, float]:
@@ -86,21 +46,6 @@ def cluster_numbers(state: State) -> dict[str, float]:
     pairs = state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64)
     sizes = np.bincount(labels_of(len(state.grains), pairs))
     return {"clusters": len(sizes), "mean_cluster_size": mean_size(sizes), "largest_cluster": int(sizes.max())}
-
-
-def count_row(state: State, clusters: Mapping[str, float]) -> dict[str, float]:
-    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, which are given."""
-    at_rest = state.at_rest
-    return {
-        "step": state.steps,
-        "time": state.time,
-        "contacts": int(state.count[CONTACTS]),
-        "made": int(state.count[MADE]),
-        "moved": int(state.count[SLIPPED]),
-        "broken": int(state.count[BROKEN]),
-        **clusters,
-        **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
-    }
 
 
 def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:
@@ -166,14 +111,26 @@ class Ledger(LedgerColumns):
         return True
 
     def row_of(self, engine: Engine) -> dict[str, float]:
-        """The row of the present state of an engine."""
-        found = engine.losses().tolist(), self._cluster_numbers(engine), engine.body_motion()
-        row = log_row(engine.state, *found, engine.contact_energies(), engine.force_energies(), self._extra)
-        return dict.fromkeys(self.columns, 0.0) | row  # 0 for forces that a change left out
+        """The row of the present state of an engine: energies, losses [J], momenta (SI), temperatures [K], counts."""
+        lost, bodies, state = engine.losses().tolist(), engine.body_motion(), engine.state
+        energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *engine.contact_energies()]
+        forces, own = engine.force_energies(), {name: v for each in self._extra for name, v in each.row(state).items()}
+        further = [own[name] for name in self._further]
+        row = dict.fromkeys(self.columns, 0.0)  # 0 for forces that a change left out
+        row |= self.counts_of(engine) | dict(zip((*KINETIC, *ENERGIES, *LOSSES), (*energies, *lost), strict=True))
+        row |= forces | {"total": math.fsum([*energies, *forces.values(), *lost, *further])}
+        row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
+        row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
+        row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
+        return row | own
 
     def counts_of(self, engine: Engine) -> dict[str, float]:
-        """The part of the row of the present state that needs no energies."""
-        return count_row(engine.state, self._cluster_numbers(engine))
+        """The part of the row of the present state that needs no energies: step, time [s], contacts and clusters."""
+        state, at_rest = engine.state, engine.state.at_rest
+        numbers = {"contacts": CONTACTS, "made": MADE, "moved": SLIPPED, "broken": BROKEN}
+        row: dict[str, float] = {"step": state.steps, "time": state.time}
+        row |= {name: int(state.count[k]) for name, k in numbers.items()} | self._cluster_numbers(engine)
+        return row | ({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))})
 
     def _cluster_numbers(self, engine: Engine) -> dict[str, float]:
         """Numbers of clusters, found anew after contacts have formed or broken."""

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 from ..engine.component import present
 from ..forces.base import LongRangeForce
 from .cadence import SHORTEST_DURATION
+
+
+def changed_tables(one: Any, other: Any) -> list[str]:
+    """Names of the tables in which the cases of two simulations differ, [run] excepted."""
+    first, second = (case_of(each, math.inf, math.inf) for each in (one, other))
+    return [name for name in first if name != "run" and first[name] != second[name]]
 
 
 def case_of(simulation: Any, until: float, last_step: float, stop: str | None = None) -> dict[str, Any]:
