@@ -89,8 +89,6 @@ if TYPE_CHECKING:
     from .forces.pair.inverse_square import Attraction as Attraction
     from .forces.pair.inverse_square import Charges as Charges
     from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
-    from .integrate.adaptive import Adaptive as Adaptive
-    from .integrate.forest_ruth import ForestRuth as ForestRuth
     from .integrate.rigid.rigid_clusters import RigidClusters as RigidClusters
     from .integrate.verlet import Verlet as Verlet
     from .neighbours.search import Neighbours as Neighbours

@@ -27,8 +27,7 @@ OBJECTS = [
     sand.ElectricField((0, 1e3, 0)),
     sand.Field("1 mT", shape="rotating", amplitude=(2e-3, 0, 0), frequency="1 kHz", phase="90 deg", axis=(0, 0, 1)),
     sand.Verlet(step="1 ps", far="taylor", far_steps=12),
-    sand.Adaptive(tolerance=1e-7),
-    sand.ForestRuth(step="2 ns"),
+    sand.RigidClusters(longest_step="2 ns"),
     sand.Neighbours("cells", margin=1e-7),
 ]
 

@@ -67,7 +67,7 @@ def test_taylor_rate_of_the_torque():
     from sand.basics.arrays import empty_long_range_arrays
     from sand.compiler.jit import kernel
     from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
-    from sand.integrate.respa import clear_rates, set_mean_velocities
+    from sand.integrate.taylor import clear_rates, set_mean_velocities
 
     sum_rates = ALL_PAIRS_CUT.rates
 

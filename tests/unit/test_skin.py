@@ -20,6 +20,8 @@ from sand.integrate.parts import Stop
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.skin import largest_displacement, largest_squared_speeds
 
+from ..plugins import ForestRuth
+
 
 def dense_gas(forces=None, margin="auto", **options):
     """Sixty grains in a periodic box, with cells or a list, so fast that lists are rebuilt every few dozen steps."""
@@ -34,8 +36,7 @@ CASES = {
     "contacts": {},
     "contacts, listed": {"margin": "5 nm"},
     "cycles and gas": {"forces": (sand.Contact(), sand.Dipoles(), sand.Gas("3e4 K", pressure="1 bar"))},
-    "flights": {"stepping": sand.Adaptive()},
-    "steps of fourth order": {"stepping": sand.ForestRuth()},
+    "steps of fourth order": {"stepping": ForestRuth()},
 }
 
 

@@ -101,14 +101,6 @@ class WallArrays(NamedTuple):
     touching: np.ndarray  # (W, N) uint8: 1 for grains in contact with the wall
 
 
-class RungeKuttaArrays(NamedTuple):
-    """Buffers for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Not saved."""
-
-    start: np.ndarray  # (13, N) state at the start of the step
-    rate: np.ndarray  # (7, 13, N) rates of change at each stage
-    power: np.ndarray  # (7,) power of the external forces at each stage [W]
-
-
 class ClusterArrays(NamedTuple):
     """Memory for the settling of clusters, one at a time.  Not saved."""
 
@@ -277,11 +269,6 @@ def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = Fals
     inner = np.zeros(p // PAIRS_PER_INNER_ENTRY, np.uint32)
     types = np.zeros((2, 1 if uniform_contacts else p))
     return PairList(pair, in_contact, types[0], types[1], anchor, inner, np.full(7, -1.0))
-
-
-def runge_kutta_arrays(grains: int) -> RungeKuttaArrays:
-    """Allocate the buffers of the Runge–Kutta integrator; `grains` is 0 if it is not used."""
-    return RungeKuttaArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
 def wall_arrays(walls: int, grains: int) -> WallArrays:

@@ -24,13 +24,11 @@ from .arrays import (
     ContactArrays,
     LongRangeArrays,
     PairList,
-    RungeKuttaArrays,
     WallArrays,
     body_arrays,
     cluster_arrays,
     empty_contact_arrays,
     grown,
-    runge_kutta_arrays,
     wall_arrays,
 )
 from .box import Box
@@ -82,7 +80,7 @@ LONG_RANGE_SUMS = 11  # summations of long-range forces
 CHECKED = 12  # step at which the time step was last chosen
 STEP_INCREASES = 13  # step at which the time step was last allowed to increase
 REJECTED = 14  # rejected steps without contacts, of integrators other than Verlet
-NEEDED = 15  # step at which a time step as short as LEVEL, or FLIGHT of ForestRuth, was last needed
+NEEDED = 15  # step at which a time step as short as LEVEL, or as FLIGHT, was last needed
 ORDERED = 16  # step of the last spatial sort
 COMPARED = 17  # contacts formed and broken when the cut-off was last compared with the clusters; −1: it is fixed
 WALL_CONTACTS = 18  # contacts with walls in use
@@ -125,7 +123,7 @@ RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
 contact does not exist."""
 
 
-GROUPS = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts", "bodies")
+GROUPS = ("contacts", "pair_list", "long_range", "clusters", "walls", "wall_contacts", "bodies")
 """Groups of arrays of a state, besides its grains."""
 SINGLE = ("clock", "count", "lost", "cutoff", "order")
 """Its other arrays."""
@@ -149,7 +147,6 @@ class State:
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     cutoff: np.ndarray = field(default_factory=lambda: np.zeros(len(CUTOFF)))
-    runge_kutta: RungeKuttaArrays = field(default_factory=lambda: runge_kutta_arrays(0))
     clusters: ClusterArrays = field(default_factory=lambda: cluster_arrays(0))
     walls: WallArrays = field(default_factory=lambda: wall_arrays(0, 0))
     wall_contacts: ContactArrays = field(default_factory=lambda: empty_contact_arrays(0, 0, 0))

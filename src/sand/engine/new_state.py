@@ -16,7 +16,6 @@ from ..basics.arrays import (
     empty_contact_arrays,
     empty_long_range_arrays,
     empty_pair_list,
-    runge_kutta_arrays,
 )
 from ..basics.box import Box
 from ..basics.grains import Grains
@@ -72,7 +71,6 @@ def new_state(
             all_blocks(grains) if pair_forces and over_all_pairs else 0,
             unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
-        runge_kutta=runge_kutta_arrays(count if components.flight else 0),
         clusters=cluster_arrays(count if settings.settling_time < math.inf else 0),
         uniform_contacts=uniform_contacts,
     )

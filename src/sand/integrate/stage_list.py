@@ -13,7 +13,7 @@ from ..contact.damping import DASHPOTS, NONE, THERMAL
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..forces.pair.long_range_loops import LongRangeSums
-from . import stages
+from . import stages, taylor
 from .driven import DrivenArrays, drive
 from .force_stages import (
     EXTERNAL_STAGES,
@@ -38,7 +38,7 @@ class Components(NamedTuple):
     law: ContactLaw
     pair_forces: Sequence[tuple[LongRangeSums, Any]]  # loops and parameters of each
     external_forces: Sequence[tuple[Callable, Any]]  # formula and parameters of each
-    flight: Stage | None  # takes one step while there are no contacts (base.Integrator); None: velocity Verlet
+    flight: Stage | None  # takes one step while there are no contacts (integrator.Integrator); None: velocity Verlet
     gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
@@ -62,9 +62,9 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     if parameters.settings.on:
         found |= _contact_stages(given, parameters)
     if respa.taylor:
-        found[StageNumber.PREPARE_RATES] = stages.prepare_rates
-        found[StageNumber.STORE_POSITIONS] = stages.store_summation_positions
-        found[StageNumber.EXTRAPOLATE] = stages.extrapolate
+        found[StageNumber.PREPARE_RATES] = taylor.prepare_rates
+        found[StageNumber.STORE_POSITIONS] = taylor.store_summation_positions
+        found[StageNumber.EXTRAPOLATE] = taylor.extrapolate
     if given.gas:
         found[StageNumber.GAS_KICK] = stages.kick_by_gas
     if given.flight is not None:

@@ -28,8 +28,7 @@ from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
 from .motion import UNBOUNDED, drift_for, gather_and_kick
-from .parts import CYCLE_LENGTH, DT, SINCE, Stop
-from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions
+from .parts import DT, Stop
 from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_finite, set_wall_step
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
@@ -267,30 +266,6 @@ def gather_and_kick_stage(long_vectors: bool) -> Stage:
         return 0
 
     return gather_loads_and_kick
-
-
-@stage("the rates of Taylor series")
-def prepare_rates(grains, contacts, long_range, clock, span, respa, scratch):
-    """Before the rates of pair forces are summed: mean velocities, and rates of 0."""
-    # a mean over much less than the extrapolated time is dominated by oscillations
-    past = clock[CYCLE] if clock[CYCLE] >= 0.5 * scratch[CYCLE_LENGTH] else 0.0
-    set_mean_velocities(grains, long_range, contacts.start, span, past, respa.instantaneous_rates)
-    clear_rates(long_range)
-    return 0
-
-
-@stage("the rates of Taylor series")
-def store_summation_positions(grains, long_range):
-    """Store positions and moments of this summation."""
-    store_positions(grains, long_range)
-    return 0
-
-
-@stage("the extrapolation of long-range loads")
-def extrapolate(grains, long_range, scratch):
-    """Add the extrapolated long-range loads."""
-    add_extrapolated_loads(grains, long_range, scratch[SINCE])
-    return 0
 
 
 @loop

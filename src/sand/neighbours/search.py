@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
 from ..basics.grains import Grains
-from ..basics.units import format_quantity, is_word, si
-from ..errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..basics.settings import Number, Settings, Word
+from ..basics.units import format_quantity
 from .cell_list import Search
 
-SEARCHES = ("auto", "cells", "all pairs")
-ORDERS = ("auto", "curve", "as given")
 MARGIN = 0.1
 """Skin of the Verlet list relative to the cut-off, Δr/r_c; the paper uses 0.3–0.4."""
-ADAPTIVE_MARGIN = 0.35
-"""The same for integrators with steps of their own without contacts (`Adaptive`), whose length the skin limits."""
+LONG_STEP_MARGIN = 0.35
+"""The same for integrators with steps of their own without contacts, whose length the skin limits."""
 LIST_FROM = 64
 """Fewest grains for which "auto" uses cells or a Verlet list."""
 LIST_UP_TO = 0.4
@@ -67,7 +65,7 @@ class ChosenSearch(NamedTuple):
 
 @checked
 @dataclass(frozen=True)
-class Neighbours:
+class Neighbours(Settings):
     """Settings of the neighbour search for contacts and long-range forces.
 
     Parameters
@@ -77,11 +75,11 @@ class Neighbours:
         pairs are examined, in every long-range sum and whenever the candidate pairs for contacts are listed.  "auto":
         cells from 64 grains on, if initially at most 0.4 of the other grains are within reach of a grain, on average.
     margin : float or str, optional
-        Skin of the Verlet list Δr [m] > 0, or "auto": 0.1 of the cut-off, or 0.35 with adaptive (Runge–Kutta) steps,
-        whose length the skin limits.  The list is rebuilt when a grain has moved by more than Δr/2; a large margin
-        makes lists longer, but rebuilds rarer.  If no force has a cut-off, "auto" builds no Verlet list: candidate
-        pairs for contacts are found with the cells.  With adaptive steps it builds one all the same; its skin is then
-        half the largest gap of candidate pairs.
+        Skin of the Verlet list Δr [m] > 0, or "auto": 0.1 of the cut-off, or 0.35 with an integrator of your own whose
+        steps without contacts the skin limits.  The list is rebuilt when a grain has moved by more than Δr/2; a large
+        margin makes lists longer, but rebuilds rarer.  If no force has a cut-off, "auto" builds no Verlet list:
+        candidate pairs for contacts are found with the cells.  With such an integrator it builds one all the same; its
+        skin is then half the largest gap of candidate pairs.
     order : str, optional
         Order of grains in memory while stepping.  "curve": Morton order, renewed every 2000 steps, so that neighbours
         in space are neighbours in memory; "as given": the user's order; "auto": "curve" from 4000 grains on.  Input and
@@ -97,29 +95,11 @@ class Neighbours:
     No choice changes results by more than rounding errors.
     """
 
-    search: str = "auto"
-    margin: Any = "auto"
-    order: str = "auto"
+    search: Annotated[str, Word("auto", "cells", "all pairs")] = "auto"
+    margin: Annotated[Any, Number("m", above=0.0, auto=True)] = "auto"
+    order: Annotated[str, Word("auto", "curve", "as given")] = "auto"
 
-    __pydantic_config__ = FORBID_EXTRA
-
-    def __post_init__(self) -> None:
-        problems = []
-        for name, allowed in (("search", SEARCHES), ("order", ORDERS)):
-            value = getattr(self, name)
-            if value not in allowed:
-                problems.append(f"neighbours: {name} = {value!r}; {did_you_mean(str(value), allowed)}")
-        if not is_word(self.margin, "auto"):
-            try:
-                object.__setattr__(self, "margin", si(self.margin, "m", "neighbours: margin", above=0.0))
-            except BadInput as error:
-                problems += error.problems
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units."""
-        return {"search": self.search, "margin": self.margin, "order": self.order}
+    place: ClassVar[str] = "neighbours"
 
     def uses_spatial_sort(self, count: int) -> bool:
         """Whether `count` grains are sorted in memory."""
@@ -132,7 +112,7 @@ class Neighbours:
         return Neighbours(method, search.margin or "auto", order)  # a margin would request a Verlet list
 
     def choose(
-        self, grains: Grains, box: Box, pair_gap: float, cutoffs: Sequence[float], *, adaptive_steps: bool = False
+        self, grains: Grains, box: Box, pair_gap: float, cutoffs: Sequence[float], *, long_steps: bool = False
     ) -> ChosenSearch:
         """Choose the search method for these grains.
 
@@ -146,7 +126,7 @@ class Neighbours:
             Gap [m] up to which pairs are candidates for contacts.
         cutoffs : Sequence[float]
             Cut-off radii [m] of the long-range forces that have one.
-        adaptive_steps : bool, optional
+        long_steps : bool, optional
             Whether the skin of the list limits the length of steps.
 
         Returns
@@ -157,10 +137,10 @@ class Neighbours:
         contact_reach = 2.0 * float(grains.radius.max()) + pair_gap
         widest = max(cutoffs, default=0.0)
         # candidate pairs are found with cells, or in the Verlet list; without a cut-off the skin is half their gap
-        celled = widest == 0.0 and self.margin == "auto" and not adaptive_steps
+        celled = widest == 0.0 and self.margin == "auto" and not long_steps
         margin = 0.0 if celled else self.margin
         if margin == "auto":
-            margin = (ADAPTIVE_MARGIN if adaptive_steps else MARGIN) * widest if widest > 0.0 else 0.5 * pair_gap
+            margin = (LONG_STEP_MARGIN if long_steps else MARGIN) * widest if widest > 0.0 else 0.5 * pair_gap
         list_reach = max(widest, contact_reach) + margin
         all_pairs, distance = Search(False, list_reach, margin), format_quantity(list_reach, "m")
         if self.search == "all pairs":
