@@ -35,7 +35,7 @@ __all__ = ["compile_ahead", "compile_free", "kernel_from", "number_of_helpers", 
 
 WORTH_HELPERS = 6.0
 """Expected time [s] of compilation from which on helpers save time."""
-HELPER_BYTES = 4.5e8
+HELPER_BYTES = 5e8
 """Memory that a helper needs (measured)."""
 LOOK = 0.05
 """Wall time [s] between two looks whether other processes have compiled the last stages."""
@@ -81,7 +81,7 @@ def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], proc
     """
     tasks = _missing(stages) if COMPILED else []
     total = sum(each.seconds for each in tasks)
-    if total < WORTH_HELPERS:
+    if not tasks or total < WORTH_HELPERS:
         return
     alone, wanted = not _is_one_of_several[0], number_of_helpers(processes, total, max(each.seconds for each in tasks))
     if alone and not wanted:
