@@ -116,6 +116,8 @@ def _mark(item: pytest.Item, tier: str | None) -> None:
         if item.get_closest_marker("compiled") is None:
             item.add_marker(pytest.mark.compiled(FIXTURES[name]))
     mark = item.get_closest_marker("compiled")
+    if tier is not None:  # only default tests expect all of their warnings
+        item.add_marker(pytest.mark.filterwarnings("default"), append=False)
     if mark is None and tier is None and "slow" not in item.keywords:
         item.add_marker(pytest.mark.quick)
     if mark is not None:
