@@ -218,9 +218,9 @@ def test_case_and_ledger_are_restored_from_the_checkpoint(tmp_path):
     case, ledger = (folder / "case.toml").read_text(), (folder / "ledger.csv").read_text()
     (folder / "case.toml").unlink()
     (folder / "ledger.csv").write_text("step,time\n7,nonsense")
+    assert sand.resume(folder).ledger.rows == sim.ledger.rows
     with pytest.warns(UserWarning, match="did not hold what the run had written"):
-        assert sand.resume(folder).ledger.rows == sim.ledger.rows
-    sand.resume(folder).run()
+        sand.resume(folder).run()
     assert (folder / "case.toml").read_text() == case
     assert (folder / "ledger.csv").read_text() == ledger
     (folder / "case.toml").write_text(case.replace("density = ", "density = 1"))

@@ -224,6 +224,7 @@ def failing_work(item):
     return 2 * item
 
 
+@pytest.mark.filterwarnings("default")
 def test_warnings_of_other_processes_are_issued_here():
     """`done_apart` returns the texts, each once; in the same process they are issued as ever."""
     assert done_apart(-1, lambda item: [failing_work(item) for _ in range(2)], 3) == ([6, 6], ["item 3"])
