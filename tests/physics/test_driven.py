@@ -106,6 +106,7 @@ def magnetic_gas(**options):
     return sand.Simulation(grains, forces, box="0.25 um", seed=4, driven=driven, frame_every="2 ns", **options)
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
 @pytest.mark.compiled("dipoles")
 def test_a_gas_with_driven_grains_closes_its_ledger_and_is_resumed_bit_for_bit(tmp_path):
     """Positions of fixed grains stay the same bits, driven ones move as prescribed; the case file holds the drive."""

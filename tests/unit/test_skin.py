@@ -146,6 +146,7 @@ def test_a_pair_that_separates_and_meets_again_is_found():
     assert seen > 3
 
 
+@pytest.mark.filterwarnings("ignore:grains spin too fast for a solid")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.TOO_FAST, 2), (0.0, Stop.SPINS_TOO_FAST, 0)])
 def test_an_outcome_names_the_limiting_grain(speed, stop, culprit):

@@ -369,6 +369,7 @@ def steps_until(s):
 
 @stage(
     "the time steps",
+    seconds=8.0,
     parts=(*DRIVER_PARTS, "contacts", "settings", "respa"),
 )
 def advance(s):
