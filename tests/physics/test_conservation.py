@@ -294,8 +294,8 @@ def test_twist_is_integrated_to_second_order():
     ("kind", "speed"),
     [
         ("lattice", 20.0),
-        ("pca", 20.0),
-        *(pytest.param(k, v, marks=pytest.mark.validate) for k in ("lattice", "pca") for v in (1.0, 5.0)),
+        ("bpca", 20.0),
+        *(pytest.param(k, v, marks=pytest.mark.validate) for k in ("lattice", "bpca") for v in (1.0, 5.0)),
     ],
 )
 def test_energy_balance_of_aggregate_collisions(kind, speed):
@@ -304,12 +304,12 @@ def test_energy_balance_of_aggregate_collisions(kind, speed):
     At the default step Verlet's error is (ω dt)²/8 of the ringing energy; impacts are resolved to δ_c per step.
     """
     from sand.experiments.collision import collide
-    from sand.setup import lattice, pca
+    from sand.setup import bpca, lattice
 
     def body(seed):
         if kind == "lattice":
             return lattice(5, radius=3e-7, material=sand.SILICA)
-        return pca(64, radius=3e-7, material=sand.SILICA, seed=seed)
+        return bpca(64, radius=3e-7, material=sand.SILICA, seed=seed)
 
     result, sim = collide(body(1), body(2), speed=speed, seed=3)
     assert result.made > 0

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import sand
 from sand.basics.state import BROKEN, CLOCK, IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP, LEAST_CLOCK
 from sand.contact.dmt import LAW as DMT
-from sand.contact.impact import impact_overlap, impact_pressure, impact_share
+from sand.contact.impact import impact_share
 from sand.contact.jkr import LAW as JKR
 from sand.contact.law import contact_periods, largest_pull
 from sand.engine.input_checks import check_system
@@ -48,6 +48,16 @@ def run_texts(make, **until):
 
 
 # --- impacts and overlaps ----------------------------------------------------------------------------------------
+
+
+def impact_overlap(share):
+    """Largest overlap δ/R = (10π s²)^(2/5) of an impact of s = `share` between spheres without adhesion."""
+    return (10.0 * math.pi * share * share) ** 0.4
+
+
+def impact_pressure(share):
+    """Largest pressure p₀/E* = (2/π) (10π s²)^(1/5) of such an impact."""
+    return 2.0 / math.pi * (10.0 * math.pi * share * share) ** 0.2
 
 
 def hertz(speed, r1, r2, material):

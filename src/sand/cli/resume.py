@@ -17,7 +17,7 @@ from .collide import collide
 from .grow import boxes
 from .scatter import scatter
 
-RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
+RESULT_FILES = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 """Results file of a finished job, by command."""
 
 
@@ -76,9 +76,9 @@ def _kind(folder: Path) -> str:
 
 def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) -> None:
     """Continue a job of `sand collide`, `sand scatter` or `sand grow`."""
-    if (folder / RESULTS[kind]).exists():
-        content = {**read_json(folder / RESULTS[kind]), "folder": str(folder)}
-        text = f"{folder} is finished; its results are in {folder / RESULTS[kind]}"
+    if (folder / RESULT_FILES[kind]).exists():
+        content = {**read_json(folder / RESULT_FILES[kind]), "folder": str(folder)}
+        text = f"{folder} is finished; its results are in {folder / RESULT_FILES[kind]}"
         report.answer(content, text, [], as_json=how["as_json"], quiet=how["quiet"])
     elif kind == "grow":
         from ..experiments.growth_case import read_growth

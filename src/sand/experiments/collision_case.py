@@ -28,9 +28,7 @@ from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, prepare, run_to_end
 from .executors import results_of
 
-BodyKind = Literal[
-    "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
-]
+BodyKind = Literal["grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd", "file"]
 """Names of the builders in `setup.aggregates.KINDS`, and "file"."""
 
 

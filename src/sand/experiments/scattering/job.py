@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadInput
-from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_toml, write_json, write_toml
+from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS_CSV, SCATTERING, read_toml, write_json, write_toml
 from ...io.table import GrowingTable, write_table
 from ...plotting.run_figure import save
 from ...simulation.run_writer import versions
@@ -110,7 +110,7 @@ class Job:
         ]
         rows = [one.to_dict() for one in found]
         flat = [{k: v for k, v in row.items() if k not in ("profile", "interval", "seconds")} for row in rows]
-        write_table(self.folder / RESULTS, flat)
+        write_table(self.folder / RESULTS_CSV, flat)
         save(sigma_figure(found, _title(self.flights)), self.folder / FIGURE)
         return {"cross_sections": rows}
 
@@ -129,7 +129,7 @@ class Job:
             progress=lambda n, total: progress(f"{n} of {total} flights", n / total),
         )
         rows = found.to_rows()
-        write_table(self.folder / RESULTS, rows)
+        write_table(self.folder / RESULTS_CSV, rows)
         save(map_figure(found, _title(self.flights)), self.folder / FIGURE)
         return {
             "cells": rows,
@@ -147,7 +147,7 @@ class Job:
             for n, b in enumerate(self.case.impact_parameters(one)):
                 groups[-1].append(trajectory(one, b, seed=self.case.measure.seed, stratum=k, number=n))
                 progress(f"flight {n + 1} of set-up {k + 1}", k / len(self.flights))
-        write_table(self.folder / RESULTS, [row for k, group in enumerate(groups) for row in _path_rows(k, group)])
+        write_table(self.folder / RESULTS_CSV, [row for k, group in enumerate(groups) for row in _path_rows(k, group)])
         names = [str(spin) for spin in self.case.measure.spins or [self.case.flight.spin]]
         save(trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights)), self.folder / FIGURE)
         kept = ("end", "impact_parameter", "speed", "closest", "exchanged", "drift")
