@@ -221,17 +221,13 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
     sim = two_chains(longest_step="0.2 ns")
     sim.run(steps=2)
     engine, state = sim._engine, sim.regular_state
-    engine._list_awake()
+    steps = engine.taken
     assert not state.bodies.asleep.any()
     before, arrays = state.copy(), state.grains.arrays
-    engine._inner_state()
-    engine._finish_step = None  # no step is taken below
-    from sand.integrate.rigid.awake_clusters import cluster_measures, measure_clusters_stage
-
-    engine._measures = cluster_measures(6)
-    present = engine.inner._state
-    measure_clusters_stage(engine.law).run(engine._inner_table(present), engine._measures)
-    engine._rest(np.arange(3), present.clusters.offset[:, :3])
+    steps.sort_members(state)
+    present, steps._vibrated = steps._take_awake(state), np.zeros(6, bool)
+    steps._measure_vibrations(engine)
+    steps._rest(engine, np.arange(3), present.clusters.offset[:, :3])
     assert state.bodies.asleep.tolist() == [1, 1, 1, 0, 0, 0]
     old = before.grains.arrays
     for name in ("position", "orientation", "moment"):
@@ -251,10 +247,10 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
 
     removed = state.lost[QUIETING] - before.lost[QUIETING]
     assert removed == pytest.approx(kinetic(old) - kinetic(arrays), rel=1e-9, abs=1e-14 * kinetic(old))
-    assert removed == pytest.approx(engine._measures.vibration[0], rel=1e-6, abs=1e-14 * kinetic(old))
+    assert removed == pytest.approx(steps._measures.vibration[0], rel=1e-6, abs=1e-14 * kinetic(old))
     at_rest_state = state.copy()
     state.bodies.near[0] = 3
-    engine._wake()
+    steps._wake(engine)
     for name, array in at_rest_state.grains.arrays._asdict().items():
         assert array.tobytes() == getattr(state.grains.arrays, name).tobytes()
     assert not state.bodies.asleep.any()
@@ -817,7 +813,7 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     [
         ({"vibration": 0.2}, "stepping: vibration = 0.2 must be above 0 and at most 0.1"),
         ({"vibration": 0.0}, "stepping: vibration"),
-        ({"step_fraction": 1.0}, "stepping: step_fraction = 1 must be above 0 and at most 0.2"),
+        ({"step_fraction": 1.0}, "stepping: step_fraction = 1.0 must be above 0 and at most 0.2"),
         ({"longest_step": "1 m"}, "stepping: longest_step"),
         ({"contact_stepping": sand.Verlet(far="taylor")}, "far = 'taylor' is not possible with rigid clusters"),
     ],

@@ -136,7 +136,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     [
         ('kind = "bpca"\ngrains = 8', 'kind = "chain"\ngrains = 0', "target.grains = 0"),
         ('kind = "bpca"\ngrains = 8', 'kind = "chain"', "target: grains is missing: how many does the chain have?"),
-        ('kind = "bpca"', 'kind = "blob"', "target.kind = 'blob'"),
+        ('kind = "bpca"', 'kind = "blob"', "target.kind: kind = 'blob'; allowed: grain, chain"),
         ('"2 m/s"', '"2 m"', "impact.speed: speed = '2 m' is not a quantity in m/s|impact.speed: "),
         ('"2 m/s"', '"0 m/s"', "above 0"),
         ("seeds = [1, 2]", "sedes = [1, 2]", "impact.sedes: there is no such key; did you mean 'seeds'?"),

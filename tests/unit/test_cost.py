@@ -367,7 +367,7 @@ def test_substeps_are_no_contact_steps(monkeypatch):
     """Of 0.5 s for 10⁵ contact steps and 2000 substeps, 0.3 s and 0.1 s are expected: the ratio is 1.25."""
     sim = simulation()
     timer = cost.StepTimer(sim)
-    timer._rigid, timer._calls, work = True, 1, iter([(0, 0, 0.0), (100_000, 2000, 0.5)])
+    timer._moves_bodies, timer._calls, work = True, 1, iter([(0, 0, 0.0), (100_000, 2000, 0.5)])
     monkeypatch.setattr(type(sim._engine), "awake_work", property(lambda _: next(work)))
     with timer.steps():
         pass

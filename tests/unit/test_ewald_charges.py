@@ -339,7 +339,7 @@ def test_the_choice_and_a_net_charge_are_stated():
         (
             lambda: sand.Charges(periodic="ewald", cut="sharp", cutoff="0.1 um", accuracy=2, boundary="vacuum"),
             [
-                "charges: accuracy = 2 must be at most 0.1",
+                "charges: accuracy = 2 must be at least 1e-08 and at most 0.1",
                 "charges: cutoff = 1e-07 cannot be given with periodic = 'ewald'",
                 "charges: cut = 'sharp' cannot be given with periodic = 'ewald'",
                 "charges: boundary = 'vacuum' is for dipoles only",

@@ -159,8 +159,8 @@ def test_external_forces_add_up():
     ):
         engine = sand.Simulation(grains, forces)._engine
         parameters = engine.parameters._replace(external_work=ExternalWork(True, False))
-        table, own = engine._current_table(engine.state), engine.state.grains.arrays
-        program = build_program(engine._components, parameters, table)
+        table, own = engine.table_of(engine.state), engine.state.grains.arrays
+        program = build_program(engine.components, parameters, table)
         own.force[...] = own.torque[...] = 0.0
         table.set("program", program)
         add_external_loads(table, 0.0)

@@ -459,7 +459,7 @@ def test_shortest_relaxation_time(accommodation):
         ({"pressure": 0}, r"gas: pressure = 0 must be above 0 Pa"),
         ({"pressure": None, "density": -2.0}, r"gas: density = -2.0 must be above 0 kg/m\^3"),
         ({"molecule_mass": "0 kg"}, r"gas: molecule_mass = '0 kg' must be above 0 kg"),
-        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a fraction of the molecules and must be at most 1"),
+        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 must be at least 0 and at most 1"),
         ({"accommodation": -0.1}, r"gas: accommodation = -0.1 must be at least 0"),
         ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a number"),
         ({"brownian": "no"}, r"gas: brownian = 'no' must be true or false"),

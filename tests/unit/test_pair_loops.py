@@ -46,7 +46,7 @@ def test_blocked_sums_of_several_forces(order, monkeypatch):
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
-    (_, of_dipoles), (_, of_charges) = sim._engine._components.pair_forces
+    (_, of_dipoles), (_, of_charges) = sim._engine.components.pair_forces
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
     sums = {
         "listed dipoles": dipoles.LISTED_PAIRS,

@@ -124,7 +124,8 @@ def _readers(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[
             except (NameError, AttributeError, TypeError):  # names imported for the type checker only
                 continue
         plain = parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-        if plain and annotation is not parameter.empty:
+        declared = hasattr(annotation, "__metadata__")  # read by `settings.Settings`
+        if plain and not declared and annotation is not parameter.empty:
             allowed, numeric = _allowed_types(annotation), _is_numeric(annotation)
             if allowed or numeric:
                 unit = units.get(name, "1") if numeric else None

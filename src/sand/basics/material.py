@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from ..errors import BadInput, did_you_mean, shown
 from .arguments import checked
-from .units import si
-
-_RANGES: dict[str, tuple[str, dict[str, float]]] = {
-    "density": ("kg/m^3", {"above": 0.0}),
-    "surface_energy": ("J/m^2", {"least": 0.0}),
-    "young_modulus": ("Pa", {"above": 0.0}),
-    "poisson_ratio": ("1", {"above": -1.0}),
-    "rolling_limit": ("m", {"above": 0.0}),
-    "specific_moment": ("A m^2/kg", {"least": 0.0}),
-    "anisotropy": ("J/m^3", {}),
-    "exchange_stiffness": ("J/m", {"above": 0.0}),
-}
-"""Unit and lower limit of each number."""
-OPTIONAL = ("surface_energy", "anisotropy", "exchange_stiffness")
-"""Numbers that may be None, for unknown."""
-ANISOTROPIES = ("uniaxial", "cubic")
-"""Kinds of magnetic anisotropy."""
+from .settings import Number, Settings, Word
 
 
 @checked
 @dataclass(frozen=True)
-class Material:
+class Material(Settings):
     """Properties of one material. Numbers are in SI or text with a unit.
 
     Parameters
@@ -67,45 +52,25 @@ class Material:
     """
 
     name: str
-    density: Any
-    surface_energy: Any
-    young_modulus: Any
-    poisson_ratio: Any
-    rolling_limit: Any = "10 angstrom"
-    specific_moment: Any = 0.0
-    anisotropy: Any = None
-    exchange_stiffness: Any = None
-    anisotropy_kind: str = "uniaxial"
+    density: Annotated[Any, Number("kg/m^3", above=0.0)]
+    surface_energy: Annotated[Any, Number("J/m^2", least=0.0, none=True)]
+    young_modulus: Annotated[Any, Number("Pa", above=0.0)]
+    poisson_ratio: Annotated[Any, Number(above=-1.0, most=0.5)]
+    rolling_limit: Annotated[Any, Number("m", above=0.0)] = "10 angstrom"
+    specific_moment: Annotated[Any, Number("A m^2/kg", least=0.0)] = 0.0
+    anisotropy: Annotated[Any, Number("J/m^3")] = None
+    exchange_stiffness: Annotated[Any, Number("J/m", above=0.0)] = None
+    anisotropy_kind: Annotated[str, Word("uniaxial", "cubic")] = "uniaxial"
 
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        for key, (unit, limit) in _RANGES.items():
-            value = getattr(self, key)
-            if key in OPTIONAL and value is None:
-                continue
-            try:
-                number = si(value, unit, f"{self.name}: {key}", **limit)
-            except BadInput as error:
-                problems += error.problems
-                continue
-            if key == "poisson_ratio" and number > 0.5:
-                problems.append(f"{self.name}: poisson_ratio = {value!r} must not exceed 0.5")
-            object.__setattr__(self, key, number)
-        problems += self._wrong_anisotropy()
-        if problems:
-            raise BadInput(problems)
-
-    def _wrong_anisotropy(self) -> list[str]:
-        """Messages about the kind of anisotropy, and a K that it does not allow."""
-        if self.anisotropy_kind not in ANISOTROPIES:
-            kinds = did_you_mean(str(self.anisotropy_kind), ANISOTROPIES)
-            return [f"{self.name}: anisotropy_kind = {shown(self.anisotropy_kind)}; {kinds}"]
-        k = self.anisotropy
-        if isinstance(k, float) and (k == 0.0 or (k < 0.0 and self.anisotropy_kind == "uniaxial")):
-            allowed = "must be above 0 J/m^3" if self.anisotropy_kind == "uniaxial" else "must not be 0 J/m^3"
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """A K that the kind of anisotropy does not allow."""
+        k, kind = self.anisotropy, self.anisotropy_kind
+        if k is None or wrong & {"anisotropy", "anisotropy_kind"}:
+            return
+        if k == 0.0 or (k < 0.0 and kind == "uniaxial"):
+            allowed = "must be above 0 J/m^3" if kind == "uniaxial" else "must not be 0 J/m^3"
             cubic = "; K1 of a cubic crystal may be negative: anisotropy_kind = 'cubic'" if k < 0.0 else ""
-            return [f"{self.name}: anisotropy = {k:g} {allowed} if it is {self.anisotropy_kind}{cubic}"]
-        return []
+            yield f"anisotropy = {k:g} {allowed} if it is {kind}{cubic}"
 
     @property
     def shear_modulus(self) -> float:

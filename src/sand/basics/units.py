@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import re
 from decimal import Decimal
 from typing import Any
@@ -71,14 +72,15 @@ def si(
     number = finite_number(value, unit, name)
     label = f"{name} = {shown(value)}"
     in_units = "" if unit == "1" else f" {unit}"
-    if above is not None and not number > above:
-        raise BadInput(f"{label} must be above {above:g}{in_units}")
-    if least is not None and not number >= least:
-        raise BadInput(f"{label} must be at least {least:g}{in_units}")
-    if below is not None and not number < below:
-        raise BadInput(f"{label} must be below {below:g}{in_units}")
-    if most is not None and not number <= most:
-        raise BadInput(f"{label} must be at most {most:g}{in_units}")
+    bounds = (
+        ("above", above, operator.gt),
+        ("at least", least, operator.ge),
+        ("below", below, operator.lt),
+        ("at most", most, operator.le),
+    )
+    if not all(bound is None or holds(number, bound) for _, bound, holds in bounds):
+        allowed = " and ".join(f"{words} {bound:g}" for words, bound, _ in bounds if bound is not None)
+        raise BadInput(f"{label} must be {allowed}{in_units}")
     if unit == "m/s" and below is None and not abs(number) < LIGHT:
         raise BadInput(f"{label} is not below the speed of light, {LIGHT:.4g} m/s")
     if reason := too_large(abs(number), unit):

@@ -254,7 +254,7 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
 
     every = simulation.frame_every
     if every is None:
-        chosen = chosen_cadence(simulation.time, end, simulation._chosen)
+        chosen = chosen_cadence(simulation.time, end, simulation._continuation.chosen)
         every = math.inf if chosen is None else chosen.every
     if isinstance(every, str):
         frames = f"frames {read_cadence(every, 'frame_every')}"

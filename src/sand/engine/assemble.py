@@ -6,11 +6,11 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
-from ..basics.arrays import OVER_ALLOCATION, body_arrays
+from ..basics.arrays import OVER_ALLOCATION
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
@@ -33,9 +33,6 @@ from ..integrate.parts import (
     RespaSettings,
     StepParameters,
 )
-from ..integrate.rigid.body_friction import LARGEST_DEVIATE
-from ..integrate.rigid.rigid_clusters import RigidClusters, RigidLimits
-from ..integrate.rigid.rigid_driver import LARGEST_FLIGHT
 from ..integrate.stage_list import Components
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
@@ -47,10 +44,9 @@ from .driven import Driven, check_driven, driven_arrays
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .input_checks import check_system
+from .kinds import ForcesByType, kind_of
 from .new_state import new_state
 from .ramped import RampedForces
-from .rigid.quick_bodies import SubstepEngine
-from .rigid.rigid_engine import RigidEngine, list_gap, longest_step_awake
 from .walls import Wall, check_walls, place_walls, wall_numbers
 
 WIDE_FROM = 64
@@ -63,15 +59,6 @@ GAS_PERIOD_FRACTION = 0.05
 Kicks are applied at ends of steps or cycles, at intervals h of 2/3 to 4/3 of it; free grains then diffuse too fast by
 h²/12τ², at most 4e-4.
 """
-
-
-class ForcesByType(NamedTuple):
-    """The forces of a simulation by type."""
-
-    contact: Contact | None
-    long_range: list[LongRangeForce]  # the forces that act on at least one grain
-    external: list[ExternalForce]
-    gas: list[Gas]  # at most one
 
 
 def build_engine(
@@ -110,24 +97,21 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    warnings = check_system(grains, forces, box, fresh=fresh)
-    if isinstance(stepping, RigidClusters):
-        warnings += check_rigid_clusters(forces, driven, walls, neighbours)
+    kind = kind_of(stepping)
+    warnings = check_system(grains, forces, box, fresh=fresh) + kind.check(forces, driven, walls, neighbours)
     check_driven(driven, grains, forces, stepping, neighbours)
     by_type = _forces_by_type(forces, grains)
     check_walls(walls, grains, by_type.contact, box, stepping, fresh=fresh)
-    rigid = isinstance(stepping, RigidClusters)
-    pair_gap = list_gap(grains, box) if rigid else float(grains.radius.min())
+    pair_gap = kind.pair_gap(grains, box)
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     if fresh:  # grains of another simulation may have other identities, and have crossed its box
         wrapped.arrays.id[...] = np.arange(len(grains))
         wrapped.arrays.image[...] = 0
-    if rigid:
-        neighbours = dataclasses.replace(neighbours, order="as given")
     held = driven_arrays(driven, grains)
     if held is not None:
         wrapped.arrays.velocity[:, held.grain], wrapped.arrays.spin[:, held.grain] = held.velocity, held.spin
+    if held is not None or kind.keeps_order:
         neighbours = dataclasses.replace(neighbours, order="as given")
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     if by_type.contact is not None and fresh:
@@ -148,8 +132,7 @@ def build_engine(
         force, sums, _ = long_range[follower.index]
         long_range[follower.index] = force, sums, follower.force.numbers_at(cutoffs[follower.index])
     verlet = stepping.contact_stepping
-    # friction and noise of bodies are exact: `_rigid_limits` says how long their steps may be
-    control = _step_control(grains, verlet, by_type._replace(gas=[]) if rigid else by_type, pair_gap)
+    control = _step_control(grains, verlet, kind.limiting_steps(by_type), pair_gap)
     stepping = stepping.resolved(grains, control)
     parameters = StepParameters(
         box.span,
@@ -162,9 +145,7 @@ def build_engine(
         stepping.flight_limits(grains, _longest_displacement(grains, box, found)),
         ForceNumbers(len(long_range), len(by_type.external)),
     )
-    if rigid:
-        limits = _rigid_limits(parameters, by_type, grains)
-        parameters = parameters._replace(flight_limits=limits)
+    parameters = parameters._replace(flight_limits=kind.flight_limits(parameters, by_type, grains))
     components = Components(
         (by_type.contact or Contact()).contact_law,
         [(sums, numbers) for _, sums, numbers in long_range],
@@ -189,10 +170,11 @@ def build_engine(
         state.cutoff[:] = follower.values
     parts = (state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower)
     engine = Engine(*parts)
-    if rigid:
-        state.bodies = body_arrays(len(grains), in_gas=bool(by_type.gas))
-        inner = inner_engine(wrapped, forces, box, verlet, seed)
-        engine = SubstepEngine(*parts, inner=inner, part=part_engine(inner, parameters))
+
+    def build(others: Sequence[Force], search: Neighbours) -> Engine:
+        return build_engine(wrapped, others, box, verlet, search, seed, fresh=False)
+
+    kind.complete(engine, forces, build)
     if any(map(ramps_of, forces)):
         changing = functools.partial(
             _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
@@ -218,96 +200,6 @@ def _of_nearest_images(force: Force) -> Force:
     given: Any = force
     auto = isinstance(force, EwaldForce) and force.periodic == "auto"
     return cast("Force", dataclasses.replace(given, periodic="nearest image")) if auto else force
-
-
-def _between_all(force: Force) -> Force:
-    """The force between nearest images of all pairs of grains, without a cut-off, which would depend on time."""
-    near: Any = force.of_nearest_images() if isinstance(force, EwaldForce) else force
-    defaults = {each.name: each.default for each in dataclasses.fields(near)}
-    settings = {"cutoff": None} | ({"cut": defaults["cut"]} if "cut" in defaults else {})
-    return cast("Force", dataclasses.replace(near, **settings)) if "cutoff" in defaults else cast("Force", near)
-
-
-def inner_engine(grains: Grains, forces: Sequence[Force], box: Box, verlet: Verlet, seed: int) -> Engine:
-    """The engine of the grains of awake clusters; what images other than the nearest one add is left to the bodies."""
-    near = [_between_all(force) for force in forces]
-    return build_engine(grains, near, box, verlet, Neighbours("all pairs", order="as given"), seed, fresh=False)
-
-
-def part_engine(inner: Engine, parameters: StepParameters) -> RigidEngine:
-    """The engine of substeps: the forces of the engine of awake grains, and the steps of bodies of these parameters."""
-    limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
-    own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
-    settings = {each.name: getattr(inner, each.name) for each in dataclasses.fields(Engine) if each.init}
-    return RigidEngine(**settings | {"parameters": own}, inner=inner)
-
-
-def _rigid_limits(parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
-    """Limits of the steps of rigid clusters that depend on grains, contacts and gas.
-
-    In a gas a step is at most η τ, with the shortest stopping time τ of a grain, which no mode of a body falls below:
-    the exact friction needs no short step, but drifts of half a step with the velocities before and after it let a free
-    body diffuse too fast by h²/12τ², an error of the order of η² as that of the loads. Nor may noise alone move a grain
-    farther than half of `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations √(2 k_B T h/τ m).
-    """
-    law, limits = (forces.contact or Contact()).contact_law, parameters.flight_limits
-    longest, rate, gas = limits.longest_step, 0.0, parameters.gas.gas
-    if forces.gas:
-        rate = 1.0 / forces.gas[0].shortest_time(grains)
-        spread = LARGEST_DEVIATE * math.sqrt(2.0 * gas.temperature_energy * rate / float(grains.mass.min()))
-        longest = min(longest, limits.step_fraction / rate)
-        if spread > 0.0:
-            longest = min(longest, (LARGEST_FLIGHT * parameters.criteria.pair_gap / spread) ** (2.0 / 3.0))
-    awake = min(longest, longest_step_awake(law, parameters.settings, grains))
-    return limits._replace(
-        longest_step=longest,
-        longest_awake=awake,
-        smallest_radius=float(grains.radius.min()),
-        friction_rate=rate,
-        substeps=True,
-    )
-
-
-GRAINS = "use clusters = 'grains' (sand.Verlet)"
-
-
-def check_rigid_clusters(
-    forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall], neighbours: Neighbours
-) -> list[str]:
-    """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
-    contact = next((f for f in forces if isinstance(f, Contact)), None)
-    problems = []
-    if contact is None:
-        problems.append("rigid clusters need sand.Contact; without contacts use clusters = 'grains' (sand.Verlet)")
-    elif contact.damping == "none":
-        problems.append(
-            "without damping no cluster comes to rest; use damping = 'critical' and a settling_time, such as 5 ns, in "
-            "[forces.contact] (sand.Contact)"
-        )
-    for name in ("slide_factor", "roll_factor", "twist_factor") if contact is not None else ():
-        if getattr(contact, name) == 0.0:
-            problems.append(f"with {name} = 0 in [forces.contact] a contact has no limit to rest at; {GRAINS}")
-    if contact is not None and contact.bath_temperature is not None:
-        problems.append(
-            f"with bath_temperature in [forces.contact] no cluster comes to rest; leave it out, or {GRAINS}"
-        )
-    for force in forces:
-        for name in ramps_of(force):
-            problems.append(f"rigid clusters cannot follow the ramp {force.name}.{name}; use a number, or {GRAINS}")
-    if driven:
-        problems.append(f"rigid clusters cannot have driven grains; {GRAINS}")
-    if walls:
-        problems.append(f"rigid clusters cannot have walls; {GRAINS}")
-    if neighbours.order == "curve":
-        problems.append(f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}")
-    if problems:
-        raise BadInput([f"stepping: {line}" for line in problems])
-    if contact is not None and contact.settling_time is None:
-        return [
-            "without settling_time in [forces.contact] (sand.Contact) long chains vibrate, and stay awake, for "
-            "microseconds; 5 ns is usual for grains of 10 nm"
-        ]
-    return []
 
 
 def _changing_parameters(

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.grains import Grains
-from ..basics.units import whole_number
+from ..basics.settings import Settings, Vector, Wholes
 from ..contact.model import Contact
-from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, shown
+from ..errors import BadInput, shown
 from ..forces.base import Force
-from ..forces.vectors import three
 from ..integrate.driven import DrivenArrays
 from ..integrate.integrator import Integrator
 from ..neighbours.search import Neighbours
@@ -24,7 +23,7 @@ AT_REST = (0.0, 0.0, 0.0)
 
 @checked
 @dataclass(frozen=True)
-class Driven:
+class Driven(Settings):
     """Grains with prescribed velocity and spin, by default held at rest.
 
     Their contacts and all forces on other grains act as usual; loads on them do not change their motion, as if mass and
@@ -45,26 +44,11 @@ class Driven:
         If there is no index, or a value is invalid; one line each.
     """
 
-    grains: Sequence[int]
-    velocity: Sequence[Any] = AT_REST
-    spin: Sequence[Any] = AT_REST
+    grains: Annotated[Sequence[int], Wholes(0, "indices of grains, such as [0, 1]")]
+    velocity: Annotated[Sequence[Any], Vector("m/s")] = AT_REST
+    spin: Annotated[Sequence[Any], Vector("rad/s")] = AT_REST
 
-    __pydantic_config__ = FORBID_EXTRA
-
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
-        index = [errors.take(whole_number, i, "driven: grains", 0) for i in self.grains]
-        if not index:
-            errors.problems.append("driven: grains is empty; give indices of grains, such as [0, 1]")
-        velocity = errors.take(three, self.velocity, "m/s", "driven: velocity")
-        spin = errors.take(three, self.spin, "rad/s", "driven: spin")
-        errors.done()
-        for name, value in (("grains", tuple(index)), ("velocity", velocity), ("spin", spin)):
-            object.__setattr__(self, name, value)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        return {name: list(value) for name, value in asdict(self).items()}
+    place: ClassVar[str] = "driven"
 
 
 def read_driven(value: Any) -> tuple[Driven, ...]:

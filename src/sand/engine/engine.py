@@ -20,6 +20,7 @@ from ..basics.state import (
     CHECKED,
     COMPARED,
     CONTACT_STEP,
+    CONTACT_STEPS,
     CONTACTS,
     CUT_RADIUS,
     CUTOFF_CHANGED,
@@ -41,18 +42,21 @@ from ..basics.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
+    SUBSTEPS,
     TIME,
     WALL_CONTACTS,
     State,
 )
+from ..basics.threads import cores, threads
+from ..compiler.ahead import compile_ahead
 from ..compiler.program import Program
-from ..compiler.stage import Stage
+from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import THERMAL
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
-from ..contact.measure import BODY_ROWS, ENERGIES, energies_stage, measure_bodies, wall_energies_stage
+from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies, wall_energies_stage
 from ..contact.model import Contact
 from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
@@ -99,6 +103,44 @@ def _set_arrays(table: Table, present: tuple) -> None:
         table.set(name, value)
 
 
+class GrainSteps:
+    """Steps of all grains by the driver, and what a class provides that takes other steps (`rigid.body_steps`).
+
+    Attributes
+    ----------
+    seconds : float
+        Processor time [s] of steps within the steps that are counted.
+    """
+
+    seconds: float = 0.0
+
+    def for_part(self) -> GrainSteps:
+        """Such steps for an engine of some of the grains."""
+        return self
+
+    def drivers(self) -> list[tuple[Stage, Any]]:
+        """Stages that are called during a run besides those of the program, with their parameters."""
+        return [(advance, ())]
+
+    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Further stages that a run may call, each with a table of parts and its parameters."""
+        return []
+
+    def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
+        """Take steps up to a time [s] or a step; returns why no more were taken."""
+        return engine.run_driver(advance, until, last, shorten)
+
+    def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """The arrays of a saved state, with those that it may lack."""
+        return saved
+
+    def loaded(self, engine: Engine) -> None:
+        """Follow a state that was loaded."""
+
+    def begin(self, engine: Engine) -> None:
+        """Follow a state whose loads were summed at a start, or after a change by the user."""
+
+
 @dataclass
 class Engine:
     """The state of a simulation and the compiled driver that advances it.
@@ -125,6 +167,8 @@ class Engine:
         The cut-off that follows the clusters, if there is one.
     ramped : RampedForces or None
         The forces, if any of them has ramps.
+    taken : GrainSteps
+        How steps are taken.
     """
 
     _state: State
@@ -135,9 +179,10 @@ class Engine:
     search: str
     stepping: Integrator
     neighbours: Neighbours
-    _components: Components
+    components: Components
     cutoff: ClusterCutoff | None = None
     ramped: RampedForces | None = None
+    taken: GrainSteps = field(default_factory=GrainSteps)
     _intervals: Sequence[tuple[int, int]] = ()  # of the ramps, for which the parameters are set
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _table: Table = field(init=False)
@@ -173,10 +218,17 @@ class Engine:
 
     def for_state(self, state: State) -> Self:
         """An engine with the settings of this one, for another state, with a table of its own and no other threads."""
-        settings = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        made = type(self)(**settings | {"_state": state})
+        made = self.changed(_state=state, taken=self.taken.for_part())
         made._workers = None
         return made
+
+    def share_threads(self, other: Engine) -> None:
+        """Use the threads of another engine, which does not step at the same time."""
+        self._workers = other._workers
+
+    def changed(self, **changes: Any) -> Self:
+        """An engine with the settings of this one but for these, and a table of its own."""
+        return type(self)(**{each.name: getattr(self, each.name) for each in fields(self) if each.init} | changes)
 
     @property
     def state(self) -> State:
@@ -234,13 +286,13 @@ class Engine:
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
-        table, (self._state, is_same) = self._current_table(regular), self._spare.of(regular)
+        table, (self._state, is_same) = self.table_of(regular), self._spare.of(regular)
         self._copy_table.follow(table, OF_STATE if is_same else ())
         self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
         _set_arrays(self._copy_table, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
         try:
-            stop = self._drive(time, regular.steps + most_steps, shorten=True)
+            stop = self.drive(time, regular.steps + most_steps, shorten=True)
             reached = self.regular_state
         finally:
             self._state, self._is_sorted = regular, is_sorted
@@ -255,7 +307,7 @@ class Engine:
     @property
     def law(self) -> ContactLaw:
         """The contact law."""
-        return self._components.law
+        return self.components.law
 
     @property
     def time(self) -> float:
@@ -280,7 +332,8 @@ class Engine:
     @property
     def awake_work(self) -> tuple[int, int, float]:
         """Contact steps and substeps within steps of bodies, and the processor time [s] of all work on these."""
-        return 0, 0, 0.0
+        count = self._state.count
+        return int(count[CONTACT_STEPS]), int(count[SUBSTEPS]), self.taken.seconds
 
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
@@ -320,33 +373,23 @@ class Engine:
         self._output_state = self._output_time = None
         last = self.steps + most_steps
         if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
-            return self._drive(until, last)
+            return self.drive(until, last)
         while True:
             if self._state.time < until and self.steps < last:
                 self._sort_in_space()
             renewed = self._state.count[ORDERED] + SORT_INTERVAL
-            stop = self._drive(until, min(last, renewed))
+            stop = self.drive(until, min(last, renewed))
             if not (stop is Stop.NONE and renewed <= self.steps < last):
                 return stop
 
-    def _drive(self, until: float, last: float, shorten: bool = False) -> Stop:
-        """Take steps up to a time [s] or a step, in the present order of the arrays; enlarges arrays that overflow."""
-        state, last = self._state, min(last, 2**62)
+    def drive(self, until: float, last: float, shorten: bool = False) -> Stop:
+        """Take steps up to a time [s] or a step, in the present order of the arrays."""
+        last = min(last, 2**62)
         while True:
-            stop = self._call_driver(until, last, shorten)
-            if stop is Stop.CONTACTS_FULL:
-                state.grow_contacts()
-            elif stop is Stop.WALL_CONTACTS_FULL:
-                state.grow_wall_contacts()
-            elif stop is Stop.PAIRS_FULL:
-                found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
-                state.grow_pairs(int(OVER_ALLOCATION * found))
-            elif stop is Stop.LIST_FULL:
-                state.grow_rows()
-            elif stop is Stop.CLUSTERS_CHANGED:
-                self._compare_clusters()
-            else:
+            stop = self.taken.call(self, until, last, shorten)
+            if stop is not Stop.CLUSTERS_CHANGED:
                 return stop
+            self._compare_clusters()
 
     def _compare_clusters(self) -> None:
         """After a contact formed or broke: choose the cut-off that follows the clusters anew, if they have grown."""
@@ -370,7 +413,7 @@ class Engine:
         force, sums, _ = changed[k]
         changed[k] = force, sums, force.numbers_at(radius)
         self.long_range = changed
-        self._components = self._components._replace(pair_forces=[own[1:] for own in self.long_range])
+        self.components = self.components._replace(pair_forces=[own[1:] for own in self.long_range])
         search = search._replace(reach=max(search.reach, radius + search.margin))
         self.parameters = self.parameters._replace(search=search)
         self._table.set("search", search)
@@ -397,7 +440,7 @@ class Engine:
             (force, sums, numbers._replace(own=now[force.name].constants()) if force.name in now else numbers)
             for force, sums, numbers in self.long_range
         ]
-        self._components = self._components._replace(
+        self.components = self.components._replace(
             pair_forces=[own[1:] for own in self.long_range],
             external_forces=[(force.formula, force.numbers()) for force in self.external],
         )
@@ -416,7 +459,7 @@ class Engine:
         self.set_ramped_parameters()
         if CONTACT in self.ramped.names:
             with self._held():
-                renewal_stage(self.law).run(self._current_table(state))
+                renewal_stage(self.law).run(self.table_of(state))
         state.lost[OUTSIDE] += before - self._ramped_energy()
         state.count[CHECKED] = state.steps - INCREASE_INTERVAL  # the next step is chosen for the new parameters
         if self.neighbours.uses_spatial_sort(len(state.grains)):
@@ -436,8 +479,8 @@ class Engine:
         (_, sums, numbers), own = self.long_range[k], self._state.long_range
         kept = own.force.copy(), own.torque.copy()
         clear_long_range_loads(own)
-        stage = pair_force_stages(sums, self._components.wide)[SUM]
-        stage.run(self._current_table(self._state), numbers, WHOLE)
+        stage = pair_force_stages(sums, self.components.wide)[SUM]
+        stage.run(self.table_of(self._state), numbers, WHOLE)
         found = np.array([own.force, own.torque])
         own.force[...], own.torque[...] = kept
         return found
@@ -446,16 +489,16 @@ class Engine:
         """Energy [J] of long-range force k."""
         _, sums, numbers = self.long_range[k]
         shares = np.zeros(len(self._state.grains))
-        self._add_energies(self._current_table(self._state), sums, numbers, shares)
+        self._add_energies(self.table_of(self._state), sums, numbers, shares)
         return math.fsum(shares)
 
     def _add_energies(self, table: Table, sums: LongRangeSums, numbers: Any, shares: np.ndarray) -> None:
         """Add the energies [J] of a long-range force to those of the grains."""
         if sums.energies_need_rounds:
-            run_rounds(sums, self._components.wide, table, numbers)
+            run_rounds(sums, self.components.wide, table, numbers)
         long_range_energies_for(sums).run(table, (numbers, shares))
 
-    def _current_table(self, state: State) -> Table:
+    def table_of(self, state: State) -> Table:
         """The table with the present arrays of the state."""
         present = (state.grains.arrays, *ARRAYS(state))
         if all(map(operator.is_, present, self._copy_present)):
@@ -467,7 +510,7 @@ class Engine:
 
     def _call_table(self, until: float, last: float, shorten: bool) -> tuple[Table, Any]:
         """The table for one call of the driver, and its task queue."""
-        state, table = self._state, self._current_table(self._state)
+        state, table = self._state, self.table_of(self._state)
         queue = self._task_queue(len(state.grains), state.contacts.flag.size)
         for name, value in (("queue", queue), ("until", float(until)), ("last", int(last)), ("shorten", shorten)):
             table.set(name, value)
@@ -488,44 +531,73 @@ class Engine:
 
     def uncompiled(self) -> list[str]:
         """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
-        (table, _), shares = self._call_table(math.inf, 1, False), np.zeros(len(self._state.grains))
-        program = build_program(self._components, self.parameters, table)
-        table.set("program", program)
-        stages: list[tuple[Any, Any]] = [*self._drivers(), *program.stages.values()]
-        stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+        stages = self.stages(self.first_table())
+        missing = [
+            each.purpose for table, each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)
+        ]
+        return list(dict.fromkeys(missing))
+
+    def first_table(self) -> Table:
+        """The table as for a call of the driver, with all parts that stages take."""
+        return self._call_table(math.inf, 1, False)[0]
+
+    def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """All stages that a run may call, each with a table of parts, by default this one, and its parameters."""
+        shares = np.zeros(len(self._state.grains))
+        stages: list[tuple[Any, Any]] = [*self.taken.drivers(), *self._program_for(table).stages.values()]
+        if self.parameters.settings.on:
+            stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
+            stages.append((contacts_stage(self.law), (np.zeros((1, 1)),)))
         stages.append((measure_bodies, (np.zeros((BODY_ROWS, 1)), cluster_arrays(1))))
         stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in self.long_range]
         stages += [
             (external_energies_for(outer.formula), (outer.numbers(), self.time, shares)) for outer in self.external
         ]
-        missing = [each.purpose for each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)]
-        return list(dict.fromkeys(missing))
+        return [*((table, *each) for each in stages), *self.taken.stages_within(self, table)]
 
-    def _drivers(self) -> list[tuple[Stage, Any]]:
-        """Stages that the engine itself calls during a run, with their parameters."""
-        return [(advance, ())]
+    def _program_for(self, table: Table) -> Program:
+        """The program, made for the present parameters if there is none."""
+        if self._program is None:
+            self._program = build_program(self.components, self.parameters, table)
+        for each in (self._table, table):
+            each.set("program", self._program)
+        return self._program
 
-    def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
-        """One call of the driver."""
-        return self._run_program(advance, until, last, shorten)
+    def run_driver(self, driver: Stage, until: float, last: float, shorten: bool = False) -> Stop:
+        """Run a driver with the stages of the simulation, in the present order of the arrays.
 
-    def _run_program(self, driver: Stage, until: float, last: float, shorten: bool) -> Stop:
-        """Run a driver with the stages of the simulation."""
+        Arrays that overflow are enlarged; returns why it stops otherwise.
+        """
+        state = self._state
+        while True:
+            stop = self._call_driver(driver, until, last, shorten)
+            if stop is Stop.CONTACTS_FULL:
+                state.grow_contacts()
+            elif stop is Stop.WALL_CONTACTS_FULL:
+                state.grow_wall_contacts()
+            elif stop is Stop.PAIRS_FULL:
+                found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
+                state.grow_pairs(int(OVER_ALLOCATION * found))
+            elif stop is Stop.LIST_FULL:
+                state.grow_rows()
+            else:
+                return stop
+
+    def _call_driver(self, driver: Stage, until: float, last: float, shorten: bool) -> Stop:
+        """One call of a driver."""
         state = self._state
         table, queue = self._call_table(until, last, shorten)
         try:
             if self._program is None:
-                self._program = build_program(self._components, self.parameters, table)
-                for each in (self._table, table):
-                    each.set("program", self._program)
+                compile_ahead(self.stages(table), min(cores(), threads()))
             alone = shorten and len(state.grains) < ALONE  # threads start later than one step ends
             if (
                 not alone
                 and self._workers is not None
-                and benefits_from_workers(len(self._components.pair_forces), int(state.count[CONTACTS]))
+                and benefits_from_workers(len(self.components.pair_forces), int(state.count[CONTACTS]))
             ):
                 self._workers.start(table)
-            return Stop(self._program.run(driver, table))
+            return Stop(self._program_for(table).run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(queue)
             raise
@@ -565,16 +637,16 @@ class Engine:
 
     def _record_bath_work(self, state: State) -> None:
         """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
-        walls = self._components.walls
+        walls = self.components.walls
         with self._held(state):
-            bath_work.run(self._current_table(state), (), NO_STEP)
+            bath_work.run(self.table_of(state), (), NO_STEP)
             if walls is not None:
-                bath_wall_work.run(self._current_table(state), walls, NO_STEP)
+                bath_wall_work.run(self.table_of(state), walls, NO_STEP)
 
     @contextlib.contextmanager
     def _held(self, state: State | None = None) -> Iterator[None]:
         """While constants of contacts are computed, driven grains have a mass that counts as infinite."""
-        driven, arrays = self._components.driven, (state or self._state).grains.arrays
+        driven, arrays = self.components.driven, (state or self._state).grains.arrays
         index: Any = [] if driven is None else driven.grain
         for quantity in (arrays.mass, arrays.inertia):
             quantity[index] *= HEAVY
@@ -590,17 +662,19 @@ class Engine:
         state.count[STAGE] = 1
         state.count[CHECKED] = state.count[STEP_INCREASES] = -INCREASE_INTERVAL
         state.clock[CONTACT_STEP] = math.inf
-        self._drive(-math.inf, 1)
+        self.drive(-math.inf, 1)
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)
         state.lost[:] = 0.0
         state.contacts.lost[:] = state.wall_contacts.lost[:] = 0.0
         state.walls.impulse[:] = 0.0
+        self.taken.begin(self)
 
     def refresh_loads(self) -> None:
         """Sum the loads anew by the second half of a step of 0 s, after the user has changed grains or forces."""
         self.restore_user_order()
         self._refresh_loads()
+        self.taken.begin(self)
 
     def _refresh_loads(self) -> None:
         """As `refresh_loads`, in the present order of the arrays."""
@@ -610,13 +684,13 @@ class Engine:
             self._record_bath_work(state)  # the loads that follow have no noise
         state.count[STAGE] = 1
         state.clock[STEP] = state.clock[CYCLE] = state.clock[LEFT] = 0.0
-        self._drive(-math.inf, steps + 1)
+        self.drive(-math.inf, steps + 1)
         state.count[STEPS], state.count[LONG_RANGE_SUMS] = steps, sums
 
     def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
         """Restore the regular state of a checkpoint, with `state` at a time of output [s]; sum loads, rebuild lists."""
         state, self._output_time = self.regular_state, output_time
-        state.from_arrays(saved)
+        state.from_arrays(self.taken.with_missing(self, saved))
         if self.cutoff is None:
             state.count[COMPARED] = -1
         if state.order.size:  # the order of the lists depends on it
@@ -629,6 +703,7 @@ class Engine:
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
         self._rebuild_list()
+        self.taken.loaded(self)
 
     def _rebuild_list(self) -> None:
         """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
@@ -654,7 +729,7 @@ class Engine:
     def _energies_at_grains(self, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
         """As `energies_at_grains`, in arrays that the next call uses again."""
         state, columns = self.state, dict.fromkeys(self.columns())
-        table, count = self._current_table(state), len(state.grains)
+        table, count = self.table_of(state), len(state.grains)
         if self._shares.keys() != columns.keys() or any(len(share) != count for share in self._shares.values()):
             self._shares = {name: np.zeros(count) for name in columns}
         shares = self._shares
@@ -669,6 +744,12 @@ class Engine:
             external_energies_for(outer.formula).run(table, (outer.numbers(), state.time, shares[outer.name]))
         return shares
 
+    def external_energy(self, outer: ExternalForce, time: float) -> float:
+        """Energy [J] of a per-grain force on the grains of the regular state, at a time [s]."""
+        shares = np.zeros(len(self._state.grains))
+        external_energies_for(outer.formula).run(self.table_of(self._state), (outer.numbers(), time, shares))
+        return math.fsum(shares)
+
     def columns(self) -> list[str]:
         """Columns of the forces in the ledger."""
         return [*(force.column for force, _, _ in self.long_range), *(force.name for force in self.external)]
@@ -678,9 +759,9 @@ class Engine:
         found, state = self._of_contacts[0], self.state
         found[:] = 0.0
         if state.count[CONTACTS]:
-            energies_stage(self.law).run(self._current_table(state), self._of_contacts)
+            energies_stage(self.law).run(self.table_of(state), self._of_contacts)
         if state.count[WALL_CONTACTS]:
-            wall_energies_stage(self.law).run(self._current_table(state), self._of_contacts)
+            wall_energies_stage(self.law).run(self.table_of(state), self._of_contacts)
         return found.tolist()
 
     def body_motion(self) -> BodyMotion:
@@ -688,7 +769,7 @@ class Engine:
         state, count = self.state, len(self._state.grains)
         if self._of_bodies is None or self._of_bodies[0].shape[1] != count:
             self._of_bodies = np.zeros((BODY_ROWS, count)), cluster_arrays(count)
-        bodies = measure_bodies.run(self._current_table(state), self._of_bodies)
+        bodies = measure_bodies.run(self.table_of(state), self._of_bodies)
         found = self._of_bodies[0][:, :bodies].copy()
         return BodyMotion(found[0].astype(np.int64), *found[1:])
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -16,23 +16,26 @@ from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.material import Material, as_material
 from ..basics.ramps import ramps_of
+from ..basics.settings import Direction, Number, Reading, Settings, Vector
 from ..basics.state import WALL_CONTACTS, State
-from ..basics.units import si
 from ..contact.constants_table import constant_names
 from ..contact.model import Contact
 from ..contact.wall_loops import WallNumbers
 from ..errors import BadInput, shown
-from ..forces.vectors import three
 from ..integrate.integrator import Integrator
 from ..setup.checks import most_overlap
 
-VECTORS = {"point": "m", "normal": "1", "velocity": "m/s"}
-"""Vectors of a wall and their units."""
+
+def _name_of_columns(value: Any, name: str) -> str:
+    """Check a name that begins the names of columns; empty for none.  Raises BadInput."""
+    if not isinstance(value, str) or (value and not value.isidentifier()):
+        raise BadInput(f"{name} = {shown(value)} must be made of letters, digits and '_', such as 'left'")
+    return value
 
 
 @checked
 @dataclass(frozen=True)
-class Wall:
+class Wall(Settings):
     """A plane wall to which grains stick, by the contact law of `sand.Contact` in the limit of an infinite sphere.
 
     Parameters
@@ -60,50 +63,20 @@ class Wall:
         If a number is out of range; one line for each.
     """
 
-    point: Any
-    normal: Any
-    material: Any
-    velocity: Any = (0.0, 0.0, 0.0)
-    mass: Any = None
-    force: Any = None
-    name: str = ""
+    point: Annotated[Any, Vector("m")]
+    normal: Annotated[Any, Direction("that from the wall to the grains", unit_length=True)]
+    material: Annotated[Any, Reading(as_material, write=lambda material: material.name)]
+    velocity: Annotated[Any, Vector("m/s")] = (0.0, 0.0, 0.0)
+    mass: Annotated[Any, Number("kg", above=0.0)] = None
+    force: Annotated[Any, Number("N")] = None
+    name: Annotated[str, Reading(_name_of_columns, write=lambda name: name or None)] = ""
 
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        found: dict[str, Any] = {}
-        for key, unit in VECTORS.items():
-            try:
-                found[key] = three(getattr(self, key), unit, f"wall: {key}")
-            except BadInput as error:
-                problems += error.problems
-        if (length := math.hypot(*found.get("normal", (1.0, 0.0, 0.0)))) == 0.0:
-            problems.append("wall: normal = (0, 0, 0) has no direction; give that from the wall to the grains")
-        elif "normal" in found:
-            found["normal"] = tuple(v / length for v in found["normal"])
-        for key, unit, bounds in (("mass", "kg", {"above": 0.0}), ("force", "N", {})):
-            try:
-                if getattr(self, key) is not None:
-                    found[key] = si(getattr(self, key), unit, f"wall: {key}", **bounds)
-            except BadInput as error:
-                problems += error.problems
+    place: ClassVar[str] = "wall"
+
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """A force without a mass."""
         if self.force is not None and self.mass is None:
-            problems.append("wall: force is given without a mass; give the mass of the wall, such as '1e-15 kg'")
-        if self.name and not self.name.isidentifier():
-            problems.append(f"wall: name = {self.name!r} must be made of letters, digits and '_', such as 'left'")
-        try:
-            found["material"] = as_material(self.material, "wall: material")
-        except BadInput as error:
-            problems += error.problems
-        if problems:
-            raise BadInput(problems)
-        for key, value in found.items():
-            object.__setattr__(self, key, value)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        given = {key: list(getattr(self, key)) for key in VECTORS} | {"material": self.material.name}
-        optional = {"mass": self.mass, "force": self.force, "name": self.name or None}
-        return given | {key: value for key, value in optional.items() if value is not None}
+            yield "force is given without a mass; give the mass of the wall, such as '1e-15 kg'"
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from ..basics.grains import Grains
+from ..basics.settings import Settings
 from ..compiler.stage import Stage
 from ..errors import BadInput
 
@@ -28,6 +29,9 @@ class Integrator(Protocol):
         The stage that takes one step of grains without contacts, as in `examples/plugins/forest_ruth.py`; None for
         velocity Verlet. It takes parts of a simulation by name (`parts.PARTS`), calls the forces by `force_calls`, and
         builds on `integrate.flight`. Such steps are limited by the skin of the lists.
+
+    A class may have two further attributes: `moves_bodies` = True, if clusters at rest move as bodies, whose steps are
+    long, and `clusters`, a word that selects it in the [stepping] table instead of `method`.
     """
 
     name: ClassVar[str]
@@ -50,8 +54,30 @@ class Integrator(Protocol):
         """
 
 
+class IntegratorSettings(Settings):
+    """Base class of the settings of integrators, keys of the table [stepping] of case files."""
+
+    name: ClassVar[str]
+    place: ClassVar[str] = "stepping"
+
+    def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
+        return {"method": self.name} | super().parameters()
+
+
 INTEGRATORS: dict[str, type] = {}
 """Registered integrators by name."""
+
+
+def moves_bodies(stepping: Any) -> bool:
+    """Whether clusters at rest move as bodies: steps are long, and contact steps are taken within them."""
+    return bool(getattr(stepping, "moves_bodies", False))
+
+
+def methods_of_clusters() -> dict[str, str]:
+    """Words for `clusters` in the [stepping] table, and the names of the integrators that they stand for."""
+    return {each.clusters: name for name, each in INTEGRATORS.items() if hasattr(each, "clusters")}
+
 
 T = TypeVar("T", bound=type)
 

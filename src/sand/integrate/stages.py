@@ -4,7 +4,6 @@ Their numbers are the entries of the program of a simulation (`program.build_pro
 and are compiled once for each; those of forces are in `force_stages`.
 """
 
-import functools
 import math
 from enum import IntEnum
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from ..basics.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from ..compiler.jit import loop
+from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import half_kick_weight, record_half_kicks, record_half_kicks_at_walls
 from ..contact.events import compact_contacts, forming_loops, settle_loop
@@ -72,7 +72,7 @@ INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
 
 
-@functools.cache
+@factory
 def drift_stage(magnetic: bool, long_vectors: bool) -> Stage:
     """First half kick and drift of a block of grains; stores the bits of the largest squared speed."""
     drift_some = drift_for(magnetic)
@@ -97,7 +97,7 @@ def verlet_list(grains, long_range, count, span, search):
     return Stop.LIST_FULL.value if full else Stop.NONE.value
 
 
-@functools.cache
+@factory
 def pair_list_stage(law: ContactLaw, celled: bool) -> Stage:
     """Rebuild the pair list of a contact law, with cells or without; returns a `Stop`."""
     build_pair_list = pair_list_loop(law, celled)
@@ -124,7 +124,7 @@ def inner_list(grains, pair_list, count, span, criteria):
     return 0
 
 
-@functools.cache
+@factory
 def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Stage:
     """Update of a block of contacts; stores its sums."""
     contact_pass = contact_pass_loop(law, damping)
@@ -142,7 +142,7 @@ def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Sta
     return pass_contacts
 
 
-@functools.cache
+@factory
 def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of contact events by number: work of stiffnesses, slip and breaking, forming."""
     settle, form_contacts = settle_loop(law, damping), forming_loops(law, damping).form
@@ -166,7 +166,7 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     return {StageNumber.STIFFNESS_WORK: stiffness_work, StageNumber.SETTLE: settle_contacts, StageNumber.FORM: form}
 
 
-@functools.cache
+@factory
 def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of walls by number, whose parameters are `contact.wall_loops.WallNumbers`: contacts, loads, step."""
     update, find_step = wall_loops(law, damping).update, wall_step_loop(law)
@@ -239,7 +239,7 @@ def remove_broken(contacts, count):
     return 0
 
 
-@functools.cache
+@factory
 def gather_stage(long_vectors: bool) -> Stage:
     """Sums of the contact loads of a block of grains."""
 
@@ -253,7 +253,7 @@ def gather_stage(long_vectors: bool) -> Stage:
     return gather_loads
 
 
-@functools.cache
+@factory
 def gather_and_kick_stage(long_vectors: bool) -> Stage:
     """Sums of the contact loads of a block of grains, and the second half kick; stores the largest speeds."""
 

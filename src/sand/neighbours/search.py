@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
 from ..basics.grains import Grains
-from ..basics.units import format_quantity, is_word, si
-from ..errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..basics.settings import Number, Settings, Word
+from ..basics.units import format_quantity
 from .cell_list import Search
 
-SEARCHES = ("auto", "cells", "all pairs")
-ORDERS = ("auto", "curve", "as given")
 MARGIN = 0.1
 """Skin of the Verlet list relative to the cut-off, Δr/r_c; the paper uses 0.3–0.4."""
 LONG_STEP_MARGIN = 0.35
@@ -67,7 +65,7 @@ class ChosenSearch(NamedTuple):
 
 @checked
 @dataclass(frozen=True)
-class Neighbours:
+class Neighbours(Settings):
     """Settings of the neighbour search for contacts and long-range forces.
 
     Parameters
@@ -97,29 +95,11 @@ class Neighbours:
     No choice changes results by more than rounding errors.
     """
 
-    search: str = "auto"
-    margin: Any = "auto"
-    order: str = "auto"
+    search: Annotated[str, Word("auto", "cells", "all pairs")] = "auto"
+    margin: Annotated[Any, Number("m", above=0.0, auto=True)] = "auto"
+    order: Annotated[str, Word("auto", "curve", "as given")] = "auto"
 
-    __pydantic_config__ = FORBID_EXTRA
-
-    def __post_init__(self) -> None:
-        problems = []
-        for name, allowed in (("search", SEARCHES), ("order", ORDERS)):
-            value = getattr(self, name)
-            if value not in allowed:
-                problems.append(f"neighbours: {name} = {value!r}; {did_you_mean(str(value), allowed)}")
-        if not is_word(self.margin, "auto"):
-            try:
-                object.__setattr__(self, "margin", si(self.margin, "m", "neighbours: margin", above=0.0))
-            except BadInput as error:
-                problems += error.problems
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units."""
-        return {"search": self.search, "margin": self.margin, "order": self.order}
+    place: ClassVar[str] = "neighbours"
 
     def uses_spatial_sort(self, count: int) -> bool:
         """Whether `count` grains are sorted in memory."""

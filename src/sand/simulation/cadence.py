@@ -186,6 +186,13 @@ class Schedule:
         """Whether the next output is due at this time [s] and step."""
         return self.due <= time or self.step_due <= step
 
+    def take(self, time: float, step: int) -> bool:
+        """Whether the next output is due at this time [s] and step; if so, move to the one after it."""
+        is_due = self.is_due(time, step)
+        if is_due:
+            self.advance(time, step)
+        return is_due
+
     def advance(self, time: float, step: int = 0) -> None:
         """Move to the first output after an output at this time [s] and step."""
         self._advance(time, step, time + NEAR * self._spacing() if self._timed else time)

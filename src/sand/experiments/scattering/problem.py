@@ -13,8 +13,8 @@ from ...basics.constants import BOLTZMANN
 from ...basics.grains import Grains
 from ...basics.material import Material, as_material
 from ...basics.units import dimensions, format_quantity, in_unit, is_word, si
+from ...basics.vectors import three
 from ...errors import BadInput, ErrorCollector, did_you_mean
-from ...forces.vectors import three
 from ...theory.magnetic import thermal_speed
 from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from ...basics.material import PRESETS
+from ...basics.settings import For
 from ...config.case import MaterialSection, material_errors, with_absolute_files
 from ...config.commands import refuse_other_command
 from ...config.key_errors import validate
-from ...config.sections import PathName, Section, Seed
+from ...config.sections import PathName, Section, Seed, with_keys
 from ...errors import BadInput, ErrorCollector
 from ...io.run_folder import read_toml
 from ..collision_case import BodyKind, BodySection
@@ -26,21 +27,15 @@ class ScatterBody(BodySection):
     """Builder (as for `sand build`), or `file`."""
 
 
+@with_keys(flight, "radius", "material", "moment", "projectile", "target", "speed")
 class FlightSection(Section):
     """Section [flight]: initial conditions, with the arguments of `sand.experiments.scattering.flight`."""
 
-    temperature: Any = 0.0
+    if TYPE_CHECKING:
+        spin: Any
     speed: Any = None
-    speed_unit: str = "m/s"
-    spin: Any = "none"
-    start: Any = "auto"
-    start_shape: str = "plane"
-    orientation: str = "random"
-    target_velocity: Any = None
-    field: Any = None
-    escape: Any = "auto"
-    outcome: str = "hit"
-    tolerance: Any = 1e-8
+    """Speed v∞ of the projectile > 0 [m/s], or in units of its v_th = √(k_B T/m) with `speed_unit="thermal"`. One, or a
+    list."""
 
 
 class MeasureSection(Section):
@@ -50,9 +45,9 @@ class MeasureSection(Section):
     """Quantity to compute: cross-sections, a map of hit probabilities, or trajectories."""
     relative_error: Annotated[float, Field(ge=1e-4, le=0.5, strict=True)] = 0.02
     """Relative standard error of cross-sections at which sampling stops, 1e-4 … 0.5."""
-    impact_parameters: list[Any] = Field(default_factory=list)
+    impact_parameters: Annotated[list[Any], For("job", "trajectories")] = Field(default_factory=list)
     """Impact parameters of trajectories [m], or as text "0.95 b_max"."""
-    spins: list[Any] = Field(default_factory=list)
+    spins: Annotated[list[Any], For("job", "trajectories")] = Field(default_factory=list)
     """Spins of trajectories, each as `flight.spin`; they replace it."""
     cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
     """Cells of a map along the impact parameter."""
@@ -94,13 +89,7 @@ class ScatterCase(Section):
         speeds = speed if isinstance(speed, list) else [] if speed is None else [speed]
         if not speeds:
             errors.problems.append("flight.speed is missing; give one, or a list of them")
-        if measure.job != "trajectories":
-            errors.problems += [
-                f"measure.{name} is for job = 'trajectories'; leave it out"
-                for name in ("spins", "impact_parameters")
-                if getattr(measure, name)
-            ]
-        elif len(speeds) > 1:
+        if measure.job == "trajectories" and len(speeds) > 1:
             errors.problems.append("flight.speed: trajectories are computed for a single speed; give one")
         found = [
             errors.take(flight, **bodies, **given, speed=v, spin=w)

@@ -1,9 +1,8 @@
 """Loops of external forces: one formula over all grains."""
 
-import functools
-
 from ...basics.box import nearest_image
 from ...compiler.jit import loop
+from ...compiler.recipes import factory
 from ...compiler.stage import stage
 from ...numerics.vec import accrue, dot, load
 from .formulas import GrainState
@@ -82,7 +81,7 @@ def wrapping_work(formula_of_grain):
     return sum_work
 
 
-@functools.cache
+@factory
 def external_energies_for(formula_of_grain):
     """The stage that computes the energy [J] of each grain by one formula.
 

@@ -1,6 +1,5 @@
 """Loops of a long-range force: sums in blocks, rates, energies, single pairs."""
 
-import functools
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.jit import loop
+from ...compiler.recipes import factory
 from ...compiler.stage import Stage, stage
 
 PARALLEL_FROM = 1000
@@ -70,7 +70,7 @@ class LongRangeSums(NamedTuple):
     own_memory: bool = False  # blocks keep their sums in the parameters, never in long_range.block_sums
 
 
-@functools.cache
+@factory
 def long_range_energies_for(sums: LongRangeSums) -> Stage:
     """The stage that adds half of each pair energy [J] of one force to both grains.
 

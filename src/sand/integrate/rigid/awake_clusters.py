@@ -1,6 +1,5 @@
 """Clusters of rigid-body runs that are awake: rigid kicks by other bodies, and what tells whether they are at rest."""
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -9,6 +8,7 @@ import numpy as np
 from ...basics.box import nearest_image
 from ...basics.constants import MAGNETIC
 from ...basics.state import CONTACTS
+from ...compiler.recipes import factory
 from ...compiler.stage import Stage, stage
 from ...contact.constants_table import column_loops
 from ...contact.law import ContactLaw
@@ -79,7 +79,7 @@ def kick_clusters(grains, contacts, clusters, span, scratch, parameters):
     return 0
 
 
-@functools.cache
+@factory
 def measure_clusters_stage(law: ContactLaw) -> Stage:
     """The stage that fills `ClusterMeasures`, its parameters, and `clusters.offset`, from the centres of mass."""
     constants_at, at_break = column_loops(law).at, law.at_break

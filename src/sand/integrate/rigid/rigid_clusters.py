@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ...basics.arguments import checked
 from ...basics.grains import Grains
-from ...basics.units import is_word, si
+from ...basics.settings import Number, Table
 from ...compiler.stage import Stage
-from ...errors import FORBID_EXTRA, BadInput, shown
-from ..integrator import register
+from ..integrator import IntegratorSettings, register
 from ..step_control import StepCriteria
 from ..verlet import Verlet
 
-MOST_VIBRATION, MOST_STEP_FRACTION = 0.1, 0.2
-"""Largest values accepted: above, clusters would come to rest while they swing, and steps would not be accurate."""
 SAMPLES = 4
 """Vibrations of awake clusters are measured this often in the shortest time after which a cluster may be at rest."""
 
@@ -37,7 +35,7 @@ class RigidLimits(NamedTuple):
 @register
 @checked
 @dataclass(frozen=True)
-class RigidClusters:
+class RigidClusters(IntegratorSettings):
     """Clusters at rest move as rigid bodies with long steps; grains of awake clusters take contact steps within these.
 
     A cluster comes to rest when its vibrational energy has been low for half of its slowest period and no touch is
@@ -67,44 +65,22 @@ class RigidClusters:
         If a parameter is out of range.
     """
 
-    vibration: Any = 0.01
-    step_fraction: Any = 0.1
-    longest_step: Any = "auto"
-    contact_stepping: Verlet = field(default_factory=Verlet)
+    # above the largest values clusters would come to rest while they swing, and steps would not be accurate
+    vibration: Annotated[Any, Number(above=0.0, most=0.1)] = 0.01
+    step_fraction: Annotated[Any, Number(above=0.0, most=0.2)] = 0.1
+    longest_step: Annotated[Any, Number("s", above=0.0, auto=True)] = "auto"
+    contact_stepping: Annotated[Verlet, Table(Verlet)] = field(default_factory=Verlet)
 
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "rigid-clusters"
+    clusters: ClassVar[str] = "rigid"
+    moves_bodies: ClassVar[bool] = True
     flight: ClassVar[Stage | None] = None
 
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        bounds = {"vibration": MOST_VIBRATION, "step_fraction": MOST_STEP_FRACTION, "longest_step": math.inf}
-        for key, most in bounds.items():
-            value = getattr(self, key)
-            if key == "longest_step" and is_word(value, "auto"):
-                continue
-            try:
-                unit = "s" if key == "longest_step" else "1"
-                object.__setattr__(self, key, si(value, unit, f"stepping: {key}", above=0.0))
-                if getattr(self, key) > most:
-                    problems.append(f"stepping: {key} = {getattr(self, key):g} must be above 0 and at most {most:g}")
-            except BadInput as error:
-                problems.extend(error.problems)
-        if not isinstance(self.contact_stepping, Verlet):
-            problems.append(f"stepping: contact_stepping = {shown(self.contact_stepping)}; give sand.Verlet(…)")
-        elif self.contact_stepping.far.startswith("taylor"):
-            problems.append(
-                f"stepping: far = {self.contact_stepping.far!r} is not possible with rigid clusters; use 'impulse' or "
-                "'every step'"
-            )
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        contact_stepping = {k: v for k, v in self.contact_stepping.parameters().items() if k != "method"}
-        own = {key: getattr(self, key) for key in ("vibration", "step_fraction", "longest_step")}
-        return {"method": self.name, **own, "contact_stepping": contact_stepping}
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """Taylor series of long-range forces, which need steps of all grains."""
+        if "contact_stepping" not in wrong and self.contact_stepping.far.startswith("taylor"):
+            far = self.contact_stepping.far
+            yield f"far = {far!r} is not possible with rigid clusters; use 'impulse' or 'every step'"
 
     def resolved(self, grains: Grains, criteria: StepCriteria) -> RigidClusters:
         """These settings: the driver chooses the automatic step."""

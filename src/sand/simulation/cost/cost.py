@@ -26,7 +26,7 @@ from ...compiler.jit import cache_folder
 from ...compiler.progress import compilation_seconds
 from ...contact.model import Contact
 from ...forces.pair.ewald_force import EwaldForce
-from ...integrate.rigid.rigid_clusters import RigidClusters
+from ...integrate.integrator import moves_bodies
 from ...integrate.task_queue import uses_task_queue
 from ...neighbours.search import share_within
 from ..cadence import FRAMES, number_in, read_cadence
@@ -119,11 +119,11 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
     span = min(end, found.span)
     output = outputs(simulation, span, found.total) * output_seconds(simulation) * speeds[OUTPUT]
     parts = {"stepping": stepping, "output": output, "start": (START + FIGURE) * speeds[DRAWING]}
-    rigid = isinstance(simulation.stepping, RigidClusters)
+    bodies = moves_bodies(simulation.stepping)
     return Cost(
         span / found.total,
         found.total,
-        found.awake if rigid else None,
+        found.awake if bodies else None,
         math.fsum(parts.values()),
         parts,
         memory,
@@ -220,7 +220,7 @@ class StepTimer:
 
     def __init__(self, simulation: Simulation, clock: Callable[[], float] = time.thread_time):
         self._of, self._clock, self._calls = weakref.ref(simulation), clock, 0  # it ends with the simulation
-        self._rigid = isinstance(simulation.stepping, RigidClusters)
+        self._moves_bodies = moves_bodies(simulation.stepping)
         self._kind, self._long_range = kind_of(simulation), long_range_seconds(simulation)
         self._rough_output = output_seconds(simulation)
         # of each kind of step, and of outputs and figures: number, their time [s], and the rough estimate of that [s]
@@ -272,7 +272,7 @@ class StepTimer:
 
     def _add(self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int) -> None:
         steps, seconds, awake_steps, substeps, awake = map(sub, after, before)
-        if self._rigid:
+        if self._moves_bodies:
             found = {"bodies": (steps, seconds - awake), "awake": (awake_steps, awake)}
             self._count("awake", 0, 0.0, substeps * PER_SUBSTEP)
         elif (contacts > 0) != (contacts_after > 0):

@@ -15,7 +15,7 @@ import numpy as np
 from ...basics.constants import MAGNETIC
 from ...contact.law import contact_constants
 from ...contact.model import Contact
-from ...integrate.rigid.rigid_clusters import RigidClusters
+from ...integrate.integrator import moves_bodies
 from ...integrate.rigid.rigid_driver import LARGEST_TURN, TURN_PER_FRACTION
 from ...integrate.step_control import FLIGHT_FRACTION, MAX_FIELD_PHASE, MAX_SPIN_ANGLE
 from .coagulation import (
@@ -114,7 +114,7 @@ def expected_steps(simulation: Simulation, end: float, last_step: float, *, may_
     of_contacts, of_flight = (fixed, fixed) if fixed > 0.0 else (contact_step(simulation), flight_step(simulation))
     of_contacts = min(of_contacts, of_flight) if math.isinf(of_contacts) else of_contacts
     begun = len(simulation.start) - bodies.number
-    if isinstance(simulation.stepping, RigidClusters):
+    if moves_bodies(simulation.stepping):
         limits = simulation._engine.parameters.flight_limits
         step = body_step(simulation, bodies, 0.0 if math.isinf(end) else end)
         if math.isinf(end):

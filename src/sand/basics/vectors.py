@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..basics.units import si
 from ..errors import BadInput, shown
+from .units import si
 
 
 def components(value: Any) -> list[Any] | None:
