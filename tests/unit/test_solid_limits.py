@@ -206,11 +206,11 @@ def test_a_grain_pressed_between_walls_is_warned_of():
 def test_a_clock_of_an_earlier_version_goes_on_from_zero():
     """A checkpoint without the extremes, as in tests/reference, is read; they begin at 0."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], "1 um", "silica"), [sand.Contact()])
-    saved = {name: array.copy() for name, array in sim._engine._state.to_arrays().items()}
+    state = sim.regular_state
+    saved = {name: array.copy() for name, array in state.to_arrays().items()}
     saved["clock"] = np.arange(1.0, LEAST_CLOCK + 1.0)
-    sim._engine._state.from_arrays(saved)
-    clock = sim._engine._state.clock
-    assert clock.tolist() == [*saved["clock"], *[0.0] * (len(CLOCK) - LEAST_CLOCK)]
+    state.from_arrays(saved)
+    assert state.clock.tolist() == [*saved["clock"], *[0.0] * (len(CLOCK) - LEAST_CLOCK)]
 
 
 # --- spins ---------------------------------------------------------------------------------------------------------
