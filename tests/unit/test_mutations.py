@@ -151,7 +151,7 @@ def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, c
 
 COLLISION = """
 [target]
-kind = "pca"
+kind = "bpca"
 grains = 4
 radius = "0.3 um"
 material = "silica"
