@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sand.contact.events import compact_contacts
-from sand.contact.update import BROKEN_FLAG
+from sand.contact.transitions import BROKEN_FLAG
 from sand.state.arrays import ContactArrays, empty_contact_arrays
 from sand.state.state import CONTACTS, COUNT
 

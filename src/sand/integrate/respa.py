@@ -15,7 +15,8 @@ import numpy as np
 
 from ..box import nearest_image
 from ..compiler.jit import loop
-from ..contact.update import BROKEN_FLAG, padded_contact_count
+from ..contact.transitions import BROKEN_FLAG
+from ..contact.update import padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..state.state import CONTACTS
 
