@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import sand
-from sand.threads import set_threads
+from sand.basics.threads import set_threads
 
 from .long_range import PER_VOLUME, dimers, seconds_per_step
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 import sand
+from sand.basics.arrays import empty_long_range_arrays
 from sand.compiler.stage import stage
 from sand.integrate.motion import drift_for
 from sand.neighbours.cell_list import rebuild_verlet_list
-from sand.state.arrays import empty_long_range_arrays
 
 from . import decks, machine, worlds
 from .steps import beside

@@ -21,8 +21,8 @@ from scipy.stats import mannwhitneyu, wilcoxon
 import sand
 from sand.analysis.clusters import aggregate_moments, cluster_labels, unwrapped
 from sand.analysis.shape import gyration_radius
+from sand.basics.state import BROKEN, CONTACT_STEPS, GRAINS_AWAKE, LATE, MADE, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 from sand.io.table import write_table
-from sand.state.state import BROKEN, CONTACT_STEPS, GRAINS_AWAKE, LATE, MADE, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 
 TABLE = Path(__file__).parents[1] / "docs" / "physics" / "rigid-clusters.csv"
 BOX, TEMPERATURE = 1.2e-6, 100.0

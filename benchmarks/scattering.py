@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.experiments.scattering import flight, trajectory
 from sand.experiments.scattering.flights import fly
 from sand.experiments.scattering.sampling import Task

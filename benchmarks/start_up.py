@@ -33,7 +33,7 @@ temperature = "100 K"
 BEGIN = """
 import sys, time
 from sand.cli.main import main
-from sand.simulation.engine import Engine
+from sand.engine.engine import Engine
 begin = Engine.begin
 def told(self):
     begin(self)

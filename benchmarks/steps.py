@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import sand
-from sand.state.state import SLIPPED
+from sand.basics.state import SLIPPED
 
 from . import decks, lammps, machine, worlds
 from .table import row

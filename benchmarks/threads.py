@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.threads import cores
+from sand.basics.threads import cores
 
 from . import worlds
 from .table import row

@@ -18,10 +18,10 @@ import numpy as np
 
 import sand
 from sand.analysis.clusters import cluster_labels
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
+from sand.basics.state import BROKEN, MADE
 from sand.contact.law import contact_constants
 from sand.io.table import write_table
-from sand.state.state import BROKEN, MADE
 
 TABLE = Path(__file__).parents[1] / "docs" / "physics" / "vibrations.csv"
 BOX, TEMPERATURE, UNTIL = 1.2e-6, 100.0, 5e-6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.contact.jkr import rest_overlap, rest_radius
 
 PEER = sand.SILICA.but(name="silica as in LAMMPS", density=2000.0, rolling_limit="2 angstrom")

@@ -24,7 +24,7 @@ from scipy.special import gamma
 import sand
 from sand.analysis.body_motion import body_motion, body_temperatures
 from sand.analysis.clusters import aggregate_moments, cluster_labels, mean_cluster_size
-from sand.constants import BOLTZMANN, MAGNETIC
+from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.experiments.growth import boxes_in
 
 KT = BOLTZMANN * 100.0

@@ -28,7 +28,7 @@ import sand
 from sand.analysis.clusters import cluster_labels
 from sand.analysis.fits import PowerLawFit, power_law
 from sand.analysis.shape import gyration_radius
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
 from sand.experiments import scattering
 from sand.io.table import write_table
 from sand.plotting.run_figure import save

@@ -19,11 +19,11 @@ import numpy as np
 
 import sand
 from sand.analysis.clusters import cluster_labels
+from sand.basics.units import si
 from sand.io.table import write_table
 from sand.plotting.run_figure import save
 from sand.plotting.style import BLUE, GREEN, RED, legend_above, panel_letter, plot_style
 from sand.theory import kinetics
-from sand.units import si
 
 MAGNETIC_DENSITY = 125 / 1.293e-6**3
 """Number density of the magnetic grains [1/m³], that of growth.toml; as many grains without a moment are added."""

@@ -25,11 +25,11 @@ import numpy as np
 import sand
 from sand.analysis.clusters import cluster_labels, unwrapped
 from sand.analysis.shape import projected_area
+from sand.basics.units import si
 from sand.io.table import write_table
 from sand.plotting.run_figure import save
 from sand.plotting.style import BLUE, RED, legend_above, panel_letter, plot_style
 from sand.setup.encounters import combined
-from sand.units import si
 
 RADIUS = 1e-8
 DIMENSION = 1.54

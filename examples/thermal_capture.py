@@ -16,7 +16,7 @@ from scipy.special import gamma, roots_genlaguerre
 
 import sand
 from sand import theory
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
 from sand.experiments.scattering import cross_section
 
 GRAIN = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg"}

@@ -137,24 +137,6 @@ def external(folder: Path) -> dict[str, Any]:
 
 
 @golden
-def adaptive(folder: Path) -> dict[str, Any]:
-    """Runge–Kutta steps without contacts, event location, then Verlet; with a field ramp."""
-    forces = [sand.Contact(), sand.Dipoles(), sand.Field("1 mT", shape="ramp", final="5 mT", end="1 ns")]
-    sim = sand.Simulation(gas(6, "0.15 um"), forces, stepping=sand.Adaptive())
-    sim.run(steps=4000)
-    return end_of(sim)
-
-
-@golden
-def fourth_order(folder: Path) -> dict[str, Any]:
-    """Steps of fourth order without contacts, event location, then Verlet; with a field ramp."""
-    forces = [sand.Contact(), sand.Dipoles(), sand.Field("1 mT", shape="ramp", final="5 mT", end="1 ns")]
-    sim = sand.Simulation(gas(6, "0.15 um"), forces, stepping=sand.ForestRuth(accuracy=1e-6))
-    sim.run(steps=4000)
-    return end_of(sim)
-
-
-@golden
 def many(folder: Path) -> dict[str, Any]:
     """Above the sizes for parallel blocks and spatial sorting; one thread and two."""
     numbers = {}

@@ -6,10 +6,10 @@ that.  Tests with the same first group share a worker of pytest-xdist, so that w
 
 from __future__ import annotations
 
-SPECS = ("contacts", "dipoles", "listed", "fields", "adaptive", "threads", "scattering", "small")
-"""Contacts alone; with dipoles; with a Verlet list and a gas; with fields in time; integrators other than Verlet;
+SPECS = ("contacts", "dipoles", "listed", "fields", "flights", "threads", "scattering", "small")
+"""Contacts alone; with dipoles; with a Verlet list and a gas; with fields in time; an integrator of the user;
 blocks shared by threads; two-body scattering; anything that compiles in a second or two."""
-WORKERS = {"adaptive": "trajectories", "scattering": "trajectories"}
+WORKERS = {"flights": "trajectories", "scattering": "trajectories"}
 """Groups that share a worker, because tests compare one with the other."""
 FIXTURES = {"finished_run": "fields", "run_in_field": "fields"}
 """Fixtures that run a simulation, and the group of its stages."""

@@ -10,8 +10,9 @@ import re
 from typing import Any
 
 from docutils import nodes
-from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
+
+from sand.config import template
 
 
 def attribute(path: str) -> Any:
@@ -31,18 +32,11 @@ def _entry(value: Any) -> nodes.entry:
 
 
 def keys_of(model: Any) -> list[tuple[str, str, str]]:
-    """Key, default and description of each field of a pydantic model; the description is the docstring below it."""
-    notes: dict[str, str] = {}
-    for kind in reversed(model.__mro__):
-        if kind.__module__.startswith("sand."):
-            for (owner, name), lines in ModuleAnalyzer.for_module(kind.__module__).find_attr_docs().items():
-                if owner == kind.__name__:
-                    notes[name] = " ".join(lines).strip()
+    """Key, default and description of each field of a section of a case file."""
     rows = []
-    for name, field in model.model_fields.items():
-        value = field.get_default(call_default_factory=True)
-        default = "required" if field.is_required() else "none" if value is None else f"`{json.dumps(value)}`"
-        rows.append((name, default, notes.get(name, "")))
+    for name, meaning, value in template.keys_of(model):
+        default = "required" if value is template.REQUIRED else "none" if value is None else f"`{json.dumps(value)}`"
+        rows.append((name, default, meaning))
     return rows
 
 

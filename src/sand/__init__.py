@@ -18,15 +18,15 @@ TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 
 
 _MODULES = {
-    "Box": "box",
-    "Grains": "grains",
-    "Material": "material",
-    "ICE": "material",
-    "SILICA": "material",
-    "GRAPHITE": "material",
-    "FORSTERITE": "material",
-    "IRON": "material",
-    "MAGNETITE": "material",
+    "Box": "basics.box",
+    "Grains": "basics.grains",
+    "Material": "basics.material",
+    "ICE": "basics.material",
+    "SILICA": "basics.material",
+    "GRAPHITE": "basics.material",
+    "FORSTERITE": "basics.material",
+    "IRON": "basics.material",
+    "MAGNETITE": "basics.material",
     "SandError": "errors",
     "BadInput": "errors",
     "FilesFailed": "errors",
@@ -34,17 +34,17 @@ _MODULES = {
     **FORCES,
     "external_force": "forces.own",
     "pair_force": "forces.own",
-    "Ramp": "ramps",
+    "Ramp": "basics.ramps",
     **INTEGRATORS,
-    "Neighbours": "neighbours.settings",
+    "Neighbours": "neighbours.search",
     "Simulation": "simulation.simulation",
-    "Wall": "simulation.walls",
+    "Wall": "engine.walls",
     "resume": "config.build",
     "open": "results",
-    "Driven": "simulation.driven",
+    "Driven": "engine.driven",
     "Observer": "simulation.observers",
     "Updater": "simulation.updater",
-    "set_threads": "threads",
+    "set_threads": "basics.threads",
     "Outcome": "simulation.outcome",
     "Result": "simulation.outcome",
 }
@@ -60,9 +60,21 @@ if TYPE_CHECKING:
     from . import io as io
     from . import setup as setup
     from . import theory as theory
-    from .box import Box as Box
+    from .basics.box import Box as Box
+    from .basics.grains import Grains as Grains
+    from .basics.material import FORSTERITE as FORSTERITE
+    from .basics.material import GRAPHITE as GRAPHITE
+    from .basics.material import ICE as ICE
+    from .basics.material import IRON as IRON
+    from .basics.material import MAGNETITE as MAGNETITE
+    from .basics.material import SILICA as SILICA
+    from .basics.material import Material as Material
+    from .basics.ramps import Ramp as Ramp
+    from .basics.threads import set_threads as set_threads
     from .config.build import resume as resume
     from .contact.model import Contact as Contact
+    from .engine.driven import Driven as Driven
+    from .engine.walls import Wall as Wall
     from .errors import BadInput as BadInput
     from .errors import FilesFailed as FilesFailed
     from .errors import Interrupted as Interrupted
@@ -77,29 +89,15 @@ if TYPE_CHECKING:
     from .forces.pair.inverse_square import Attraction as Attraction
     from .forces.pair.inverse_square import Charges as Charges
     from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
-    from .grains import Grains as Grains
-    from .integrate.adaptive import Adaptive as Adaptive
-    from .integrate.forest_ruth import ForestRuth as ForestRuth
-    from .integrate.rigid_clusters import RigidClusters as RigidClusters
+    from .integrate.rigid.rigid_clusters import RigidClusters as RigidClusters
     from .integrate.verlet import Verlet as Verlet
-    from .material import FORSTERITE as FORSTERITE
-    from .material import GRAPHITE as GRAPHITE
-    from .material import ICE as ICE
-    from .material import IRON as IRON
-    from .material import MAGNETITE as MAGNETITE
-    from .material import SILICA as SILICA
-    from .material import Material as Material
-    from .neighbours.settings import Neighbours as Neighbours
-    from .ramps import Ramp as Ramp
+    from .neighbours.search import Neighbours as Neighbours
     from .results import open as open
-    from .simulation.driven import Driven as Driven
     from .simulation.observers import Observer as Observer
     from .simulation.outcome import Outcome as Outcome
     from .simulation.outcome import Result as Result
     from .simulation.simulation import Simulation as Simulation
     from .simulation.updater import Updater as Updater
-    from .simulation.walls import Wall as Wall
-    from .threads import set_threads as set_threads
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,9 @@ import numpy as np
 
 from .analysis.clusters import cluster_labels
 from .analysis.ledger_columns import LedgerColumns
-from .arguments import checked
+from .basics.arguments import checked
+from .basics.paths import user_path
+from .basics.units import format_quantity, si
 from .config.build import simulate
 from .config.case import read_case
 from .errors import BadInput, ErrorCollector, import_optional, shown
@@ -22,11 +24,9 @@ from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
-from .paths import user_path
 from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
-from .units import format_quantity, si
 from .viewer.external_field import read_field
 from .viewer.show import view_folder
 

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.box import Box
+from sand.basics.box import Box
+from sand.basics.own_quantities import OwnQuantities
 from sand.io import run_folder as files
 from sand.io.damage import sealed
 from sand.io.ledger_table import LedgerFile
 from sand.io.trajectory import TrajectoryWriter
-from sand.own_quantities import OwnQuantities
 
 RADIUS = 10e-9
 SUNK = 0.997

@@ -13,14 +13,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sand.box import Box
+from sand.basics.box import Box
+from sand.basics.material import IRON, SILICA
+from sand.basics.state import LOST
 from sand.io.damage import sealed
 from sand.io.frame_chunks import MODES
 from sand.io.ledger_table import LedgerFile
 from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
 from sand.io.trajectory import TrajectoryWriter
-from sand.material import IRON, SILICA
-from sand.state.state import LOST
 from sand.viewer.external_field import FieldDescription
 
 R = 10e-9

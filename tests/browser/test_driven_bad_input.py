@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sand.box import Box
+from sand.basics.box import Box
 from sand.errors import BadInput
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page

@@ -6,7 +6,7 @@ Grains are 0.3 of their size and bars 0.45 radii of the smaller grain thick, so 
 import numpy as np
 import pytest
 
-from sand.box import Box
+from sand.basics.box import Box
 
 from .eye import Eye
 from .looking import SOURCES, View, agree, numbers, size

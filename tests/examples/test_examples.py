@@ -19,7 +19,7 @@ from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.experiments.collision_case import read_collision
 from sand.experiments.scattering import sampling
-from sand.experiments.scattering.case import read_scattering
+from sand.experiments.scattering.scatter_case import read_scattering
 from sand.io.run_folder import read_toml
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

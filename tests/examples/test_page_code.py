@@ -9,6 +9,8 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
+from sand.integrate.registry import INTEGRATORS
+
 quoted = pytest.importorskip("benchmarks.quoted", reason="benchmarks are not beside the tests")
 from benchmarks import page_code  # noqa: E402
 
@@ -27,6 +29,7 @@ def as_docs(tmp_path, monkeypatch):
     matplotlib.use("Agg")
     yield
     plt.close("all")
+    INTEGRATORS.pop("forest-ruth", None)  # which a page registers
 
 
 def shortened(code: str) -> str:

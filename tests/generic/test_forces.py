@@ -10,22 +10,23 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import sand
+from sand.basics.arrays import empty_long_range_arrays
+from sand.basics.constants import MAGNETIC
 from sand.config.case import ForcesSection
-from sand.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.forces import BUILT_IN
 from sand.forces.external.formulas import GrainState
-from sand.forces.pair import dipole_loops, generic_loops, loops
+from sand.forces.pair import dipole_loops, generic_loops
+from sand.forces.pair import long_range_loops as loops
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import pair_load_cut
 from sand.forces.pair.generic_loops import PairGrain, PairParameters, cut_pair
-from sand.forces.pair.loops import ALL_PAIRS_BLOCKS, first_row, listed_blocks
+from sand.forces.pair.long_range_loops import ALL_PAIRS_BLOCKS, first_row, listed_blocks
 from sand.forces.pair.pair_force import PairForce
 from sand.forces.registry import FORCES, register
 from sand.integrate.force_stages import SUM, WHOLE, pair_force_stages
 from sand.neighbours.cell_list import build_verlet_list
 from sand.numerics.vec import cross
-from sand.state.arrays import empty_long_range_arrays
 
 from ..tables import table_of
 

@@ -9,17 +9,17 @@ import pytest
 
 import sand
 from sand.analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, names_of
-from sand.box import Box
+from sand.basics.box import Box
+from sand.basics.grains import GrainArrays
+from sand.basics.own_quantities import RESERVED, OwnQuantities, joined
+from sand.basics.own_units import si_unit, with_own_unit
+from sand.basics.schema import FIELDS
 from sand.cli.main import main
-from sand.grains import GrainArrays
-from sand.io.bodies import read_body, write_body
 from sand.io.frame import OF_CONTACTS, OF_GRAINS, Frame, FrameSequence
-from sand.own_quantities import RESERVED, OwnQuantities, joined
-from sand.own_units import si_unit, with_own_unit
+from sand.io.read_grains import read_body, write_body
 from sand.plotting.plots import HISTORY
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import si_prefix
-from sand.schema import FIELDS
 from sand.setup.encounters import encounter
 from sand.simulation.change import Change
 from sand.viewer.packets import frame_packet
@@ -369,8 +369,8 @@ def test_frames_give_tables_starts_and_pages(run):
 
 def five_frame(index=slice(None)):
     """A frame of grains of `five`."""
-    from sand.io.bodies import contacts_of
     from sand.io.frame_chunks import stored_frame
+    from sand.io.read_grains import contacts_of
 
     grains = five()[index]
     return Frame(stored_frame(0, 0.0, grains, Box.open(), contacts_of(grains)))

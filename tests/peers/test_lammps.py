@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import COULOMB, MAGNETIC
+from sand.basics.constants import COULOMB, MAGNETIC
 from sand.contact import jkr
 from sand.theory import contact
 

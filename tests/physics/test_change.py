@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import CONTACTS
 from sand.errors import BadInput
-from sand.state.state import CONTACTS
 
 
 def warm_gas(damped=True, **options):
@@ -263,7 +263,7 @@ def test_every_mistake_has_a_line_and_nothing_is_changed(wrong):
     assert len(caught.value.problems) >= len(MISTAKES[wrong])
     for pattern in MISTAKES[wrong]:
         assert re.search(pattern, str(caught.value)), str(caught.value)
-    assert sim.box.lengths == (0.4e-6,) * 3 and len(sim.grains) == 6 == sim._next_id
+    assert sim.box.lengths == (0.4e-6,) * 3 and len(sim.grains) == 6 == sim._system.next_id
     assert (sim.grains.id == np.arange(6)).all()
     assert len(before) == len(sim.state.to_arrays())
 

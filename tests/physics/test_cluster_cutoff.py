@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 import sand
-from sand import threads
-from sand.constants import BOLTZMANN, MAGNETIC
+from sand.basics import threads
+from sand.basics.constants import BOLTZMANN, MAGNETIC
+from sand.basics.state import COMPARED, CONTACTS, CUT_RADIUS, CUT_TIME
+from sand.engine import engine
 from sand.integrate import task_queue
 from sand.integrate.parts import Stop
-from sand.simulation import engine
-from sand.state.state import COMPARED, CONTACTS, CUT_RADIUS, CUT_TIME
+
+from ..plugins import ForestRuth
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:contacts of iron"),
@@ -203,8 +205,7 @@ def test_energy_and_loads_at_a_change(search):
 
 STEPPINGS = {
     "verlet": sand.Verlet(steps_per_period=160),
-    "adaptive": sand.Adaptive(contact_stepping=sand.Verlet(steps_per_period=160)),
-    "forest-ruth": sand.ForestRuth(contact_stepping=sand.Verlet(steps_per_period=160)),
+    "forest-ruth": ForestRuth(contact_stepping=sand.Verlet(steps_per_period=160)),
 }
 
 
@@ -256,7 +257,7 @@ def test_changes_are_the_same_for_any_output_and_interruption(tmp_path, neighbou
 
 
 @pytest.mark.compiled("dipoles", "listed")
-@pytest.mark.parametrize("stepping", ["verlet", "adaptive"])
+@pytest.mark.parametrize("stepping", ["verlet", "forest-ruth"])
 @pytest.mark.parametrize("order", ["as given", "curve"])
 def test_a_regular_step_that_is_not_kept_changes_nothing(monkeypatch, order, stepping):
     """The one shorter step to each output fails, as by a contact: the regular step is tried and taken back.

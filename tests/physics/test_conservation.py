@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
+from sand.basics.state import CONTACT_STEP
 from sand.contact import jkr
-from sand.state.state import CONTACT_STEP
 
 from .setups import PrescribedMotion, random_aggregate, rest_distance, struck_chain
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import DAMPING, LOST, RECORDED
 from sand.contact.law import LAWS, contact_constants
 from sand.contact.mixing import MIXING
-from sand.state.state import DAMPING, LOST, RECORDED
 
 from .setups import random_aggregate, rest_distance
 
@@ -173,17 +173,17 @@ def test_contact_time_without_adhesion_is_that_of_hertz():
         ({"mixing": "mean"}, "mixing = 'mean'; allowed: geometric"),
         ({"roll_factor": -1}, "roll_factor = -1 must be at least 0"),
         ({"rolling_limit": "1 kg"}, "rolling_limit = '1 kg' is not a quantity in m"),
-        ({"damping": "constant"}, "needs a damping_constant above 0"),
-        ({"damping": "viscoelastic"}, "needs a viscous_time above 0"),
+        ({"damping": "constant"}, "damping_constant is missing: damping = 'constant' needs"),
+        ({"damping": "viscoelastic"}, "viscous_time is missing: damping = 'viscoelastic' needs"),
         ({"damping": "critical", "damping_ratio": -0.1}, "damping_ratio = -0.1 must be above 0"),
-        ({"damping": "critical", "damping_ratio": 5.1}, "damping_ratio = 5.1 must be at most 5"),
-        ({"damping_ratio": 0.2}, "damping_ratio is given, but damping = 'none' does not use it"),
-        ({"damping": "critical", "viscous_time": "1 ps"}, "viscous_time is given, but damping = 'critical'"),
+        ({"damping": "critical", "damping_ratio": 5.1}, "damping_ratio = 5.1 must be above 0 and at most 5"),
+        ({"damping_ratio": 0.2}, "damping_ratio = 0.2 is not used by damping = 'none'"),
+        ({"damping": "critical", "viscous_time": "1 ps"}, "viscous_time = '1 ps' is not used by damping = 'critical'"),
         ({"bath_temperature": "100 K"}, "bath_temperature needs damping"),
         ({"damping": "critical", "bath_temperature": "0 K"}, "bath_temperature = '0 K' must be above 0 K"),
         ({"settling_time": 0.0}, "settling_time = 0.0 must be above 0 s"),
         ({"settling_time": "5 nm"}, "settling_time = '5 nm' is not a quantity in s"),
-        ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not a quantity in kg/s"),
+        ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not used by damping = 'none'"),
     ],
 )
 def test_bad_settings(settings, message):

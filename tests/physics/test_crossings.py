@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import State
 from sand.io.checkpoint import newest_checkpoint
-from sand.state.state import State
+
+from ..plugins import ForestRuth
 
 L = 1e-6
 BOX = sand.Box.periodic(L, L, None)
 STEPPINGS = {
     "verlet": (None, {}),
-    "forest-ruth": (lambda: sand.ForestRuth(), {}),
-    "adaptive": (lambda: sand.Adaptive(), {}),
+    "forest-ruth": (ForestRuth, {}),
     "rigid": (lambda: sand.RigidClusters(), {"damping": "critical", "settling_time": "0.1 ns"}),
 }
 
@@ -34,7 +35,7 @@ def unwrapped_of(grains):
     return grains.position + grains.image * np.array([L, L, 0.0])
 
 
-@pytest.mark.compiled("contacts", "fields", "adaptive")
+@pytest.mark.compiled("contacts", "fields", "flights")
 @pytest.mark.parametrize("name", STEPPINGS)
 def test_the_centre_of_mass_moves_on(name):
     """Σ m x/Σ m = x₀ + (Σ m v/Σ m) t with unwrapped x, whatever collides, because all forces are internal.
@@ -57,7 +58,7 @@ def test_the_centre_of_mass_moves_on(name):
     assert image[:6].max() >= 2 and image[6:].max() >= 1 and not image[:, 2].any()
 
 
-@pytest.mark.compiled("contacts", "fields", "adaptive")
+@pytest.mark.compiled("contacts", "fields", "flights")
 def test_crossings_are_kept(tmp_path):
     """A checkpoint, a snapshot, the removal of a grain and a scaled box keep them; a start from a frame begins at 0."""
     sim = sand.Simulation(gas_of(), [sand.Contact()], box=BOX, out=tmp_path / "run")

@@ -11,7 +11,9 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 import sand
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
+from sand.basics.state import DAMPING, LONG_RANGE_SUMS, ORDERED, STEP
+from sand.basics.threads import set_threads
 from sand.contact.damping import (
     DampingLoad,
     Dashpots,
@@ -24,9 +26,7 @@ from sand.contact.damping import (
     unit_deviates,
 )
 from sand.contact.law import LAWS, contact_constants
-from sand.simulation import engine as engines
-from sand.state.state import DAMPING, LONG_RANGE_SUMS, ORDERED, STEP
-from sand.threads import set_threads
+from sand.engine import engine as engines
 
 from .setups import random_aggregate, rest_distance
 from .test_reproducibility import state

@@ -8,6 +8,7 @@ import pytest
 import sand
 from sand.errors import BadInput
 
+from ..plugins import ForestRuth
 from .test_ramps import BOTH, RADIUS, REST, normal_energy
 
 
@@ -145,7 +146,7 @@ WRONG = {
     "run(sand.Driven([0, 9]), sand.Driven([0]))": ["there is no grain 9", "grain 0 is given more than once"],
     "run(sand.Driven([0, 1, 2]))": ["all 3 grains are driven"],
     "run('all')": ["driven = 'a'"],
-    "run(sand.Driven([0]), stepping=sand.Adaptive(), neighbours=sand.Neighbours(order='curve'))": ["adaptive", "curve"],
+    "run(sand.Driven([0]), stepping=ForestRuth(), neighbours=sand.Neighbours(order='curve'))": ["forest-ruth", "curve"],
     "run(sand.Driven([0]), settling='1 us')": ["settling_time"],
 }
 
@@ -157,7 +158,7 @@ def test_each_mistake_is_one_line(wrong):
         sand.Simulation(row_of_grains(3, 1e-8), [sand.Contact(settling_time=settling)], driven=given, **options)
 
     with pytest.raises(BadInput) as error:
-        eval(wrong, {"run": run, "sand": sand})
+        eval(wrong, {"run": run, "sand": sand, "ForestRuth": ForestRuth})
     assert len(error.value.problems) == len(WRONG[wrong])
     assert all(text in line for text, line in zip(WRONG[wrong], error.value.problems, strict=True)), (
         error.value.problems

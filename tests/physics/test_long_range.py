@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import BOLTZMANN, COULOMB
+from sand.basics.constants import BOLTZMANN, COULOMB
+from sand.basics.state import KICKED, STEP
 from sand.forces.gas.drag import rotation_friction, translation_friction
-from sand.state.state import KICKED, STEP
 
 
 def pair_crossing_the_cutoff(cut, step):

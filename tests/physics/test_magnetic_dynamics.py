@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 
 from .setups import rest_distance
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import State
 from sand.cli.main import main
 from sand.io.checkpoint import newest_checkpoint
-from sand.state.state import State
 
 from .test_killed import content
 from .test_reproducibility import gas_simulation, state

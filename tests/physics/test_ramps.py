@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import COULOMB
-from sand.state.state import BREAKING, OUTSIDE
+from sand.basics.constants import COULOMB
+from sand.basics.state import BREAKING, OUTSIDE
 
 RADIUS = 1e-7
 BOTH = sand.Contact().pairing(sand.SILICA, sand.SILICA)

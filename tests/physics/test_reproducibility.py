@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.integrate.registry import INTEGRATORS
-from sand.state.state import BROKEN, CONTACTS, CYCLE, LISTED, LONG_RANGE_SUMS, SLIPPED
-from sand.threads import set_threads
+from sand.basics.state import BROKEN, CONTACTS, CYCLE, LISTED, LONG_RANGE_SUMS, SLIPPED
+from sand.basics.threads import set_threads
 
+from ..plugins import STEPPINGS
 from .setups import random_aggregate, rest_distance, struck_chain
 
 
@@ -42,8 +42,8 @@ def test_the_frame_interval_changes_no_bit():
     assert ends[0] == ends[1] == ends[2]
 
 
-@pytest.mark.compiled("dipoles", "adaptive")
-@pytest.mark.parametrize("stepping", [each() for each in INTEGRATORS.values()], ids=lambda each: each.name)
+@pytest.mark.compiled("dipoles", "flights")
+@pytest.mark.parametrize("stepping", [each() for each in STEPPINGS.values()], ids=lambda each: each.name)
 def test_a_deep_copy_goes_on_with_the_same_bits(stepping):
     """A copy made after 200 steps and the original, each run further, are independent and equal to the last bit."""
     sim = gas_simulation(stepping=stepping)
@@ -117,9 +117,9 @@ def test_restart_with_an_old_pair_list_is_bit_for_bit():
 @pytest.mark.compiled("contacts")
 def test_array_sizes_change_no_bit():
     """Initial room for 16 or 4096 contacts and pairs, constants shared or per contact: the same bits."""
-    from sand.contact.columns import constant_names
+    from sand.basics.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
+    from sand.contact.constants_table import constant_names
     from sand.contact.jkr import LAW
-    from sand.state.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
 
     ends = []
     for room, uniform in ((16, True), (4096, True), (16, False), (4096, False)):
@@ -148,11 +148,11 @@ def test_times_are_met_to_the_last_bit():
     assert sorted({k * 1e-9 for k in range(10)} | {*ends, 10e-9}) == [row["time"] for row in sim.ledger.rows]
 
 
-@pytest.mark.compiled("dipoles")
-@pytest.mark.parametrize("integrator", list(INTEGRATORS))
+@pytest.mark.compiled("dipoles", "flights")
+@pytest.mark.parametrize("integrator", STEPPINGS)
 def test_a_continued_run_has_the_bits_of_a_direct_one(integrator):
     """Ends of runs and frames are shown by a copy of the regular state: neither changes a regular step."""
-    stepping = INTEGRATORS[integrator]
+    stepping = STEPPINGS[integrator]
     direct = gas_simulation(stepping=stepping())
     direct.run(until="10 ns")
     continued = gas_simulation(frame_every="0.37 ns", stepping=stepping())
@@ -198,7 +198,6 @@ import sys, warnings; warnings.simplefilter("ignore")
 import numpy as np
 from tests.physics.setups import random_aggregate
 import sand
-from sand.integrate.registry import INTEGRATORS
 fast = 8.0 * np.random.default_rng(3).normal(size=(5, 3))
 grains = random_aggregate(5, 7, radii=(5e-9, 1e-8), moment="300 A m^2/kg", velocity=fast)
 field = sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")
@@ -231,7 +230,7 @@ def test_compiled_and_interpreted_runs_agree_to_rounding(tmp_path):
 def test_kernels_against_plain_python_loops():
     """Pair list, contact loads and gather against double loops in NumPy, to 1e-9 of the largest load."""
     from sand.contact import jkr, mechanics
-    from sand.contact.columns import column_loops
+    from sand.contact.constants_table import column_loops
 
     grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])

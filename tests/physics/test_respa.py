@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.state.state import CONTACT_STEP, CYCLE, LEFT, LONG_RANGE_SUMS
+from sand.basics.state import CONTACT_STEP, CYCLE, LEFT, LONG_RANGE_SUMS
 
 from .setups import rest_distance
 

@@ -10,11 +10,11 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 import sand
-from sand.constants import BOLTZMANN
-from sand.integrate import body_friction
-from sand.integrate.body_friction import friction_modes, kick_body
-from sand.state.arrays import body_arrays
-from sand.state.state import KICKED, LATE, MADE, RESTED, SOME_AWAKE, TIME, WOKEN
+from sand.basics.arrays import body_arrays
+from sand.basics.constants import BOLTZMANN
+from sand.basics.state import KICKED, LATE, MADE, RESTED, SOME_AWAKE, TIME, WOKEN
+from sand.integrate.rigid import body_friction
+from sand.integrate.rigid.body_friction import friction_modes, kick_body
 
 from .setups import different, rest_distance
 

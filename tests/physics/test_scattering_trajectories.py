@@ -9,12 +9,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sand
+from sand.basics.constants import MAGNETIC
 from sand.cli.main import main
-from sand.constants import MAGNETIC
 from sand.experiments.scattering import cross_sections as scattering
 from sand.experiments.scattering.flights import BOUNCE, COLUMNS, fly
 from sand.experiments.scattering.maps import probability_map
 from sand.experiments.scattering.sampling import Task
+
+from ..plugins import ForestRuth
 
 END, HIT, MISS = COLUMNS.index("end"), 0, 1
 IRON = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg", "temperature": "100 K"}
@@ -92,9 +94,9 @@ def test_against_scipy():
         assert np.abs(mine - theirs).max() < 1e-6 * size
 
 
-@pytest.mark.compiled("scattering", "adaptive")
+@pytest.mark.compiled("scattering", "flights")
 def test_against_the_simulation():
-    """The same pair in `Simulation` with `Adaptive` steps and quaternions: the same positions to 1e-5 of R."""
+    """The same pair in `Simulation` with steps of fourth order and quaternions: the same positions to 1e-5 of R."""
     pair = unequal_pair(field=None)
     ours = scattering.trajectory(pair, "150 nm")
     grains = sand.Grains(
@@ -105,7 +107,7 @@ def test_against_the_simulation():
         spin=[ours.spin_projectile[0], ours.spin_target[0]],
         moment=[pair.projectile.moment[0], pair.target.moment[0]],
     )
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=sand.Adaptive(tolerance=1e-11))
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=ForestRuth(accuracy=1e-12))
     sim.run(until=float(0.9 * ours.time[-1]))
     projectile, target = ours.at(np.array([sim.time]))
     assert np.abs(sim.grains.position[0] - projectile[0]).max() < 1e-5 * 1e-8

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.state.state import SETTLED
+from sand.basics.state import SETTLED
 
 from .setups import random_aggregate
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 from sand.contact.events import inner_list_overflowed
+from sand.engine import engine as engines
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
-from sand.simulation import engine as engines
-from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 
+from ..plugins import ForestRuth
 from .test_reproducibility import state
 
 LIST_ARRAYS = ("order", "packed_position", "packed_moment", "squared_distance", "packed_grain", "block_sums", "cell_of")
@@ -260,9 +261,9 @@ def test_an_outcome_names_the_users_grain_index():
 
 
 @pytest.mark.validate
-def test_adaptive_steps_with_sorting():
-    """Adaptive steps with contacts: a split run gives the same bits, and public indices do not change."""
-    whole, pieces = hot_gas(stepping=sand.Adaptive()), hot_gas(stepping=sand.Adaptive())
+def test_an_integrator_of_the_user_with_sorting():
+    """Steps of fourth order with contacts: a split run gives the same bits, and public indices do not change."""
+    whole, pieces = hot_gas(stepping=ForestRuth()), hot_gas(stepping=ForestRuth())
     for steps in (100, SORT_EVERY, SORT_EVERY - 100, SORT_EVERY):
         pieces.run(steps=steps)
         assert (pieces.grains.radius == pieces.start.radius).all()

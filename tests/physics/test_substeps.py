@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.integrate.parts import Stop
-from sand.simulation.substeps import SubstepEngine
-from sand.state.state import (
+from sand.basics.state import (
     IMPACT_SPEED,
     LARGEST_IMPACT,
     LARGEST_OVERLAP,
@@ -23,6 +21,8 @@ from sand.state.state import (
     WOKEN,
     State,
 )
+from sand.engine.rigid.quick_bodies import QuickBodies
+from sand.integrate.parts import Stop
 
 from .setups import different, momenta, rest_distance
 
@@ -152,12 +152,12 @@ def test_loads_besides_those_in_substeps_allow_the_step(monkeypatch):
     pairs of dipoles in NumPy.  A magnetic grain of 50 nm in the gas acts on others far beyond the pairs in the list,
     but is heavy, and needs no short steps itself.
     """
-    checked, exclude = [], SubstepEngine._exclude_loads
+    checked, exclude = [], QuickBodies._exclude_loads
 
-    def check(self, part, index):
-        state, own = self._state, part._state
+    def check(self, engine):
+        state, own, index = engine.regular_state, self.part.state, self.part.index
         total = state.grains.force[index].copy(), state.grains.field[index].copy()
-        exclude(self, part, index)
+        exclude(self, engine)
         g, at = own.grains, own.grains.position
         r = state.box.nearest(at[:, None] - at[None])
         d = np.sqrt((r**2).sum(axis=-1)) + np.eye(len(at))
@@ -171,7 +171,7 @@ def test_loads_besides_those_in_substeps_allow_the_step(monkeypatch):
         rate = np.sqrt((energy[used] / own.bodies.inertia[:, used].min(axis=0)).max())
         checked.append(float(state.clock[STEP]) * rate)
 
-    monkeypatch.setattr(SubstepEngine, "_exclude_loads", check)
+    monkeypatch.setattr(QuickBodies, "_exclude_loads", check)
     with_more(thin_gas(seed=2), [np.zeros(3)], [np.zeros(3)], radius=5e-8, moment=1e-15).run(until="0.1 us")
     assert len(checked) > 10 and 0.099 < max(checked) < 0.1001
 
@@ -292,14 +292,14 @@ def test_numbers_of_the_noise_of_a_gas_are_used_once(monkeypatch):
     After 4 stopping times of 0.1 µs the kinetic energy of bodies is 3/2 k_B T, to four standard errors √(3/2N) k_B T.
     """
     used = []
-    store = SubstepEngine._store
+    store = QuickBodies._store
 
-    def record(self, part, index, contacts):
-        own = part._state.count
+    def record(self, engine):
+        own = self.part.state.count
         used.append((int(own[SUBSTEPS]), int(own[SUBSTEPS] + own[STEPS])))
-        store(self, part, index, contacts)
+        store(self, engine)
 
-    monkeypatch.setattr(SubstepEngine, "_store", record)
+    monkeypatch.setattr(QuickBodies, "_store", record)
     sim = thin_gas(sand.Gas("100 K", pressure="2.1 bar"))
     assert 8e-8 < 1.0 / sim._engine.parameters.flight_limits.friction_rate < 1.2e-7
     sim.run(until="0.4 us")
@@ -343,21 +343,21 @@ def test_substeps_that_fail_leave_the_state_before_the_step(monkeypatch):
     sim = thin_gas()
     sim.run(until="50 ns")
     before = {name: array.copy() for name, array in sim.regular_state.to_arrays().items()}
-    copy, chosen = SubstepEngine._copy, []
+    copy, chosen = QuickBodies._copy, []
 
-    def failing(self, index, contacts):
-        part = copy(self, index, contacts)
-        chosen.append(index)
+    def failing(self, state):
+        steps = copy(self, state)
+        chosen.append(self.part.index)
 
         def stop(*arguments, **options):
-            part._state.count[8:10] = 0, 1
-            part._state.grains.arrays.position[:] += 1.0
+            self.part.state.count[8:10] = 0, 1
+            self.part.state.grains.arrays.position[:] += 1.0
             return Stop.OVERCOMPRESSED
 
-        monkeypatch.setattr(part, "_drive", stop)
-        return part
+        monkeypatch.setattr(self.part.engine, "drive", stop)
+        return steps
 
-    monkeypatch.setattr(SubstepEngine, "_copy", failing)
+    monkeypatch.setattr(QuickBodies, "_copy", failing)
     result = sim.run(until="1 us")
     assert result.outcome.is_physics and result.grains == tuple(chosen[-1][:2])
     after = sim.regular_state.to_arrays()

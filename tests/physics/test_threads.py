@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand import threads
+from sand.basics import threads
+from sand.basics.state import CONTACTS, OUTSIDE, SLIPPED
+from sand.engine import engine
 from sand.errors import BadInput
 from sand.integrate import task_queue
 from sand.integrate.task_queue import (
@@ -22,8 +24,6 @@ from sand.integrate.task_queue import (
     take_blocks,
     uses_task_queue,
 )
-from sand.simulation import engine
-from sand.state.state import CONTACTS, OUTSIDE, SLIPPED
 
 pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
 
@@ -77,7 +77,7 @@ def test_the_number_of_threads_changes_no_bit(cutoff, size):
         sand.set_threads(number)
         sim = vibrating_lattice(cutoff, size)
         assert sim._engine._workers is not None
-        assert bool(sim._engine._components.pair_forces) is (cutoff != "bare")
+        assert bool(sim._engine.components.pair_forces) is (cutoff != "bare")
         sim.run(steps=25)
         sim.run(steps=35)
         ends.append(state(sim))
@@ -125,7 +125,7 @@ def test_a_late_worker_changes_nothing():
     before, system = state(sim), sim.state
     queue = new_task_queue(len(system.grains), system.contacts.flag.size)
     queue.words[WORD] = QUIT << TASK
-    table = sim._engine._current_table(system)
+    table = sim._engine.table_of(system)
     table.set("queue", queue)
     take_blocks.run(table)
     assert queue.words[ACTIVE] == 0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import CONTACTS
 from sand.errors import BadInput
-from sand.state.state import CONTACTS
 
 from .test_change import warm_gas
 
@@ -69,7 +69,7 @@ def test_moments_depend_neither_on_output_nor_on_interruptions(tmp_path):
     again.run(until="10.5 ns")
     assert updaters[1][0].moments == moments == updaters[2][0].moments + updaters[3][0].moments
     assert different(bits(whole), bits(often)) == [] == different(bits(whole), bits(again))
-    assert (whole.grains.id == again.grains.id).all() and whole._next_id == again._next_id
+    assert (whole.grains.id == again.grains.id).all() and whole._system.next_id == again._system.next_id
     frames = sand.open(tmp_path / "run").frames
     assert len(frames[0]) == 20 and len(frames[-1]) == len(whole.grains)
     assert (frames[-1].id == whole.grains.id).all()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
+from sand.basics.state import WALL_CONTACTS
 from sand.simulation.outcome import Outcome
-from sand.state.state import WALL_CONTACTS
 
 from .setups import rest_distance
 from .test_reproducibility import state
@@ -283,8 +283,8 @@ def test_output_split_and_resume_change_no_bit(tmp_path):
 @pytest.mark.compiled("contacts")
 def test_order_in_memory_and_threads(monkeypatch):
     """Sorted arrays change results by rounding only; threads change no bit."""
+    from sand.engine import engine
     from sand.integrate import task_queue
-    from sand.simulation import engine
 
     plain, ordered = bouncing(), bouncing(order="curve")
     for sim in (plain, ordered):

@@ -3,7 +3,7 @@
 import numpy as np
 
 import sand
-from sand.box import Box
+from sand.basics.box import Box
 from sand.io.trajectory import TrajectoryWriter
 
 MODES = ("stretch", "slide", "roll", "twist")

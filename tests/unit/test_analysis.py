@@ -23,7 +23,7 @@ from sand.analysis.shape import (
     principal_lengths,
     projected_area,
 )
-from sand.box import Box
+from sand.basics.box import Box
 
 ROD = np.column_stack([2.0 * np.arange(9) - 8.0, np.zeros(9), np.zeros(9)])
 RNG = np.random.default_rng(5)

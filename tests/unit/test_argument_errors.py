@@ -11,11 +11,11 @@ import pint
 import pytest
 
 import sand
+from sand.basics.quantity_array import QuantityArray
 from sand.config.case import check_case
-from sand.io.bodies import write_body
+from sand.io.read_grains import write_body
 from sand.io.run_folder import LEDGER, TRAJECTORY
 from sand.io.trajectory import read_frames
-from sand.quantity_array import QuantityArray
 from sand.simulation.contact_table import ContactTable
 
 
@@ -87,8 +87,7 @@ ARGUMENTS = [
     ("sand.ElectricField(field='1 V/m')", "no argument 'field'"),
     ("sand.Verlet(step=np.array([1e-9, 2e-9]))", "stepping: step = array of shape (2,) is not a quantity in s"),
     ("sand.Verlet(dt='1 ns')", "there is no argument 'dt'"),
-    ("sand.Adaptive(tolerance=np.ones(2))", "tolerance = array of shape (2,) is not a number"),
-    ("sand.Adaptive(position_error=np.ones(2))", "position_error = array of shape (2,) is not a quantity"),
+    ("sand.RigidClusters(vibration=np.ones(2))", "vibration = array of shape (2,) is not a number"),
     ("sand.Neighbours(margin=np.ones(2))", "margin = array of shape (2,) is not a quantity"),
     ("sand.Neighbours(search=np.ones(2))", "search = array of shape (2,) must be text"),
     ("sand.set_threads(threads=2)", "set_threads: there is no argument 'threads'"),
@@ -106,7 +105,7 @@ SIMULATIONS = [
     ("sand.Simulation(grains, ['contact'])", "'contact' is not a force"),
     (
         "sand.Simulation(grains, stepping='verlet')",
-        "stepping = 'verlet'; give sand.Verlet(…) or sand.Adaptive(…) or sand.ForestRuth(…)",
+        "stepping = 'verlet'; give sand.Verlet(…) or sand.RigidClusters(…)",
     ),
     ("sand.Simulation(grains, stepping=sand.Verlet)", "stepping = sand.Verlet is a class; write sand.Verlet(…)"),
     ("sand.Simulation(grains, neighbours='cells')", "neighbours = 'cells'; give sand.Neighbours(…)"),
@@ -238,8 +237,14 @@ EXPERIMENTS = [
         "least = <int> is a whole number",
     ),
     ("sand.analysis.clusters.percolating_clusters(x, [[1], [2]], sand.Box.open())", "pairs"),
-    ("sand.theory.growth.aggregate_moment('1 A m^2', 10, exponent=1e30)", "exponent = 1e+30 must be at most 1"),
-    ("sand.theory.smoluchowski.log_sizes(100, per_decade=1e30)", "per_decade = 1e+30 must be at most 3000"),
+    (
+        "sand.theory.growth.aggregate_moment('1 A m^2', 10, exponent=1e30)",
+        "exponent = 1e+30 must be at least 0 and at most 1",
+    ),
+    (
+        "sand.theory.smoluchowski.log_sizes(100, per_decade=1e30)",
+        "per_decade = 1e+30 must be at least 4 and at most 3000",
+    ),
     ("sand.setup.gas(5, '1 um', classes=np.zeros((1, 3)), **iron)", "classes.0 = array of shape (3,); give a table"),
     ("sand.setup.aggregates.rest_distance('iron', 0)", "radius = 0.0 must be above 0 m"),
     ("sand.setup.turned(grains, 7)", "rotation = 7; give a scipy.spatial.transform.Rotation"),
@@ -345,7 +350,7 @@ def test_all_wrong_settings_are_reported_together():
         sand.Contact(slip=3, slide_factor=-1.0, roll_factor="x")
     assert len(caught.value.problems) == 3
     with pytest.raises(sand.BadInput) as caught:
-        sand.Adaptive(tolerance=-1.0, contact_stepping="verlet")
+        sand.RigidClusters(step_fraction=-1.0, contact_stepping="verlet")
     assert len(caught.value.problems) == 2
     with pytest.raises(sand.BadInput) as caught:
         sand.Grains([[0, 0, 0]], 1e-8, "iron", velocty=1, spim=2)

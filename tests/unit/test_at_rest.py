@@ -6,15 +6,15 @@ import pytest
 import sand
 from sand.analysis.ledger_columns import LedgerColumns
 from sand.analysis.quantities import measured
-from sand.box import Box
+from sand.basics.box import Box
 from sand.cli.main import main
+from sand.engine.changed_state import subset
 from sand.io.gsd_index import read_index
 from sand.io.trajectory import Frames, TrajectoryWriter
 from sand.plotting.palettes import REST_COLOURS
 from sand.plotting.plots import grains_figure, history_figure
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import rgb
-from sand.simulation.changed_state import subset
 from sand.simulation.ledger import Ledger
 from sand.viewer.dataset import run_dataset
 from sand.viewer.series import series_from_ledger
@@ -104,7 +104,7 @@ def test_pictures_show_it():
 def rows(awake):
     """Rows of a ledger with the columns that the panel of clusters draws."""
     sizes = {"mean_cluster_size": 2.0, "largest_cluster": 3, "clusters": 4}
-    zeros = dict.fromkeys(Ledger(rigid=True).columns, 0.0)
+    zeros = dict.fromkeys(Ledger(awake=True).columns, 0.0)
     return [zeros | sizes | {"step": k, "time": k * 1e-9, "awake": value} for k, value in enumerate(awake)]
 
 
@@ -136,15 +136,15 @@ def test_the_page_plots_awake_grains():
 
 def test_the_column_belongs_to_runs_with_rigid_clusters():
     """The last of the numbers, before those of walls; a ledger from a checkpoint without it goes on without it."""
-    assert Ledger(walls=["wall_force"], rigid=True).columns[-2:] == ("awake", "wall_force")
-    plain, rigid = Ledger(), Ledger(rigid=True)
+    assert Ledger(walls=["wall_force"], awake=True).columns[-2:] == ("awake", "wall_force")
+    plain, rigid = Ledger(), Ledger(awake=True)
     assert rigid.columns == (*plain.columns, "awake")
     table = np.arange(2.0 * len(plain.columns)).reshape(2, -1)
     rigid.from_array(table, plain.columns)
     assert rigid.columns == plain.columns and rigid.add(rigid.rows[-1] | {"time": 1e9, "awake": 3})
     assert rigid.to_array().shape == (3, len(plain.columns))
     with pytest.raises(sand.BadInput, match="columns"):
-        Ledger(rigid=True).from_array(table[:, 1:], plain.columns[1:])
+        Ledger(awake=True).from_array(table[:, 1:], plain.columns[1:])
     with pytest.raises(sand.BadInput, match="'awake' is a column of the ledger; give this force another name"):
         Ledger(["awake"])
 

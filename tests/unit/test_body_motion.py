@@ -12,16 +12,16 @@ from scipy.stats import gamma
 import sand
 from sand.analysis.body_motion import MEDIAN_ENERGY, BodyMotion, body_motion, body_temperatures, temperatures_of
 from sand.analysis.ledger_columns import LedgerColumns
-from sand.box import Box
+from sand.basics.arrays import cluster_arrays
+from sand.basics.box import Box
+from sand.basics.constants import BOLTZMANN
 from sand.cli.main import main
-from sand.constants import BOLTZMANN
 from sand.contact.measure import BODY_ROWS, measure_bodies
 from sand.io.ledger_table import TEMPERATURES
 from sand.plotting.panels import has_temperatures
 from sand.plotting.plots import history_figure
 from sand.plotting.run_figure import run_figure
 from sand.simulation.ledger import Ledger
-from sand.state.arrays import cluster_arrays
 from sand.viewer.series import series_from_ledger
 
 BOX = Box.periodic(1e-6)

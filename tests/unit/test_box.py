@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sand.box import Box, as_box
+from sand.basics.box import Box, as_box
 from sand.errors import BadInput
 
 coordinate = st.floats(-30, 30)
@@ -36,7 +36,7 @@ def test_close_pairs_by_both_searches(box, monkeypatch):
     """The search over all pairs and SciPy's tree find the same pairs in the same order."""
     points = np.random.default_rng(4).uniform(-0.7, 0.7, (150, 3))
     few = box.close_pairs(points, 0.2)
-    monkeypatch.setattr("sand.box.ALL_PAIRS_UP_TO", 0)
+    monkeypatch.setattr("sand.basics.box.ALL_PAIRS_UP_TO", 0)
     many = box.close_pairs(points, 0.2)
     assert len(few) > 100
     assert (few == many).all()

@@ -11,7 +11,7 @@ import sand
 from sand.cli.main import main
 from sand.contact.jkr import rest_overlap, rest_radius
 from sand.contact.mixing import pairing_between
-from sand.io.bodies import read_body, write_body
+from sand.io.read_grains import read_body, write_body
 from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
 from sand.setup._kernels.aggregation import return_to_sphere
 from sand.setup._kernels.hash_grid import gap_to_nearest, insert_grain

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.box import Box
+from sand.basics.box import Box
+from sand.engine.changed_state import joined, subset
 from sand.io.frame_chunks import MODES
 from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import TrajectoryWriter, read_frames
-from sand.simulation.changed_state import joined, subset
 from sand.viewer.by_identity import ByIdentity
 from sand.viewer.dataset import run_dataset
 

@@ -10,7 +10,7 @@ import tomli_w
 import sand
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
-from sand.config.errors import validate
+from sand.config.key_errors import validate
 from sand.errors import BadInput
 from sand.experiments.growth_case import GrowSection
 from sand.simulation.serialise import case_of
@@ -112,7 +112,7 @@ def problems_of(content):
         ({"grains__classes": [{"number": 5}, {"number": 4}]}, ["number = 8", "have the sum 9"]),
         ({"grains__classes": [{"share": 0.99}, {"share": 0.01}]}, ["classes.1", "0.01 of number = 8 is no member"]),
         ({"grains__classes": [{}]}, ["grains.classes.0", "either share", "or number"]),
-        ({"grains__classes": [{"share": 1.5}]}, ["grains.classes.0", "share = 1.5 must be at most 1"]),
+        ({"grains__classes": [{"share": 1.5}]}, ["grains.classes.0", "share = 1.5 must be above 0 and at most 1"]),
         ({"grains__classes": [{"share": 1, "chrge": 0}]}, ["grains.classes.0.chrge", "did you mean 'charge'?"]),
         ({"grains__classes": [{"share": 1, "charge": "1 V"}]}, ["grains.classes.0", "charge = '1 V'"]),
         (
@@ -122,7 +122,10 @@ def problems_of(content):
         ({"grains__classes": [{"share": 1, "radius": "lognormal(1 nm)"}]}, ["grains.classes.0", "width SIGMA"]),
         ({"grains__classes": [{"share": 1, "kind": "bpc"}]}, ["grains.classes.0", "kind = 'bpc'", "did you mean"]),
         ({"grains__classes": [{"share": 1, "kind": "bpca"}]}, ["grains.classes.0", "grains is missing"]),
-        ({"grains__classes": [{"share": 1, "grains": 4}]}, ["grains.classes.0", "grains is not for kind = 'grain'"]),
+        (
+            {"grains__classes": [{"share": 1, "grains": 4}]},
+            ["grains.classes.0", "grains = 4 is not used by kind = 'grain'"],
+        ),
         ({"grains__classes": [{"share": 1, "kind": "file"}]}, ["grains.classes.0", "file is missing"]),
         ({"grains__classes": [{"share": 1, "kind": "file", "file": "none.xyz"}]}, ["grains.classes.0", "none.xyz"]),
         ({"grains__classes": [{"number": 1, "kind": "chain", "grains": 40}], "grains__number": None}, ["too small"]),
@@ -289,7 +292,7 @@ def test_a_gas_between_walls_of_a_case():
     grains = sand.setup.gas(8, sand.Box.periodic("400 nm", "400 nm", None), extent="0.5 um", **given)
     assert (simulation_of(case, None).grains.position == grains.position).all()
     assert case.grains.recipe()["extent"] == "0.5 um"
-    with pytest.raises(sand.BadInput, match="extent is not for kind = 'file'"):
+    with pytest.raises(sand.BadInput, match="extent = '1 um' is not used by kind = 'file'"):
         check_case(changed(grains={"kind": "file", "file": "a.gsd", "extent": "1 um"}), "some.toml")
 
 

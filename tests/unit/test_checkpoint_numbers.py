@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import STEPS
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.state.state import STEPS
 
 REFERENCE = Path(__file__).parents[1] / "reference" / f"run-v{VERSION}"
 

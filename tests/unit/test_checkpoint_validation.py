@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.arrays import SAVED_BODIES, SAVED_WALLS, body_arrays
+from sand.basics.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS, WALL_CONTACTS
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
-from sand.state.arrays import SAVED_BODIES, SAVED_WALLS, body_arrays
-from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS, WALL_CONTACTS
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import BOLTZMANN, MAGNETIC
+from sand.basics.constants import BOLTZMANN, MAGNETIC
+from sand.basics.state import CONTACTS, CUT_RADIUS
+from sand.engine.cluster_cutoff import follow_clusters
 from sand.forces.pair.dipoles import capturing_pair, kinetic_temperature
-from sand.simulation.cluster_cutoff import follow_clusters
-from sand.state.state import CONTACTS, CUT_RADIUS
 
 BOX = sand.Box.periodic("20 um")
 NO_PAIRS = np.zeros((0, 2), np.int64)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.clusters import FEW, cluster_labels, cluster_sizes, mean_cluster_size, unwrapped
-from sand.box import Box
+from sand.basics.box import Box
 
 
 @pytest.mark.parametrize("seed", range(5))

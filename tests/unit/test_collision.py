@@ -12,7 +12,7 @@ from sand.cli.main import main
 from sand.experiments.collision import approach, collide, collide_many
 from sand.experiments.collision_case import read_collision, run_seeds
 from sand.experiments.collision_outcome import collision_title
-from sand.io.bodies import read_body
+from sand.io.read_grains import read_body
 from sand.setup import chain, grain, pca
 from sand.theory import contact
 
@@ -136,7 +136,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     [
         ('kind = "pca"\ngrains = 8', 'kind = "chain"\ngrains = 0', "target.grains = 0"),
         ('kind = "pca"\ngrains = 8', 'kind = "chain"', "target: grains is missing: how many does the chain have?"),
-        ('kind = "pca"', 'kind = "blob"', "target.kind = 'blob'"),
+        ('kind = "pca"', 'kind = "blob"', "target.kind: kind = 'blob'; allowed: grain, chain"),
         ('"2 m/s"', '"2 m"', "impact.speed: speed = '2 m' is not a quantity in m/s|impact.speed: "),
         ('"2 m/s"', '"0 m/s"', "above 0"),
         ("seeds = [1, 2]", "sedes = [1, 2]", "impact.sedes: there is no such key; did you mean 'seeds'?"),

@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.contact import jkr, mechanics
-from sand.contact.columns import column_loops
+from sand.contact.constants_table import column_loops
 from sand.contact.update import pose_at
 from sand.simulation.contact_table import COLUMNS
 

@@ -5,9 +5,13 @@ import copy
 import numpy as np
 import pytest
 
-from sand.box import Box
+from sand.basics.arrays import empty_contact_arrays, empty_pair_list
+from sand.basics.box import Box
+from sand.basics.grains import GrainArrays, Grains
+from sand.basics.material import SILICA
+from sand.basics.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, TWISTING
 from sand.compiler.jit import kernel
-from sand.contact.columns import column_loops, constant_names
+from sand.contact.constants_table import column_loops, constant_names
 from sand.contact.damping import NONE
 from sand.contact.events import settle_loop
 from sand.contact.jkr import LAW as JKR
@@ -27,14 +31,10 @@ from sand.contact.update import (
     pose_at,
     twist_increment,
 )
-from sand.grains import GrainArrays, Grains
 from sand.integrate.motion import drift_for
 from sand.integrate.parts import ContactParameters
-from sand.material import SILICA
 from sand.numerics.quaternion import turned_back
 from sand.numerics.vec import axpy, load4, put, scale
-from sand.state.arrays import empty_contact_arrays, empty_pair_list
-from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, TWISTING
 
 PAIRS = 403
 """Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
+from sand.basics.state import CONTACTS
 from sand.cli.main import main
 from sand.compiler.cache import write_record
-from sand.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.experiments.templates import TEMPLATES
-from sand.simulation import coagulation, cost
-from sand.simulation import expected_steps as steps
 from sand.simulation.cadence import number_in, read_cadence
-from sand.state.state import CONTACTS
+from sand.simulation.cost.cost import coagulation, cost
+from sand.simulation.cost.cost import expected_steps as steps
 from sand.theory.contact import contact
 from sand.theory.kinetics import brownian, capture
 
@@ -367,7 +367,7 @@ def test_substeps_are_no_contact_steps(monkeypatch):
     """Of 0.5 s for 10⁵ contact steps and 2000 substeps, 0.3 s and 0.1 s are expected: the ratio is 1.25."""
     sim = simulation()
     timer = cost.StepTimer(sim)
-    timer._rigid, timer._calls, work = True, 1, iter([(0, 0, 0.0), (100_000, 2000, 0.5)])
+    timer._moves_bodies, timer._calls, work = True, 1, iter([(0, 0, 0.0), (100_000, 2000, 0.5)])
     monkeypatch.setattr(type(sim._engine), "awake_work", property(lambda _: next(work)))
     with timer.steps():
         pass

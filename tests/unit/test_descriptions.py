@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.descriptions import changed_arguments, units_of
+from sand.basics.descriptions import changed_arguments, units_of
+from sand.basics.units import exact_quantity, in_unit
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
-from sand.units import exact_quantity, in_unit
 
 OBJECTS = [
     sand.Box(),
@@ -27,8 +27,7 @@ OBJECTS = [
     sand.ElectricField((0, 1e3, 0)),
     sand.Field("1 mT", shape="rotating", amplitude=(2e-3, 0, 0), frequency="1 kHz", phase="90 deg", axis=(0, 0, 1)),
     sand.Verlet(step="1 ps", far="taylor", far_steps=12),
-    sand.Adaptive(tolerance=1e-7),
-    sand.ForestRuth(step="2 ns"),
+    sand.RigidClusters(longest_step="2 ns"),
     sand.Neighbours("cells", margin=1e-7),
 ]
 

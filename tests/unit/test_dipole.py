@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sand.constants import BOLTZMANN, MAGNETIC
+from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.forces.pair import dipole_formulas as dipole
 
 component = st.integers(-100, 100).map(lambda n: n / 100)

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import erfc
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.forces.pair.dipole_formulas import pair_load
 from sand.forces.pair.ewald import DEGREES, half_of_vectors
@@ -362,9 +362,12 @@ GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
         ),
         (
             lambda: sand.Dipoles(periodic="ewald", accuracy=1e-9),
-            "dipoles: accuracy = 1e-09 must be at least 1e-08",
+            "dipoles: accuracy = 1e-09 must be at least 1e-08 and at most 0.1",
         ),
-        (lambda: sand.Dipoles(periodic="ewald", accuracy=0.2), "dipoles: accuracy = 0.2 must be at most 0.1"),
+        (
+            lambda: sand.Dipoles(periodic="ewald", accuracy=0.2),
+            "dipoles: accuracy = 0.2 must be at least 1e-08 and at most 0.1",
+        ),
         (
             lambda: sand.Dipoles(periodic="ewald", cutoff="0.1 um"),
             "dipoles: cutoff = 1e-07 cannot be given with periodic = 'ewald'",
@@ -411,9 +414,9 @@ def test_all_mistakes_are_reported_at_once():
     with pytest.raises(BadInput) as error:
         sand.Dipoles("1 um", "sharp", periodic="ewald", open="tree", accuracy=0.2, boundary="foil", reciprocal="meshes")
     lines = (
+        "accuracy = 0.2 must be at least 1e-08 and at most 0.1",
         "boundary = 'foil'; did you mean",
         "reciprocal = 'meshes'; did you mean 'mesh'?",
-        "accuracy = 0.2 must be at most 0.1",
         "cutoff = 1e-06 cannot be given with periodic = 'ewald'",
         "cut = 'sharp' cannot be given with periodic = 'ewald'",
         "open = 'tree' is for open boxes and periodic = 'ewald' for periodic ones; leave one of them out",

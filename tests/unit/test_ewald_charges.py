@@ -9,7 +9,7 @@ import pytest
 from scipy.special import erfc
 
 import sand
-from sand.constants import COULOMB
+from sand.basics.constants import COULOMB
 from sand.errors import BadInput
 from sand.forces.pair.ewald import DEGREES, half_of_vectors
 from sand.forces.pair.ewald_fit import CHARGES, fitted, screened, smeared
@@ -339,7 +339,7 @@ def test_the_choice_and_a_net_charge_are_stated():
         (
             lambda: sand.Charges(periodic="ewald", cut="sharp", cutoff="0.1 um", accuracy=2, boundary="vacuum"),
             [
-                "charges: accuracy = 2 must be at most 0.1",
+                "charges: accuracy = 2 must be at least 1e-08 and at most 0.1",
                 "charges: cutoff = 1e-07 cannot be given with periodic = 'ewald'",
                 "charges: cut = 'sharp' cannot be given with periodic = 'ewald'",
                 "charges: boundary = 'vacuum' is for dipoles only",

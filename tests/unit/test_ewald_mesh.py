@@ -8,13 +8,13 @@ import pytest
 from scipy.interpolate import BSpline
 
 import sand
+from sand.basics.constants import COULOMB, MAGNETIC
 from sand.compiler.program import Program
 from sand.compiler.stage import PythonStage, stage
-from sand.constants import COULOMB, MAGNETIC
 from sand.errors import BadInput
 from sand.forces.pair import ewald
 from sand.forces.pair.ewald_fit import CHARGES
-from sand.forces.pair.loops import all_blocks
+from sand.forces.pair.long_range_loops import all_blocks
 from sand.forces.pair.mesh import MeshSums, lattice_sum, mesh_errors, mesh_sums, new_mesh, nodes_for
 from sand.forces.pair.mesh_loops import MESH_CHARGES, ORDERS, add_mesh_forces, fill_spline, mesh_rounds
 from tests.tables import table_of

@@ -271,7 +271,7 @@ RAMPING = {"shape": "ramp", "final": "1 mT", "end": "5 us"}
         (ROTATING | {"axis": None}, ["axis is missing", "three numbers", "[0, 0, 1]"]),
         (RAMPING | {"final": None}, ["final is missing", "in T"]),
         (RAMPING | {"end": None}, ["end is missing", "in s", "'5 us'"]),
-        ({"flux_density": None}, ["flux_density is missing", "in T"]),
+        ({"flux_density": None}, ["flux_density z = None is not a quantity in T"]),
         # numbers
         ({"flux_density": [0, "nan T", 0]}, ["flux_density y = 'nan T' is not finite", "in T"]),
         (OSCILLATING | {"amplitude": [1, 2]}, ["amplitude = [1, 2]", "one value along z or three components, in T"]),

@@ -11,8 +11,8 @@ from PIL import Image
 
 import sand
 from sand.analysis.clusters import unwrapped
-from sand.box import Box
-from sand.constants import BOLTZMANN
+from sand.basics.box import Box
+from sand.basics.constants import BOLTZMANN
 from sand.plotting.panels import energy_unit, time_unit
 from sand.plotting.render.scene import camera_rotation, make_scene, side_by_side, view_window
 from sand.plotting.render.spheres import SUPERSAMPLING, Spheres, render_spheres

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import STEPS
 from sand.errors import FilesFailed
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.ledger_table import LedgerFile, read_ledger
 from sand.io.run_folder import make_folder, read_toml, replace_file, shows_a_run, write_json, write_toml
 from sand.io.trajectory import TrajectoryWriter, read_frames
-from sand.state.state import STEPS
 
 from ..physics.setups import struck_chain
 from .synthetic_trajectories import write_trajectory

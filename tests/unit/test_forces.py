@@ -9,12 +9,12 @@ import pytest
 import sand
 from sand.compiler.jit import formula
 from sand.compiler.user_code import code_digest
+from sand.forces.external.external_loops import external_energies_for
 from sand.forces.external.formulas import GrainState, uniform_field
-from sand.forces.external.loops import external_energies_for
 from sand.integrate.force_calls import add_external_loads, sum_external
 from sand.integrate.force_stages import ENERGY, external_force_stages, pair_force_stages
 from sand.integrate.parts import ExternalWork
-from sand.integrate.program import build_program
+from sand.integrate.stage_list import build_program
 
 
 class Weight(NamedTuple):
@@ -80,10 +80,15 @@ SOURCE = """
 from numba import njit
 from sand.compiler.jit import formula
 import math
+import numpy as np
+from enum import IntEnum
+class Power(IntEnum):
+    SQUARE = 2
 FACTOR = 2.0
 AXIS = (0.0, 1.0)
+WEIGHTS = np.array([0.25, 0.5])
 def half(x):
-    return 0.5 * x + math.sin(x - AXIS[0])
+    return WEIGHTS[1] * x**Power.SQUARE + math.sin(x - AXIS[0])
 @formula
 def force(x):
     return FACTOR * half(x)
@@ -95,9 +100,12 @@ def force(x):
     ("old", "new", "differs"),
     [
         ("FACTOR = 2.0", "FACTOR = 3.0", True),
-        ("0.5 * x", "0.25 * x", True),
+        ("WEIGHTS[1] * x", "WEIGHTS[0] * x", True),
+        ("[0.25, 0.5]", "[0.25, 1.5]", True),
+        ("[0.25, 0.5]", "[0.25, 'half'], dtype=object", None),
+        ("SQUARE = 2", "SQUARE = 3", True),
         ("def half", "@njit\ndef half", False),
-        ("    return 0.5", "    # half of it\n    return 0.5", False),
+        ("    return WEIGHTS", "    # half of it\n    return WEIGHTS", False),
         ("FACTOR *", "-FACTOR *", True),
         ("math.sin", "math.cos", True),
         ("x - AXIS[0]", "AXIS[0] - x", True),
@@ -151,8 +159,8 @@ def test_external_forces_add_up():
     ):
         engine = sand.Simulation(grains, forces)._engine
         parameters = engine.parameters._replace(external_work=ExternalWork(True, False))
-        table, own = engine._current_table(engine.state), engine.state.grains.arrays
-        program = build_program(engine._components, parameters, table)
+        table, own = engine.table_of(engine.state), engine.state.grains.arrays
+        program = build_program(engine.components, parameters, table)
         own.force[...] = own.torque[...] = 0.0
         table.set("program", program)
         add_external_loads(table, 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.box import Box
+from sand.basics.box import Box
 from sand.io.trajectory import TrajectoryWriter, read_frames
 
 from .synthetic_trajectories import contacts_of

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.constants import BOLTZMANN
 from sand.compiler.jit import kernel
-from sand.constants import BOLTZMANN
 from sand.forces.base import ExternalForce, Force
 from sand.forces.gas import drag as law
-from sand.forces.gas.loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
+from sand.forces.gas.gas_loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
 from sand.forces.gas.model import Gas
 
 SPEED = math.sqrt(8.0 / math.pi)
@@ -458,7 +458,7 @@ def test_shortest_relaxation_time(accommodation):
         ({"pressure": 0}, r"gas: pressure = 0 must be above 0 Pa"),
         ({"pressure": None, "density": -2.0}, r"gas: density = -2.0 must be above 0 kg/m\^3"),
         ({"molecule_mass": "0 kg"}, r"gas: molecule_mass = '0 kg' must be above 0 kg"),
-        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a fraction of the molecules and must be at most 1"),
+        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 must be at least 0 and at most 1"),
         ({"accommodation": -0.1}, r"gas: accommodation = -0.1 must be at least 0"),
         ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a number"),
         ({"brownian": "no"}, r"gas: brownian = 'no' must be true or false"),

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
+from sand.basics.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 from sand.compiler.jit import kernel
 from sand.contact.gather import BLOCK, DENSE_FROM, LARGEST_CLASS, gather, resort_contacts_by_grain
 from sand.integrate.motion import drift_for, gather_and_kick, kick
 from sand.integrate.task_queue import GRAINS_PER_BLOCK
-from sand.state.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
-from sand.state.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 
 GRAINS = GATHER_ORDER_FROM + 37
 """Enough for the block-wise order, with an incomplete last block."""

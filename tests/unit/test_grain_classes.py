@@ -5,9 +5,9 @@ import pytest
 from scipy import stats
 
 import sand
+from sand.basics.constants import BOLTZMANN
 from sand.config.build import simulation_of
 from sand.config.case import check_case
-from sand.constants import BOLTZMANN
 from sand.setup import GrainClass, gas, gas_with_contacts
 from sand.simulation.serialise import case_of
 
@@ -155,7 +155,10 @@ def test_case_file_and_script_give_the_same_grains():
         ),
         ({"classes": [{"share": 1.0, "material": "irn"}]}, ["classes.0: unknown material 'irn'"]),
         ({"classes": [3]}, ["classes.0 = 3; give a table"]),
-        ({"classes": [{"number": 9, "moments": "aligned"}]}, ["classes.0: moments is not for kind = 'grain'"]),
+        (
+            {"classes": [{"number": 9, "moments": "aligned"}]},
+            ["classes.0: moments = 'aligned' is not used by kind = 'grain'"],
+        ),
         ({"radius": None}, ["gas: radius is missing"]),
         ({"material": None}, ["gas: material is missing"]),
         ({"material": {"iron": 0.6, "ice": 0.6}}, ["material: the fractions 0.6, 0.6 have the sum 1.2"]),

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.grains import GrainArrays
-from sand.schema import FIELDS
+from sand.basics.grains import GrainArrays
+from sand.basics.schema import FIELDS
 
 
 def two(**changes):

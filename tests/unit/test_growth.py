@@ -9,8 +9,8 @@ import tomli_w
 
 import sand
 from sand.analysis.body_motion import BodyMotion
+from sand.basics.constants import BOLTZMANN
 from sand.cli.main import main
-from sand.constants import BOLTZMANN
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 from sand.experiments.growth_boxes import shared_settings

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
 from sand.experiments.scattering import flight
 from sand.experiments.scattering.initial_conditions import R, U, draw_path
 from sand.experiments.scattering.two_aggregates import ANGULAR1, TURN1, draw_rigid_pose

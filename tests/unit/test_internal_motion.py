@@ -8,8 +8,8 @@ import pytest
 
 import sand
 from sand.analysis.internal_motion import internal_kinetic_energy
-from sand.box import Box
-from sand.constants import BOLTZMANN
+from sand.basics.box import Box
+from sand.basics.constants import BOLTZMANN
 from sand.contact.model import DEFAULT_DAMPING_RATIO
 from sand.simulation.vibration import vibration_notes
 

@@ -142,7 +142,7 @@ def test_z_of_33_is_out_of_reach():
 
 def test_kernels_are_those_of_the_closed_forms():
     """K of two grains is σ v: π(2r)²⟨v⟩; Eq. 14 at m̄v² = k_BT times √(2α/(m̄d³)), or ⟨σv⟩; to rounding."""
-    reduced, heat = theory.reduced_mass(MASS), sand.constants.BOLTZMANN * 100.0
+    reduced, heat = theory.reduced_mass(MASS), sand.basics.constants.BOLTZMANN * 100.0
     brownian = theory.geometric_cross_section(R) * kinetics.mean_speed(reduced, 100.0)
     assert kinetics.brownian(R, MASS, 100.0)(MASS, MASS) == pytest.approx(brownian, rel=1e-12, abs=0.0)
     thermal = math.sqrt(heat / reduced)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import sand
+from sand.basics.state import LOST
 from sand.experiments.growth import all_aggregates, growth_of
 from sand.io.ledger_table import TEMPERATURES
 from sand.plotting.chain_map import Map, Picture, chain_figure
@@ -22,7 +23,6 @@ from sand.plotting.plots import HISTORY, history_figure
 from sand.plotting.run_figure import figure_bytes, run_figure
 from sand.plotting.scattering import sigma_figure, trajectories_figure
 from sand.plotting.style import legend_above
-from sand.state.state import LOST
 
 from .test_figure import ledger_of, run_of
 from .test_growth import synthetic_box

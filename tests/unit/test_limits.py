@@ -9,8 +9,8 @@ from scipy.constants import k as BOLTZMANN
 
 import sand
 from sand.cli.main import main
-from sand.simulation.checks import check_system
-from sand.simulation.limits import bath_temperature, limit_rows, limit_warnings
+from sand.engine.input_checks import check_system
+from sand.limits.model_limits import bath_temperature, limit_rows, limit_warnings
 
 FORCES = [sand.Contact(), sand.Dipoles()]
 BOX = sand.Box.periodic("3 um")

@@ -92,7 +92,7 @@ def test_barriers_are_those_of_the_lowest_path(k, kind, start, end, barrier):
 def test_all_presets_have_the_kind_of_their_crystal():
     """Iron (K₁ > 0) and magnetite (K₁ < 0) are cubic: K₁V/4 and |K₁|V/12; the other presets have no anisotropy."""
     volume, found = 4 / 3 * math.pi * R**3, {}
-    for name, material in sand.material.PRESETS.items():
+    for name, material in sand.basics.material.PRESETS.items():
         if material.anisotropy is not None:
             found[name] = magnetic_limits(material, R).energy_barrier / (material.anisotropy * volume)
     assert found == {

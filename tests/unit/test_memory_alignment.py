@@ -30,7 +30,7 @@ def test_all_arrays_of_a_state_are_aligned():
     for one in (system, system.copy()):
         one.grow_contacts()
         one.grow_pairs()
-        groups = (one.grains.arrays, one.contacts, one.pair_list, one.long_range, one.runge_kutta)
+        groups = (one.grains.arrays, one.contacts, one.pair_list, one.long_range)
         assert all(is_aligned(array) or array.size == 0 for group in groups for array in group)
         assert one.contacts.flag.size % SIMD_WIDTH == one.pair_list.in_contact.size % SIMD_WIDTH == 0
     assert [padded_size(number) for number in (0, 1, 8, 9)] == [0, 8, 8, 16]

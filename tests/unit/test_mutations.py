@@ -17,7 +17,7 @@ import sand
 from sand.config.build import simulation_of
 from sand.config.case import read_case
 from sand.experiments.collision_case import read_collision
-from sand.experiments.scattering.case import read_scattering
+from sand.experiments.scattering.scatter_case import read_scattering
 from sand.io.checkpoint import read_checkpoint
 from sand.io.trajectory import read_frames
 

@@ -6,16 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sand
-from sand.box import Box, as_box
-from sand.contact.columns import column_loops
+from sand.basics.arrays import empty_long_range_arrays
+from sand.basics.box import Box, as_box
+from sand.basics.state import LISTED, MADE, PAIRS, REBUILT
+from sand.contact.constants_table import column_loops
 from sand.contact.jkr import LAW as JKR
 from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
 from sand.integrate.force_stages import SUM, WHOLE, pair_force_stages
 from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours import cell_list as cells
-from sand.neighbours.settings import Neighbours, share_within
-from sand.state.arrays import empty_long_range_arrays
-from sand.state.state import LISTED, MADE, PAIRS, REBUILT
+from sand.neighbours.search import Neighbours, share_within
 
 from ..tables import table_of
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import COULOMB, GRAVITATION, MAGNETIC
+from sand.basics.constants import COULOMB, GRAVITATION, MAGNETIC
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import Cutoff, cut_weight, pair_load_cut
 from sand.forces.pair.dipole_rates import cut_curvature, pair_rates, uncut_rates
@@ -64,10 +64,10 @@ def test_taylor_rate_of_the_torque():
         spin=1e8 * rng.normal(size=(3, 3)),
         moment=6e-18 * rng.normal(size=(3, 3)),
     )
+    from sand.basics.arrays import empty_long_range_arrays
     from sand.compiler.jit import kernel
     from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
-    from sand.integrate.respa import clear_rates, set_mean_velocities
-    from sand.state.arrays import empty_long_range_arrays
+    from sand.integrate.taylor import clear_rates, set_mean_velocities
 
     sum_rates = ALL_PAIRS_CUT.rates
 

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.arrays import empty_long_range_arrays
 from sand.compiler.jit import formula, kernel
 from sand.compiler.program import Program
 from sand.forces.pair import dipole_loops as dipoles
-from sand.forces.pair import generic_loops, loops
+from sand.forces.pair import generic_loops
+from sand.forces.pair import long_range_loops as loops
 from sand.integrate.force_calls import sum_pair_forces
 from sand.integrate.force_stages import PAIR_STAGES, SUM, pair_force_stages
 from sand.integrate.parts import ForceNumbers
 from sand.integrate.stages import StageNumber
 from sand.integrate.task_queue import SHARED, new_task_queue
 from sand.neighbours.cell_list import build_verlet_list
-from sand.state.arrays import empty_long_range_arrays
 
 from ..tables import table_of
 
@@ -45,7 +46,7 @@ def test_blocked_sums_of_several_forces(order, monkeypatch):
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
-    (_, of_dipoles), (_, of_charges) = sim._engine._components.pair_forces
+    (_, of_dipoles), (_, of_charges) = sim._engine.components.pair_forces
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
     sums = {
         "listed dipoles": dipoles.LISTED_PAIRS,

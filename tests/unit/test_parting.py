@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.experiments.collision import collide
 from sand.experiments.parting import cannot_touch
 from sand.setup import grain, pca

@@ -7,7 +7,7 @@ import sys
 import pytest
 from llvmlite import binding, ir
 
-from sand import threads
+from sand.basics import threads
 from sand.compiler import atomics
 
 SYSTEMS = {

@@ -3,8 +3,8 @@
 import pytest
 
 import sand
+from sand.basics.schema import CHANGEABLE, FIELDS
 from sand.forces.registry import FORCES
-from sand.schema import CHANGEABLE, FIELDS
 
 
 @pytest.fixture

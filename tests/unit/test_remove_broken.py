@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from sand.basics.arrays import ContactArrays, empty_contact_arrays
+from sand.basics.state import CONTACTS, COUNT
 from sand.contact.events import compact_contacts
 from sand.contact.transitions import BROKEN_FLAG
-from sand.state.arrays import ContactArrays, empty_contact_arrays
-from sand.state.state import CONTACTS, COUNT
 
 BY_GRAIN = {"side", "start", "gather_order"}
 """Arrays that are rebuilt from the pairs."""

@@ -9,15 +9,15 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 import sand
-from sand.integrate.rigid_body import (
+from sand.basics.arrays import body_arrays
+from sand.basics.state import BODIES
+from sand.integrate.rigid.rigid_body import (
     asymmetric_rotation,
     contact_loads_bound,
     free_sphere,
     move_body,
     sum_body_loads,
 )
-from sand.state.arrays import body_arrays
-from sand.state.state import BODIES
 
 INERTIA = (1.0, 2.0, 3.5)
 

@@ -8,11 +8,11 @@ import pytest
 import sand
 from sand.analysis.clusters import cluster_labels, unwrapped
 from sand.analysis.internal_motion import internal_kinetic_energy
-from sand.box import Box
+from sand.basics.arrays import cluster_arrays, empty_contact_arrays
+from sand.basics.box import Box
+from sand.basics.state import CONTACTS, COUNT
 from sand.contact.gather import resort_contacts_by_grain
 from sand.contact.settling import settle_clusters, solve_symmetric
-from sand.state.arrays import cluster_arrays, empty_contact_arrays
-from sand.state.state import CONTACTS, COUNT
 
 BOX = Box.periodic(1e-6)
 RING = [(0, 1), (1, 2), (2, 3), (3, 4), (5, 4), (5, 0)]

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import sand
-from sand.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN
 from sand.setup import gas
 
 ARGS = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg", "temperature": "100 K"}

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import INNER_COUNT, PAIRS
 from sand.simulation.cadence import Cadence, Schedule
-from sand.state.state import INNER_COUNT, PAIRS
 
 from ..physics.setups import rest_distance, struck_chain
 

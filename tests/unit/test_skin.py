@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.integrate import task_queue
-from sand.integrate.parts import Stop
-from sand.integrate.stages import INNER_SKIN_FRACTION
-from sand.neighbours.skin import largest_displacement, largest_squared_speeds
-from sand.simulation import engine
-from sand.state.state import (
+from sand.basics.state import (
     BROKEN,
     INNER_SKIN,
     LONG_RANGE_SKIN,
@@ -19,6 +14,13 @@ from sand.state.state import (
     SQUARED_SPEED,
     SQUARED_SPIN,
 )
+from sand.engine import engine
+from sand.integrate import task_queue
+from sand.integrate.parts import Stop
+from sand.integrate.stages import INNER_SKIN_FRACTION
+from sand.neighbours.skin import largest_displacement, largest_squared_speeds
+
+from ..plugins import ForestRuth
 
 
 def dense_gas(forces=None, margin="auto", **options):
@@ -34,8 +36,7 @@ CASES = {
     "contacts": {},
     "contacts, listed": {"margin": "5 nm"},
     "cycles and gas": {"forces": (sand.Contact(), sand.Dipoles(), sand.Gas("3e4 K", pressure="1 bar"))},
-    "flights": {"stepping": sand.Adaptive()},
-    "steps of fourth order": {"stepping": sand.ForestRuth()},
+    "steps of fourth order": {"stepping": ForestRuth()},
 }
 
 

@@ -10,12 +10,13 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import sand
+from sand.basics.state import BROKEN, CLOCK, IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP, LEAST_CLOCK
 from sand.contact.dmt import LAW as DMT
 from sand.contact.impact import impact_overlap, impact_pressure, impact_share
 from sand.contact.jkr import LAW as JKR
 from sand.contact.law import contact_periods, largest_pull
-from sand.simulation.checks import check_system
-from sand.simulation.solid_limits import (
+from sand.engine.input_checks import check_system
+from sand.limits.solid_limits import (
     DEEPEST_OVERLAP,
     ELECTRON_EMISSION,
     FASTEST_IMPACT,
@@ -26,7 +27,6 @@ from sand.simulation.solid_limits import (
     spin_stress,
     torn_clusters,
 )
-from sand.state.state import BROKEN, CLOCK, IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP, LEAST_CLOCK
 
 OPEN = sand.Box.open()
 BARE = sand.SILICA.but(name="bare silica", surface_energy=0)

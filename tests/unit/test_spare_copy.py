@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.state.spare_copy import SpareCopy
+from sand.basics.spare_copy import SpareCopy
 
 
 @pytest.fixture

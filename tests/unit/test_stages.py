@@ -415,12 +415,12 @@ import sys
 from typing import Any, NamedTuple
 import numpy as np
 from numba.core import event
-from sand.box import Box
+from sand.basics.box import Box
 from sand.compiler.program import Program, call_stage, has_stage
 from sand.compiler.stage import stage
 from sand.compiler.table import Table
 from sand.neighbours.cell_list import rebuild_verlet_list
-from sand.state.arrays import empty_long_range_arrays
+from sand.basics.arrays import empty_long_range_arrays
 
 class Count(event.Listener):
     number = 0

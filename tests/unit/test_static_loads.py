@@ -16,7 +16,7 @@ def contact_responses(sim):
     """What `responses_stage` measures of the present contacts, and their grains (C, 2)."""
     engine, state = sim._engine, sim.regular_state
     rows = np.zeros((ROWS, state.contacts.pair.shape[1]))
-    responses_stage(engine.law).run(engine._current_table(state), (rows,))
+    responses_stage(engine.law).run(engine.table_of(state), (rows,))
     pair = sim.contacts["pair"]
     return responses(rows[:, : len(pair)]), pair
 

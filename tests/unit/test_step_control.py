@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.state import INNER_COUNT, INNER_SKIN, PAIRS
 from sand.compiler.jit import kernel
 from sand.contact.events import inner_list_overflowed
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
 from sand.neighbours.pair_list import build_inner_list
 from sand.numerics.simd import float_bits, float_from_bits
-from sand.state.state import INNER_COUNT, INNER_SKIN, PAIRS
 
 
 def dense_gas():

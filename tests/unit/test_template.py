@@ -18,17 +18,17 @@ from sand.config.case import (
     check_case,
     read_case,
 )
-from sand.config.errors import _keys_at
+from sand.config.key_errors import _keys_at
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
+from sand.engine.driven import Driven
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
-from sand.experiments.scattering.case import ScatterCase
+from sand.experiments.scattering.scatter_case import ScatterCase
 from sand.experiments.templates import TEMPLATES
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
-from sand.neighbours.settings import Neighbours
+from sand.neighbours.search import Neighbours
 from sand.setup import GrainClass
-from sand.simulation.driven import Driven
 
 MODELS = [RunSection, BoxSection, GrainsSection, GrainClass, MaterialSection, Neighbours]
 

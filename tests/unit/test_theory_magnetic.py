@@ -7,7 +7,7 @@ import pytest
 
 import sand
 from sand import theory
-from sand.constants import BOLTZMANN, MAGNETIC
+from sand.basics.constants import BOLTZMANN, MAGNETIC
 
 R = 1e-8
 MASS = sand.IRON.density * 4.0 / 3.0 * math.pi * R**3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import MAGNETIC
+from sand.basics.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.forces.pair import tree, tree_cells, tree_loops
 from sand.forces.pair.dipole_formulas import pair_load
@@ -399,7 +399,7 @@ def test_choice_and_wrong_input():
     for options, lines in (
         ({"open": "octree"}, ["open = 'octree'; did you mean 'tree'"]),
         ({"open": "pairs", "accuracy": 1e-2}, ["accuracy is used only with periodic = 'ewald' or open = 'tree'"]),
-        ({"open": "tree", "accuracy": 0.2}, ["accuracy = 0.2 must be at most 0.1"]),
+        ({"open": "tree", "accuracy": 0.2}, ["accuracy = 0.2 must be at least 1e-08 and at most 0.1"]),
         (
             {"open": "tree", "periodic": "ewald", "cutoff": "1 um"},
             ["cutoff = 1e-06 cannot be given with periodic", "open = 'tree' is for open boxes and periodic = 'ewald'"],

@@ -11,9 +11,9 @@ from scipy.constants import k as BOLTZMANN
 import sand
 from sand.config.build import simulation_of
 from sand.config.case import read_case
+from sand.engine.input_checks import check_system
 from sand.errors import BadInput
-from sand.simulation.checks import check_system
-from sand.simulation.truncation import motion_temperature, truncation_warnings
+from sand.limits.truncation import motion_temperature, truncation_warnings
 
 BOX = sand.Box.periodic("2 um")
 OPEN = sand.Box.open()

@@ -11,11 +11,11 @@ import pint
 import pytest
 
 import sand
+from sand.basics.quantity_array import QuantityArray
+from sand.basics.units import in_unit, si
 from sand.config.case import check_case
 from sand.experiments import kernel_table
 from sand.io.run_folder import read_text
-from sand.quantity_array import QuantityArray
-from sand.units import in_unit, si
 
 UNIT = pint.UnitRegistry()
 PAIR = [[0, 0, 0], [1e-6, 0, 0]]

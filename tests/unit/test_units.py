@@ -7,8 +7,8 @@ import sys
 import pint
 import pytest
 
+from sand.basics.units import format_quantity, in_unit, si
 from sand.errors import BadInput
-from sand.units import format_quantity, in_unit, si
 
 
 @pytest.mark.parametrize(

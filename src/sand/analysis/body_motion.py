@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
-from ..constants import BOLTZMANN
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.constants import BOLTZMANN
 from ..errors import refuse_other
 from .clusters import cluster_labels, in_one_piece
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
-from ..box import Box
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.box import Box
+from ..basics.units import whole_number
 from ..errors import BadInput, shown
-from ..units import whole_number
 
 FEW = 200
 """Grains plus contacts up to which a disjoint-set forest in Python is faster than SciPy's graph (130 µs)."""

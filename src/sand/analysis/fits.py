@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
 from ..errors import BadInput
 
 SAME = 1e-9

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.units import seed_given, si
 from ..errors import BadInput, shown
-from ..units import seed_given, si
 from .fits import power_law
 from .shape import gyration_radius
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
 from ..errors import refuse_other
 from .clusters import aggregate_moments, checked_labels, cluster_labels, percolating_clusters, unwrapped
 from .network import network

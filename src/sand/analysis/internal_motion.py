@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
+from ..basics.arguments import checked
+from ..basics.box import Box
 from .body_motion import body_motion
 from .clusters import cluster_labels, in_one_piece
 

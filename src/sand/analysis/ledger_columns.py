@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.state import DAMPING, LOST
 from ..errors import NoSuchKey, did_you_mean, import_optional, shown
-from ..state.state import DAMPING, LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 DAMPED = tuple(f"lost_{name}" for name in DAMPING)

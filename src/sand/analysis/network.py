@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
 
-from ..arguments import MOST_GRAINS, checked
-from ..units import whole_number
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.units import whole_number
 from .clusters import checked_pairs, cluster_labels
 from .shape import coordination
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.frame_chunks import MODES as SHARES
 from ..io.frame_chunks import REST

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.units import MOST, whole_number
 from ..errors import BadInput, shown
-from ..units import MOST, whole_number
 from .clusters import checked_pairs
 from .projection import area_of_union
 

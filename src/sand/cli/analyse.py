@@ -75,7 +75,7 @@ def _output_folder(folder: Path, names: Sequence[str], overwrite: bool) -> Path:
 
 
 def _show(content: dict[str, Any], folder: Path | None) -> None:
-    from ..units import format_quantity
+    from ..basics.units import format_quantity
 
     for one in content["ensembles"]:
         fitted = f" for large S; fitted from S = {one['window'][0]:g} to {one['window'][1]:.4g}"

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ..threads import set_threads
+from ..basics.threads import set_threads
 from . import options, parsing, report
 
 SHOWN = 12

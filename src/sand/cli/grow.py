@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
+from ..basics.threads import set_threads
 from ..errors import BadInput
-from ..threads import set_threads
 from . import options, parsing, report
 
 DEFAULT_SEEDS = list(range(1, 9))

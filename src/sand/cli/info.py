@@ -96,7 +96,7 @@ def describe_folder(path: Path) -> Description:
 
 
 def _describe_run(path: Path, listed: tuple[str, str]) -> Description:
-    from ..units import format_quantity
+    from ..basics.units import format_quantity
 
     until, condition = _planned_end(path / files.CASE)
     summary = _summary(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
@@ -190,7 +190,7 @@ def _cost(
     """Expected cost of a run, or of several like it one after the other, which draw one figure or one each."""
     from ..compiler.jit import COMPILE_TIMES
     from ..compiler.progress import compile_times
-    from ..simulation.cost import expected_cost
+    from ..simulation.cost.cost import expected_cost
 
     cost, missing = expected_cost(simulation, end, last_step, condition), simulation._engine.uncompiled()
     if cost.seconds is not None:
@@ -211,7 +211,7 @@ def _cost(
 
 def _steps(cost: Any) -> str:
     """Expected steps, for people."""
-    from ..units import format_quantity
+    from ..basics.units import format_quantity
 
     each = f"about {format_quantity(float(f'{cost.step:.2g}'), 's')} each"
     if cost.steps is None:
@@ -234,15 +234,15 @@ def _wall_time(cost: Any) -> str:
 
 def _limits(simulation: Any) -> dict[str, str]:
     """Limits of the model for the grains and forces of a simulation, by label."""
-    from ..simulation.limits import limit_rows
+    from ..limits.model_limits import limit_rows
 
     return limit_rows(simulation.grains, simulation.forces, simulation.box)
 
 
 def _collision_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..basics.units import format_quantity
     from ..experiments.collision import INTERVAL, MOST_CHECKS, expected_end
     from ..experiments.collision_case import read_collision
-    from ..units import format_quantity
 
     case = read_collision(path)
     seeds = case.impact.seeds
@@ -293,9 +293,9 @@ def _growth_case(path: Path, start: tuple[str, str]) -> Description:
 
 
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
-    from ..experiments.scattering.case import read_scattering
-    from ..experiments.scattering.cost import expected_flights
-    from ..units import format_quantity
+    from ..basics.units import format_quantity
+    from ..experiments.scattering.flight_cost import expected_flights
+    from ..experiments.scattering.scatter_case import read_scattering
 
     case, flights = read_scattering(path)
     rows: report.Rows = [("job", case.measure.job)]
@@ -315,8 +315,8 @@ def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
 
 def describe_trajectory(path: Path) -> Description:
     """Describe the frames, times and last frame of a trajectory."""
+    from ..basics.units import format_quantity
     from ..io.trajectory import read_frames
-    from ..units import format_quantity
 
     frames = read_frames(path)
     if not frames:
@@ -343,8 +343,8 @@ def describe_trajectory(path: Path) -> Description:
 
 def describe_checkpoint(path: Path) -> Description:
     """Describe the state in a checkpoint."""
+    from ..basics.units import format_quantity
     from ..io.checkpoint import read_checkpoint
-    from ..units import format_quantity
 
     arrays, meta = read_checkpoint(path)
     grains, contacts = len(arrays["grains/radius"]), arrays["contacts/pair"].shape[1]
@@ -383,7 +383,7 @@ def _describe_results(path: Path, content: dict[str, Any]) -> Description | None
 
 def describe_ledger(path: Path) -> Description:
     """Describe the first and the last row of a ledger."""
-    from ..units import format_quantity
+    from ..basics.units import format_quantity
 
     ledger = _ledger(path)
     first, last = ledger[0], ledger[-1]

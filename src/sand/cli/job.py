@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..basics.units import format_quantity
 from ..compiler.program import before_first_calls
 from ..errors import BadInput
 from ..experiments.executors import executor_for
 from ..simulation.observers import Observer
 from ..simulation.signals import STOPS, Signals
-from ..units import format_quantity
 from . import report
 from .exits import WALL_TIME
 from .interrupts import BEGAN, Interrupts

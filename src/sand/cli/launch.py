@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..basics.units import format_quantity
 from ..config.case import with_absolute_files
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
@@ -15,7 +16,6 @@ from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..simulation.outcome import Outcome, Result
-from ..units import format_quantity
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS, WALL_TIME
 from .job import InterruptObserver

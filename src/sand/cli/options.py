@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..basics.arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..basics.paths import checked_name
 from ..errors import BadInput
-from ..paths import checked_name
 
 
 class PathName(click.ParamType):

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..descriptions import docstring
+from ..basics.descriptions import docstring
 from ..errors import BadInput
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import click
 
-from ..descriptions import docstring
+from ..basics.descriptions import docstring
 from ..errors import SandError
 from ..version import __version__
 from . import (

@@ -6,8 +6,8 @@ import math
 import time
 from typing import Any
 
+from ..basics.units import format_quantity
 from ..simulation.observers import Observer
-from ..units import format_quantity
 from .report import LAYOUT, progress_bar
 
 NUMBERS_EVERY = 1.0

@@ -249,12 +249,12 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
     condition : str or None
         Condition that ends the run.
     """
+    from ..basics.units import format_quantity
     from ..simulation.cadence import chosen_cadence, read_cadence
-    from ..units import format_quantity
 
     every = simulation.frame_every
     if every is None:
-        chosen = chosen_cadence(simulation.time, end, simulation._chosen)
+        chosen = chosen_cadence(simulation.time, end, simulation._continuation.chosen)
         every = math.inf if chosen is None else chosen.every
     if isinstance(every, str):
         frames = f"frames {read_cadence(every, 'frame_every')}"
@@ -280,7 +280,7 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
 
 
 def _grains(grains: Any, temperature: float) -> str:
-    from ..units import MELTED, format_quantity
+    from ..basics.units import MELTED, format_quantity
 
     def span(values: Any, text: Callable[[float], str]) -> str:
         least, most = text(float(values.min())), text(float(values.max()))
@@ -302,7 +302,7 @@ def _grains(grains: Any, temperature: float) -> str:
 
 def _force(force: Any) -> str:
     """Name and non-default settings of a force; case.toml lists all settings."""
-    from ..descriptions import as_text, changed_arguments
+    from ..basics.descriptions import as_text, changed_arguments
 
     texts = [f"{key} = {as_text(value)}" for key, value in changed_arguments(force).items()]
     return f"{force.name} ({', '.join(texts)})" if texts else force.name
@@ -310,7 +310,7 @@ def _force(force: Any) -> str:
 
 def results(summary: dict[str, Any]) -> Rows:
     """The most important numbers of summary.json."""
-    from ..units import format_quantity
+    from ..basics.units import format_quantity
 
     rigid = summary.get("rigid_clusters")
     awake: Rows = [("awake", awake_share(rigid))] if rigid else []

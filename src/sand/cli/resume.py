@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
+from ..basics.threads import set_threads
 from ..errors import BadInput
 from ..io.run_folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, SUMMARY, read_json
-from ..threads import set_threads
 from . import options, parsing, report
 from .collide import collide
 from .grow import boxes
@@ -86,7 +86,7 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
         content, seeds = read_growth(folder / CASE)
         boxes(content, seeds or [], folder, scheduler=scheduler, **how)
     elif kind == "scatter":
-        from ..experiments.scattering.case import read_scattering
+        from ..experiments.scattering.scatter_case import read_scattering
 
         del how["threads"]  # a flight uses one thread
         read = read_scattering(folder / CASE)
@@ -101,9 +101,9 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
 
 def _run(place: Path, until: float | None, wall_time: float | None, *, quiet: bool, as_json: bool) -> int | None:
     """Continue a run; returns the exit code, None if its planned end is reached."""
+    from ..basics.units import format_quantity
     from ..config.build import resume
     from ..simulation.condition import GIVEN
-    from ..units import format_quantity
     from .launch import launch
 
     simulation = resume(place)

@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
+from ..basics.threads import set_threads
 from ..errors import BadInput
 from ..io.run_folder import CASE, TRAJECTORY
-from ..threads import set_threads
 from . import options, parsing, report
 
 

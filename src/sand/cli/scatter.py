@@ -37,7 +37,7 @@ def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: An
     every flight. The numbers do not depend on the number of workers or on interruptions; continue an interrupted job
     with `sand resume`.
     """
-    from ..experiments.scattering.case import read_scattering
+    from ..experiments.scattering.scatter_case import read_scattering
     from .launch import refuse_folder
 
     read = read_scattering(case)

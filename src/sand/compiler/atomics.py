@@ -13,7 +13,9 @@ from typing import Any
 from llvmlite import binding, ir  # type: ignore[import-untyped]
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
+
+from .jit import compiled_form
 
 __all__ = ["fetch_add", "read", "write", "yield_cpu"]
 
@@ -117,21 +119,21 @@ def _yield_cpu(context: Any) -> Any:
 # numba requires equal signatures, including annotations, which a lambda cannot have
 
 
-@overload(fetch_add)
+@compiled_form(fetch_add)
 def _compiled_fetch_add(array, index, value):
     return lambda array, index, value: _fetch_add(array, index, value)
 
 
-@overload(read)
+@compiled_form(read)
 def _compiled_read(array, index):
     return lambda array, index: _read(array, index)
 
 
-@overload(write)
+@compiled_form(write)
 def _compiled_write(array, index, value):
     return lambda array, index, value: _write(array, index, value)
 
 
-@overload(yield_cpu)
+@compiled_form(yield_cpu)
 def _compiled_yield_cpu():
     return lambda: _yield_cpu()

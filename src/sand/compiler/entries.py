@@ -25,7 +25,7 @@ from numba.core.serialize import dumps, loads
 
 from ..errors import warn
 from .cache import WRITABLE_BY_OTHERS, remade
-from .progress import acquire_lock
+from .progress import Timeout, acquire_lock, free_lock
 
 __all__ = ["CodeCache", "Entries", "described", "machine_code"]
 
@@ -166,6 +166,15 @@ class CodeCache(NullCache):
     def holds(self, signature: Any, codegen: Any) -> bool:
         """Whether there is code for these types; nothing is loaded."""
         return self._entries.read(*self._place(signature, codegen)) is not None
+
+    def take(self, signature: Any, codegen: Any) -> bool:
+        """Take the lock of the code for these types, if there are locks; False if another process has it."""
+        name, _ = self._place(signature, codegen)
+        try:
+            self._locks += filter(None, [free_lock(self._entries.own / Path(name).with_suffix(".lock"))])
+        except Timeout:
+            return False
+        return True
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Compiled code from the disk; None if there is none, while this process holds the lock of its file."""

@@ -20,15 +20,15 @@ from typing import Any
 
 import numba
 from numba.core import event
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from .cache import cache_folders
 from .entries import CodeCache, Entries
 from .progress import CompilationListener, making_code
 from .user_code import code_digest
 
-__all__ = ["COMPILED", "COMPILE_TIMES", "cache_folder", "caller", "compile_error", "formula", "in_cache", "kernel"]
-__all__ += ["loop", "rare", "separate"]
+__all__ = ["COMPILED", "COMPILE_TIMES", "cache_folder", "caller", "compile_error", "compile_if_free", "compiled_form"]
+__all__ += ["formula", "in_cache", "kernel", "loop", "rare", "separate"]
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -120,9 +120,14 @@ loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
 separate = _registered(**_INNER, **_NO_ALIASES, forceinline=False)
 
 
+def compiled_form(function: Callable) -> Callable:
+    """Decorator: makes what compiled code calls in place of `function`, which remains an ordinary Python function."""
+    return overload(function, jit_options=_INNER | _ALIASES | {"forceinline": True})
+
+
 _COMPILED = (
-    "analysis/projection.py", "box.py", "compiler", "contact", "experiments/scattering", "forces", "grains.py",
-    "integrate", "neighbours", "numerics", "setup/_kernels", "state",
+    "analysis/projection.py", "basics/arrays.py", "basics/box.py", "basics/grains.py", "basics/state.py", "compiler",
+    "contact", "experiments/scattering", "forces", "integrate", "neighbours", "numerics", "setup/_kernels",
 )  # fmt: skip
 """Packages and files with compiled functions, or with named tuples that compiled functions take."""
 
@@ -175,6 +180,18 @@ def in_cache(compiled: Any, signature: Any) -> bool:
     """Whether the code of a kernel for this signature is on the disk; nothing is compiled."""
     code = compiled._cache
     return isinstance(code, CodeCache) and code.holds(signature, compiled.targetctx.codegen())
+
+
+def compile_if_free(compiled: Any, signature: Any) -> bool:
+    """Compile a kernel for a signature into the cache, unless it is there; False if another process does so now."""
+    code, codegen = compiled._cache, compiled.targetctx.codegen()
+    if isinstance(code, CodeCache):
+        if code.holds(signature, codegen):
+            return True
+        if not code.take(signature, codegen):
+            return False
+    compiled.compile(signature)
+    return True
 
 
 _PURPOSES: dict[int, str] = {}

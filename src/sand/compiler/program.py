@@ -11,10 +11,10 @@ import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from .groups import WORD
-from .jit import COMPILED
+from .jit import COMPILED, compiled_form
 from .native_calls import status_and_result
 from .stage import PythonStage, Stage
 from .table import Table, words_of
@@ -174,7 +174,7 @@ def stage_fails(s: Any, number: int, block: int) -> bool:
     return False
 
 
-@overload(stage_fails)
+@compiled_form(stage_fails)
 def _compiled_stage_fails(s, number, block):
     def call(s, number, block):
         return _entry_fails(s.program, number, s, block)
@@ -182,14 +182,14 @@ def _compiled_stage_fails(s, number, block):
     return call
 
 
-@overload(has_stage)
+@compiled_form(has_stage)
 def _compiled_has_stage(s, number):
     if isinstance(number, types.IntEnumMember):
         return lambda s, number: s.program[number.value, 0] != 0
     return lambda s, number: s.program[number, 0] != 0
 
 
-@overload(call_stage)
+@compiled_form(call_stage)
 def _compiled_call_stage(s, number, block=0):
     def call(s, number, block=0):
         return _call_entry(s.program, number, s, block)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,13 +15,16 @@ from numba.core import event
 
 from .cache import read_record, write_record
 
-__all__ = ["CompilationListener", "acquire_lock", "announce", "compilation_notes", "compilation_seconds"]
-__all__ += ["compile_times", "describe", "making_code", "suppress_notes"]
+__all__ = ["CompilationListener", "Timeout", "acquire_lock", "announce", "compilation_notes", "compilation_seconds"]
+__all__ += ["compile_times", "describe", "free_lock", "making_code", "shown_line", "suppress_notes"]
 
 LONGEST_WAIT = 300.0
 """Wall time [s] to wait for a process that compiles the same code."""
 SHORT = 1.0
 """Wall time [s] of the last compilation below which no note is worth it."""
+
+REWRITE, REPEAT = 0.5, 30.0
+"""Wall times [s] after which a line of progress is shown again, on a terminal and elsewhere."""
 
 Notify = Callable[[str], None]
 
@@ -70,15 +74,57 @@ def acquire_lock(path: Path, what: str) -> BaseFileLock | None:
 
     A process that waits longer than LONGEST_WAIT compiles without the lock.
     """
-    lock = FileLock(path, thread_local=False, fallback_to_soft=False)
     try:
-        lock.acquire(timeout=0)
+        return free_lock(path)
     except Timeout:
         _notify[-1](f"another process compiles {what}; waiting for it …")
         try:
-            lock.acquire(timeout=LONGEST_WAIT)
-        except (Timeout, OSError, NotImplementedError):
+            return free_lock(path, LONGEST_WAIT)
+        except Timeout:
             return None
+
+
+@contextmanager
+def shown_line(describe: Callable[[], str]) -> Iterator[None]:
+    """Within the block, show `describe()`: on a terminal in one line that is rewritten, else as a note now and then.
+
+    The notes on single compilations are left out.
+    """
+    show, ended = _notify[-1], threading.Event()
+    rewrites = show is not _nowhere and sys.stderr is not None and sys.stderr.isatty()
+
+    def keep_showing() -> None:
+        width = 0
+        while not ended.wait(REWRITE if rewrites else REPEAT):
+            if rewrites:
+                text = f"sand: {describe()}"
+                print(f"\r{text:<{width}}", end="", file=sys.stderr, flush=True)
+                width = len(text)
+            else:
+                show(describe())
+        if width:
+            print(f"\r{'':<{width}}\r", end="", file=sys.stderr, flush=True)
+
+    if not rewrites:
+        show(describe())
+    thread = threading.Thread(target=keep_showing, daemon=True)
+    _notify.append(_nowhere)
+    thread.start()
+    try:
+        yield
+    finally:
+        _notify.pop()
+        ended.set()
+        thread.join()
+
+
+def free_lock(path: Path, wait: float = 0.0) -> BaseFileLock | None:
+    """Take a lock for which one waits so long [s]; None if there are no locks here.  Raises Timeout."""
+    lock = FileLock(path, thread_local=False, fallback_to_soft=False)
+    try:
+        lock.acquire(timeout=wait)
+    except Timeout:
+        raise
     except (OSError, NotImplementedError):
         return None
     return lock
@@ -152,8 +198,10 @@ class CompilationListener(event.Listener):
         self._depth -= 1
         if self._current and self._depth == 0:
             seconds = time.perf_counter() - self._began
-            durations = self._durations() | {self._current: round(seconds, 3)}
-            self._current = ""
+            what, self._current = self._current, ""
             if sys.exc_info()[0] is not None:  # numba's `event.is_failed` is true for every compilation
                 return
-            write_record(self._record, durations)
+            lock = acquire_lock(self._record.with_suffix(".lock"), "")  # several processes compile side by side
+            write_record(self._record, self._durations() | {what: round(seconds, 3)})
+            if lock is not None:
+                lock.release()

@@ -49,6 +49,9 @@ from .user_code import code_digest
 
 __all__ = ["PythonStage", "Stage", "stage"]
 
+Place = Callable[[str], tuple[int, Any]]
+"""Index in the table and structure of a part, by its name."""
+
 
 def is_not_inlined() -> None:
     """First line of a function that is not inlined."""
@@ -111,10 +114,17 @@ class Stage:
         Names of the parts for whose types it is compiled: arguments, and attributes of `s`.
     purpose : str
         What it computes.
+    is_cached : bool
+        Whether its machine code is cached on the disk.
+    seconds : float
+        Rough wall time [s] of its compilation.
     """
 
-    def __init__(self, function: Callable, purpose: str, long_vectors: bool, cached: bool, parts: tuple[str, ...]):
-        self.function, self.purpose, self._long_vectors, self._cached = function, purpose, long_vectors, cached
+    def __init__(
+        self, function: Callable, purpose: str, long_vectors: bool, cached: bool, parts: tuple[str, ...], seconds: float
+    ):
+        self.function, self.purpose, self._long_vectors, self.is_cached = function, purpose, long_vectors, cached
+        self.seconds = seconds
         self.needs = tuple(inspect.signature(function).parameters)
         self.parts = *(name for name in self.needs if name not in SPECIAL), *parts
         self._compiled, self._compiler = dict[Any, Any](), None
@@ -125,31 +135,30 @@ class Stage:
 
     def address(self, table: Table, parameters: Any) -> int:
         """Address of the compiled function for the types of these parts; compiles it, or loads it from the disk."""
-        key = self._key(table, parameters)
+        key = self.key(table, parameters)
         if key not in self._compiled:
-            dispatcher, signature = self._to_compile(table, parameters)
+            dispatcher, signature = self.to_compile(table.place, structure_of(parameters))
             with making_code:  # also of uncached code
                 dispatcher.compile(signature)
             found = dispatcher.overloads[signature.args]
             self._compiled[key] = found, machine_code(found).get_pointer_to_function(found.fndesc.llvm_func_name)
         return int(self._compiled[key][1])
 
-    def _key(self, table: Table, parameters: Any) -> Any:
+    def key(self, table: Table, parameters: Any) -> Any:
         """What identifies the types of these parts."""
         return structure_of(parameters), *map(table.key, self.parts)
 
-    def _to_compile(self, table: Table, parameters: Any) -> tuple[Any, Any]:
-        """Numba's dispatcher, and the signature for the types of these parts."""
-        own = structure_of(parameters)
-        parts = tuple(self._part(name, table, own) for name in self.needs)
+    def to_compile(self, place: Place, own: Any) -> tuple[Any, Any]:
+        """Numba's dispatcher, and the signature for parts at these places and parameters of this structure."""
+        parts = tuple(self._part(name, place, own) for name in self.needs)
         self._compiler = self._compiler or self._dispatcher()
         return self._compiler, types.int64(Address(parts), ANY_TABLE, types.int64)
 
     def is_compiled(self, table: Table, parameters: Any = ()) -> bool:
         """Whether the machine code for these parts exists, in this process or on the disk; nothing is compiled."""
-        if not COMPILED or self._key(table, parameters) in self._compiled:
+        if not COMPILED or self.key(table, parameters) in self._compiled:
             return True
-        return in_cache(*self._to_compile(table, parameters))
+        return in_cache(*self.to_compile(table.place, structure_of(parameters)))
 
     def in_python(self, table: Table, parameters: Any, block: int) -> Any:
         """Call the function without the compiler."""
@@ -190,16 +199,16 @@ class Stage:
             call = table.calls[self] = parameters, row, self.address(table, parameters), address_of(row)
         return int(call_from_python(call[2], table.address, call[3], block))
 
-    def _part(self, name: str, table: Table, own: Any) -> tuple[Any, Any]:
+    def _part(self, name: str, place: Place, own: Any) -> tuple[Any, Any]:
         """Index in the table, or name, and type of one argument; `own` is the structure of the parameters."""
         if name == PARAMETERS:
             return name, kind_of(own)
         if name == BLOCK:
             return name, types.int64
         if name == ALL_PARTS:
-            places = ((part, *table.place(part)) for part in self.parts)
+            places = ((part, *place(part)) for part in self.parts)
             return name, Parts(tuple((part, index, kind_of(structure)) for part, index, structure in places))
-        index, structure = table.place(name)
+        index, structure = place(name)
         return index, kind_of(structure)
 
     def _dispatcher(self) -> Any:
@@ -222,7 +231,7 @@ class Stage:
         # symbols of machine code that several processes have compiled must differ
         words = self.function.__qualname__, "wide" if wide else "", code_digest(self.function) or ""
         entry = _renamed(entry, "_".join(word for word in words if word))
-        return kernel(entry, cached=self._cached, nogil=True, wrapper=False, purpose=self.purpose)
+        return kernel(entry, cached=self.is_cached, nogil=True, wrapper=False, purpose=self.purpose)
 
 
 def _has_same_members(one: Any, other: Any) -> bool:
@@ -264,7 +273,12 @@ class PythonStage:
 
 
 def stage(
-    purpose: str, *, long_vectors: bool = False, cached: bool = True, parts: tuple[str, ...] = ()
+    purpose: str,
+    *,
+    long_vectors: bool = False,
+    cached: bool = True,
+    parts: tuple[str, ...] = (),
+    seconds: float = 0.5,
 ) -> Callable[[Callable], Stage]:
     """Decorator that makes a `Stage` of a function whose arguments are names of parts.
 
@@ -279,5 +293,7 @@ def stage(
         source; code with other objects of the user is never cached.
     parts : tuple of str, optional
         Of a stage with the argument `s`: names of its attributes.
+    seconds : float, optional
+        Rough wall time [s] of its compilation, until it is measured; stages that take longest are compiled first.
     """
-    return lambda function: Stage(function, purpose, long_vectors, cached, parts)
+    return lambda function: Stage(function, purpose, long_vectors, cached, parts, seconds)

@@ -13,6 +13,7 @@ import dis
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
+from enum import Enum
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -57,6 +58,8 @@ def _words(value: Any, seen: dict[int, int]) -> Iterator[str]:
             yield from _words_of_function(value, seen)
     elif isinstance(value, type):
         yield f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
+        if issubclass(value, Enum) and not _is_of_a_package(value.__module__):
+            yield repr({name: member.value for name, member in value.__members__.items()})
     elif isinstance(value, tuple):
         yield f"{len(value)} members"
         yield from _words(type(value), seen)
@@ -66,6 +69,8 @@ def _words(value: Any, seen: dict[int, int]) -> Iterator[str]:
         yield repr(value)
     elif isinstance(value, (ModuleType, BuiltinFunctionType, np.ufunc)):
         yield value.__name__
+    elif isinstance(value, np.ndarray) and not value.dtype.hasobject:  # constant in compiled code
+        yield f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
     elif value is Ellipsis:
         yield "..."
     else:

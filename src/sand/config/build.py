@@ -8,22 +8,22 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ..arguments import checked
-from ..box import Box
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.paths import user_path
+from ..basics.state import grains_from_arrays
 from ..errors import BadInput
 from ..forces.own import import_modules
-from ..grains import Grains
 from ..io.checkpoint import newest_checkpoint
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
-from ..paths import user_path
 from ..setup.from_file import from_trajectory, is_own_trajectory, start_from_file
 from ..setup.from_frame import Start
 from ..setup.gas import gas_with_contacts
 from ..simulation.condition import GIVEN
 from ..simulation.simulation import Simulation
-from ..state.state import grains_from_arrays
 from .case import THERMAL, Case, check_case
 
 

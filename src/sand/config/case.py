@@ -4,113 +4,101 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, ValidationError, create_model, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, create_model, model_validator
 
-from ..box import Box, as_box
+from ..basics.box import Box, as_box
+from ..basics.material import PRESETS, Material, like_preset
+from ..basics.settings import For, Number, Reading, Word
+from ..engine.driven import Driven
+from ..engine.walls import Wall, read_walls, wall_columns
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
+from ..integrate.integrator import INTEGRATORS, moves_bodies
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
-from ..material import PRESETS, Material, like_preset
-from ..neighbours.settings import Neighbours
+from ..neighbours.search import Neighbours
 from ..setup.gas import SPINS
-from ..setup.grain_classes import GrainClass, class_numbers
+from ..setup.grain_classes import GrainClass, Materials, Radii, class_numbers
 from ..simulation.condition import GIVEN, read_condition
-from ..simulation.driven import Driven
 from ..simulation.ledger import Ledger
-from ..simulation.walls import Wall, read_walls, wall_columns
 from .commands import BODIES, refuse_other_command
-from .errors import validate
+from .key_errors import validate
 from .sections import (
-    CLUSTERS,
     Cadence,
     Count,
     Duration,
-    Materials,
     Moment,
     PathName,
-    Radii,
     SaveCadence,
     Section,
     Seed,
     Stepping,
     Steps,
     method_of,
-    quantity,
     with_integrator,
-    word,
+    with_keys,
 )
+
+
+def _condition(value: Any, name: str) -> Any:
+    """Check a condition that ends a run.  Raises BadInput."""
+    if value != GIVEN:
+        read_condition(value)
+    return value
 
 
 class RunSection(Section):
     """[run]: end (a time, a number of steps, or a condition), cadences of output, seed and output folder."""
 
-    until: Duration | None = None
+    until: Duration = None
     """End of the run [s], simulated time; this, `steps` or `stop` is required; with several, the first one reached."""
     steps: Steps | None = None
     """End of the run as a number of steps, completed to the end of the cycle."""
-    stop: str | None = None
+    stop: Annotated[str | None, Reading(_condition)] = None
     """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
     ledger compared (< <= > >= == !=) with numbers with units; checked every 100 steps, with rigid clusters in every
     step. "wall > 23 h" stops the run after this wall time, to be continued. See `Simulation.run`."""
-    frame_every: Cadence | None = None
+    frame_every: Cadence = None
     """Frames: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default 1/200
     of the run."""
-    row_every: Cadence | None = None
+    row_every: Cadence = None
     """Further rows of the ledger, in the same forms; every frame has a row."""
-    checkpoint_every: SaveCadence | None = None
+    checkpoint_every: SaveCadence = None
     """Checkpoints, in the same forms or by wall time, "30 s wall"; by default at least every minute of wall time."""
     seed: Seed = 0
     """Seed of all random numbers: initial conditions and random kicks of a gas."""
     out: PathName | None = None
     """Folder of the run."""
 
-    @field_validator("stop", mode="after")
-    @classmethod
-    def _condition(cls, value: str | None) -> str | None:
-        if value not in (None, GIVEN):
-            read_condition(value)
-        return value
-
-    @model_validator(mode="after")
-    def _ends(self) -> RunSection:
+    def contradictions(self) -> Iterator[str]:
+        """A run without an end."""
         if self.until is None and self.steps is None and self.stop is None:
-            raise ValueError("until is missing; add it, for example until = '5 us'")
-        return self
+            yield "until is missing; add it, for example until = '5 us'"
+
+
+def _box(value: Any, name: str) -> Box:
+    """The box of one length or three.  Raises BadInput."""
+    return as_box([None if v == "open" else v for v in value] if isinstance(value, list) else value)
 
 
 class BoxSection(Section):
     """[box]: periodic = one length or three, "open" for an open axis; without it, open space."""
 
-    periodic: Any = None
+    periodic: Annotated[Any, Reading(_box)] = None
     """Length of a cube or list of three lengths [m], "open" for an open axis; none: open space."""
 
-    @field_validator("periodic", mode="after")
-    @classmethod
-    def _read(cls, value: Any) -> Box:
-        if isinstance(value, list):
-            value = [None if v == "open" else v for v in value]
-        return as_box(value)
 
-
+@with_keys(Material, "name", optional=True)
 class MaterialSection(Section):
     """[materials.NAME]: a new material, or changes to the one given by `like`."""
 
     like: str | None = None
-    density: Any = None
-    surface_energy: Any = None
-    young_modulus: Any = None
-    poisson_ratio: Any = None
-    rolling_limit: Any = None
-    specific_moment: Any = None
-    anisotropy: Any = None
-    exchange_stiffness: Any = None
-    anisotropy_kind: str | None = None
+    """Preset to start from. Without it, density, young_modulus and poisson_ratio are required."""
 
     def build(self, name: str) -> Material:
         """Build the material.  Raises BadInput for missing or impossible numbers."""
@@ -128,78 +116,62 @@ class GrainsSection(Section):
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
-    number: Count | None = None
+    number: Annotated[Count | None, For("kind", "gas", "given")] = None
     """Number of grains; with `classes` of grains and aggregates."""
-    radius: Radii | None = None
+    radius: Radii = None
     """Radius [m]: a length, `lognormal(MEDIAN, SIGMA, LEAST, MOST)`, `power law(EXPONENT, LEAST, MOST)`, or a list with
     one length for each grain; for a body from a file one length, only if the file has none."""
     material: Materials = "iron"
     """Preset or name in [materials], or fractions with the sum 1, `{silica = 0.7, iron = 0.3}`; for a body from a file
     it takes precedence over the file's material."""
-    moment: Moment | None = None
+    moment: Annotated[Moment, For("kind", "gas", "given")] = None
     """Moment of each grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moment."""
-    charge: quantity("C") | None = None  # type: ignore[valid-type]
+    charge: Annotated[Any, Number("C"), For("kind", "gas", "given")] = None
     """Charge of each grain [C]; none: no charge."""
-    temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
+    temperature: Annotated[Any, Number("K", least=0.0), For("kind", "gas", "given")] = 0.0
     """Temperature of velocities and spins [K]."""
-    spins: word(SPINS) = "kT/2"  # type: ignore[valid-type]
+    spins: Annotated[str, Word(among=SPINS), For("kind", "gas", "given")] = "kT/2"
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
-    exact_temperature: Annotated[bool, Field(strict=True)] = True
+    exact_temperature: Annotated[bool, Field(strict=True), For("kind", "gas", "given")] = True
     """Whether velocities and spins are scaled to exactly this temperature; otherwise they are random draws."""
-    classes: list[GrainClass] = Field(default_factory=list)
+    classes: Annotated[list[GrainClass], For("kind", "gas")] = Field(default_factory=list)
     """Classes of grains and aggregates, each a table [[grains.classes]]; see below."""
-    extent: Any = None
+    extent: Annotated[Any, For("kind", "gas")] = None
     """Length of the gas along open axes of the box [m]: one, or three with "periodic" along periodic axes; the gas is
     centred on the origin, and its members are wholly inside."""
-    file: PathName | None = None
+    file: Annotated[PathName | None, For("kind", "file", needed="one, such as file = 'run/trajectory.gsd'")] = None
     """Run folder, trajectory or body of SAND, or a file of another program: XYZ, columns, CSV, LAMMPS data and dump,
     GSD; its content tells the format."""
-    frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
+    frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True), For("kind", "file")] = -1
     """Index of the frame; −1 is the last."""
-    length: str | None = None
+    length: Annotated[str | None, For("kind", "file")] = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
 
-    @model_validator(mode="after")
-    def _check_keys(self) -> GrainsSection:
-        needed, foreign = GRAINS_KEYS[self.kind]
-        in_classes = {"number", "radius"} if self.classes else set()  # checked for each class
-        problems = [
-            f"{name} is missing; add it, for example {name} = {example}"
-            for name, example in needed.items()
-            if getattr(self, name) is None and name not in in_classes
-        ]
-        given = [name for name in foreign if name in self.model_fields_set]
-        problems += [f"{name} is not for kind = '{self.kind}'; remove it, or change kind" for name in given]
+    def contradictions(self) -> Iterator[str]:
+        """Numbers and radii that are missing, or do not fit the classes; fractions of a file."""
         if self.kind != "gas" and isinstance(self.material, dict):
-            problems.append("material: fractions are for kind = 'gas'; give one name")
+            yield "material: fractions are for kind = 'gas'; give one name"
+        if self.kind != "file" and self.number is None and not self.classes:
+            yield "number is missing; add it, for example number = 125"
+        if self.kind == "gas" and self.radius is None and not self.classes:
+            yield "radius is missing; add it, for example radius = '10 nm'"
         if self.kind == "gas" and self.classes:
             errors = ErrorCollector()
             errors.take(class_numbers, self.classes, self.number)
-            problems += errors.problems
-            problems += [
-                f"classes.{k}: radius is missing; add it here, or to [grains]"
-                for k, one in enumerate(self.classes)
-                if one.kind != "file" and one.radius is None and self.radius is None
-            ]
-        if problems:
-            raise ValueError("\n".join(problems))
-        return self
+            yield from errors.problems
+            for k, one in enumerate(self.classes):
+                if one.kind != "file" and one.radius is None and self.radius is None:
+                    yield f"classes.{k}: radius is missing; add it here, or to [grains]"
 
     def recipe(self) -> dict[str, Any]:
         """The [grains] table that describes these grains, all defaults filled in."""
-        _, foreign = GRAINS_KEYS[self.kind]
-        described = self.model_dump(exclude_none=True, exclude=set(foreign))
+        foreign = {name for name, condition in self.conditions().items() if self.kind not in condition.values}
+        described = self.model_dump(exclude_none=True, exclude=foreign)
         return described if self.classes else {k: v for k, v in described.items() if k != "classes"}
 
 
 THERMAL = ("temperature", "spins", "exact_temperature")
 """Keys of velocities and spins, which a file gives itself."""
-GRAINS_KEYS: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
-    "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame", "length")),
-    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "classes", "extent", *THERMAL)),
-    "given": ({"number": "125"}, ("file", "frame", "length", "classes", "extent")),
-}
-"""By kind: required keys, each with an example, and keys that do not apply."""
 
 
 class _Forces(Section):
@@ -250,23 +222,12 @@ else:
     )
 
 
+@with_keys(Wall, "material")
 class WallSection(Section):
     """[[walls]]: a plane to which grains stick; see `sand.Wall`."""
 
-    point: list[Any]
-    """A point of the plane at the start, three components [m]."""
-    normal: list[Any]
-    """Direction from the wall to the grains, three components, of any length above 0."""
     material: str
     """Preset or name in [materials]."""
-    velocity: list[Any] | None = None
-    """Velocity, three components [m/s]; at rest by default; for a wall with a mass the velocity at the start."""
-    mass: Any = None
-    """Mass [kg] of a wall that moves along its normal by Newton's law; none: `velocity` gives its motion."""
-    force: Any = None
-    """Force [N] on a wall with a mass along its normal; above 0 it presses the wall against the grains."""
-    name: str | None = None
-    """Name in the ledger's columns; wall1, wall2, … by default."""
 
     def build(self, materials: dict[str, Material]) -> Wall:
         """Build the wall.  Raises BadInput."""
@@ -358,8 +319,9 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     except BadInput:  # reported by the validation of the whole file
         return []
     try:
-        rigid = isinstance(table := content.get("stepping"), dict) and method_of(table) == CLUSTERS["rigid"]
-        condition.check([*Ledger(rigid=rigid).columns, *columns, *_wall_names(content.get("walls"))])
+        table = content.get("stepping")
+        awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
+        condition.check([*Ledger(awake=awake).columns, *columns, *_wall_names(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []

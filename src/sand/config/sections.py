@@ -2,70 +2,126 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from typing import Annotated, Any
+import inspect
+import typing
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
-from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..basics.arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..basics.grains import moment_size
+from ..basics.paths import checked_name
+from ..basics.settings import For, Reading, Setting
 from ..errors import did_you_mean
-from ..grains import moment_size
+from ..integrate.integrator import methods_of_clusters, moves_bodies
 from ..integrate.registry import INTEGRATORS
-from ..integrate.rigid_clusters import RigidClusters
 from ..integrate.verlet import Verlet
-from ..paths import checked_name
-from ..setup.grain_classes import material_as_given, radius_as_given
 from ..simulation.cadence import duration, read_cadence
-from ..units import si
 
 
 class Section(BaseModel):
-    """A table of a case file; unknown keys in it are errors."""
+    """A table of a case file; unknown keys in it are errors.
+
+    Annotations say what a key takes and for which value of another key it is, as those of `Settings` do.
+    """
 
     model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    described_by: ClassVar[Any] = None
+    """Class or function whose arguments are keys of the table, and whose docstring describes them."""
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _as_declared(cls, value: Any, info: ValidationInfo) -> Any:
+        """The value of a key, read as its annotation says."""
+        about = cls.model_fields[str(info.field_name)].metadata
+        setting = next((each for each in about if isinstance(each, Setting)), None)
+        return value if value is None or setting is None else setting.read(value, str(info.field_name))
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        """Keys that are missing, not used, or contradict each other."""
+        problems = []
+        for name, condition in self.conditions().items():
+            present = getattr(self, condition.word)
+            if present not in condition.values and name in self.model_fields_set:
+                problems.append(condition.unused(name, getattr(self, name), present))
+            if present in condition.values and condition.needed and getattr(self, name) is None:
+                problems.append(condition.missing(name, present))
+        problems += self.contradictions()
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+    @classmethod
+    def conditions(cls) -> dict[str, For]:
+        """Keys that are for some values of another one."""
+        about = ((name, each) for name, field in cls.model_fields.items() for each in field.metadata)
+        return {name: each for name, each in about if isinstance(each, For)}
+
+    def contradictions(self) -> Iterable[str]:
+        """Messages about keys that do not fit together."""
+        return ()
 
 
-def quantity(unit: str, **bounds: float) -> Any:
-    """Type of a number with a unit, given as text or in SI; `bounds` as for `units.si`."""
-    return Annotated[Any, BeforeValidator(_named(lambda value, name: si(value, unit, name, **bounds)))]
+S = TypeVar("S", bound=Section)
 
 
-def word(allowed: Collection[str]) -> Any:
-    """Type of a word out of a few."""
+def with_keys(kind: Any, *without: str, optional: bool = False) -> Callable[[type[S]], type[S]]:
+    """Decorator of a section: it also has the arguments of a settings class or function as keys.
 
-    def read(value: str, info: ValidationInfo) -> str:
-        if value not in allowed:
-            raise ValueError(f"{info.field_name} = {value!r}; {did_you_mean(value, list(allowed))}")
-        return value
+    Parameters
+    ----------
+    kind : type or callable
+        The class or function.
+    without
+        Arguments that are no keys.
+    optional : bool, optional
+        All keys may be left out, and are None then.
+    """
 
-    return Annotated[str, AfterValidator(read)]
+    def decorate(section: type[S]) -> type[S]:
+        hints, keys = typing.get_type_hints(kind), {}
+        for name, argument in inspect.signature(kind).parameters.items():
+            if name not in without:
+                default = ... if argument.default is argument.empty else argument.default
+                of = hints[name] if hints[name] in (str, bool) else Any
+                keys[name] = (of | None, None) if optional else (of, default)
+        section.described_by = kind
+        made = create_model(section.__name__, __base__=section, __module__=section.__module__, **keys)  # type: ignore[call-overload]
+        made.__doc__ = section.__doc__
+        return typing.cast(type[S], made)
+
+    return decorate
 
 
-def _named(function: Callable[[Any, str], Any]) -> Callable[[Any, ValidationInfo], Any]:
-    """Validator from a function of a value and the name of its key."""
-    return lambda value, info: function(value, str(info.field_name))
-
-
-def _checked_moment(value: Any) -> Any:
+def _checked_moment(value: Any, name: str) -> Any:
+    """Check a magnetic moment.  Raises BadInput."""
     moment_size(value, np.ones(1))
     return value
 
 
-Duration = Annotated[Any, BeforeValidator(_named(duration))]
+Duration = Annotated[Any, Reading(duration)]
 """A time span [s]."""
-Cadence = Annotated[Any, BeforeValidator(_named(lambda value, name: read_cadence(value, name).setting))]
+Cadence = Annotated[Any, Reading(lambda value, name: read_cadence(value, name).setting)]
 """A cadence of output: by time, by steps, or logarithmic in time."""
-SaveCadence = Annotated[Any, BeforeValidator(_named(lambda value, name: read_cadence(value, name, wall=True).setting))]
+SaveCadence = Annotated[Any, Reading(lambda value, name: read_cadence(value, name, wall=True).setting)]
 """A cadence of checkpoints, also by wall time."""
-PathName = Annotated[str, AfterValidator(_named(checked_name))]
+PathName = Annotated[str, AfterValidator(lambda value, info: checked_name(value, str(info.field_name)))]
 """Name of a file or folder."""
-Moment = Annotated[Any, AfterValidator(_checked_moment)]
+Moment = Annotated[Any, Reading(_checked_moment)]
 """A magnetic moment, absolute or per mass; stays as given."""
-Radii = Annotated[Any, AfterValidator(radius_as_given)]
-"""Radii: a length, which becomes SI, a law of radii as text, or a list."""
-Materials = Annotated[Any, AfterValidator(material_as_given)]
-"""The name of a material, a list of names, or fractions by name."""
 Count = Annotated[int, Field(ge=1, le=MOST_GRAINS, strict=True)]
 """A number of grains."""
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS, strict=True)]
@@ -74,13 +130,9 @@ Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
 """Seed of random numbers."""
 
 
-CLUSTERS = {"grains": Verlet.name, "rigid": RigidClusters.name}
-"""`clusters` of the [stepping] table, and the `method` that it stands for."""
-
-
 def method_of(table: dict[str, Any]) -> str:
     """The integrator that a [stepping] table selects by `method`, or by `clusters`."""
-    return str(table.get("method", CLUSTERS.get(str(table.get("clusters", "grains")), "")))
+    return str(table.get("method", methods_of_clusters().get(str(table.get("clusters", Verlet.clusters)), "")))
 
 
 def _without_method(value: Any) -> Any:
@@ -93,10 +145,13 @@ def _without_method(value: Any) -> Any:
     value = dict(value)
     method, clusters = value.pop("method", None), value.pop("clusters", None)
     if method is not None and str(method) not in INTEGRATORS:
-        raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
-    if clusters is not None and str(clusters) not in CLUSTERS:
-        raise ValueError(f"clusters = {clusters!r}; {did_you_mean(str(clusters), list(CLUSTERS))}")
-    if None not in (method, clusters) and (clusters == "rigid") != (method == CLUSTERS["rigid"]):
+        advice = f"{did_you_mean(str(method), list(INTEGRATORS))}; one of your own needs --import MODULE"
+        raise ValueError(f"method = {method!r}; {advice}")
+    words = methods_of_clusters()
+    if clusters is not None and str(clusters) not in words:
+        raise ValueError(f"clusters = {clusters!r}; {did_you_mean(str(clusters), list(words))}")
+    bodies = [moves_bodies(INTEGRATORS[name]) for name in (method, words.get(str(clusters))) if name is not None]
+    if None not in (method, clusters) and len(set(bodies)) > 1:
         raise ValueError(f"clusters = {clusters!r} contradicts method = {method!r}; leave one of them out")
     return value
 

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import tomli_w
 from pydantic import BaseModel
 
-from ..descriptions import docstring, parameter_docs
+from ..basics.descriptions import docstring, parameter_docs
+from ..basics.material import PRESETS
+from ..engine.driven import Driven
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
-from ..material import PRESETS, Material
-from ..neighbours.settings import Neighbours
+from ..neighbours.search import Neighbours
 from ..setup.grain_classes import GrainClass
-from ..simulation.driven import Driven
 from .case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection
 
 WIDTH = 110
@@ -141,18 +141,16 @@ def summary(kind: type) -> str:
 
 
 def material_table() -> Table:
-    """The table [materials.NAME], with the keys of `Material` and `like`."""
-    meaning = {key.name: key.meaning for key in keys_of(Material)}
-    like = "Preset to start from. Without it, density, young_modulus and poisson_ratio are required."
-    keys = [key._replace(meaning=meaning.get(key.name, like)) for key in keys_of(MaterialSection)]
+    """The table [materials.NAME]."""
     note = f"A new material, or changes to a preset. Presets: {', '.join(PRESETS)}."
-    return Table("[materials.NAME]", note, keys)
+    return Table("[materials.NAME]", note, keys_of(MaterialSection))
 
 
 def keys_of(kind: Any) -> list[Key]:
     """Keys of a table with meaning and default: the fields of a section (a pydantic model), or of a dataclass."""
     if issubclass(kind, BaseModel):
-        notes = _attribute_docstrings(kind)
+        described_by = getattr(kind, "described_by", None)
+        notes = (parameter_docs(described_by) if described_by else {}) | _attribute_docstrings(kind)
         return [
             Key(
                 name,

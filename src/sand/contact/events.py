@@ -5,12 +5,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..box import nearest_image
-from ..compiler.jit import loop, rare
-from ..compiler.stage import Stage, stage
-from ..numerics.quaternion import turned_back
-from ..numerics.vec import accrue, dot, load, load4, put, scale, sub
-from ..state.state import (
+from ..basics.box import nearest_image
+from ..basics.state import (
     BREAKING,
     BROKEN,
     CONTACTS,
@@ -22,8 +18,12 @@ from ..state.state import (
     SLIPPED,
     TIME,
 )
+from ..compiler.jit import loop, rare
+from ..compiler.stage import Stage, stage
+from ..numerics.quaternion import turned_back
+from ..numerics.vec import accrue, dot, load, load4, put, scale, sub
 from . import tangential
-from .columns import column_loops, load_pairing, uniform_contacts
+from .constants_table import column_loops, load_pairing, uniform_contacts
 from .damping import NONE, Held, damping_loops
 from .gather import sort_contacts_by_grain
 from .law import ContactLaw

@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
+from ..basics.arrays import GATHER_CLASSES
+from ..basics.state import CONTACTS
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
 from ..numerics.vec import add, load, put, sub
-from ..state.arrays import GATHER_CLASSES
-from ..state.state import CONTACTS
 
 BLOCK = 64
 """Grains per block; the contacts of a block stay in the first-level cache."""

@@ -12,8 +12,8 @@ is √(Y/(1 − ν²)ρ), with Young's modulus Y.
 
 import math
 
+from ..basics.state import IMPACT_SPEED, LARGEST_IMPACT
 from ..compiler.jit import formula, loop
-from ..state.state import IMPACT_SPEED, LARGEST_IMPACT
 
 
 @formula

@@ -1,7 +1,6 @@
 """Energies that contacts dissipate: the energy table of the simulation and the losses of each contact."""
 
-from ..compiler.jit import loop
-from ..state.state import (
+from ..basics.state import (
     DAMPING_NORMAL,
     DAMPING_ROLLING,
     DAMPING_SLIDING,
@@ -12,6 +11,7 @@ from ..state.state import (
     STIFFNESS,
     TWISTING,
 )
+from ..compiler.jit import loop
 
 FORMING_ROW, SLIDING_ROW, ROLLING_ROW, TWISTING_ROW, DAMPING_ROW, STIFFNESS_ROW = range(len(RECORDED))
 """Rows of `ContactArrays.lost`; the last two only exist in simulations with damping or changing stiffnesses."""

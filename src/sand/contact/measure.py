@@ -1,12 +1,12 @@
 """Energies, displacements and loads of contacts, measured between steps for the energy table and for output."""
 
-import functools
 import math
 
+from ..basics.state import CONTACTS
+from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..numerics.vec import across, add, cross, dot, load, norm, scale, sub
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .damping import loads_on_grains, measured_load
 from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
@@ -18,7 +18,7 @@ ENERGIES = ("normal", "sliding", "rolling", "twisting")
 """Energies [J] of contacts that `measure_energies` computes."""
 
 
-@functools.cache
+@factory
 def energies_stage(law: ContactLaw) -> Stage:
     """The stage that measures energies, for one contact law."""
     constants_at, radius_root, normal_energy = column_loops(law).at, law.radius_root, law.energy
@@ -44,7 +44,7 @@ def energies_stage(law: ContactLaw) -> Stage:
     return measure_energies
 
 
-@functools.cache
+@factory
 def wall_energies_stage(law: ContactLaw) -> Stage:
     """The stage that measures energies of contacts with walls, for one contact law."""
     add_energies = wall_loops(law).energies
@@ -123,7 +123,7 @@ CONTACT_LOADS = ("force", "torque1", "torque2")
 """Rows of `measure_contacts` after the scalars: CONTACT_VECTORS, then the loads including damping, three rows each."""
 
 
-@functools.cache
+@factory
 def contacts_stage(law: ContactLaw) -> Stage:
     """The stage that measures contacts, for one contact law."""
     constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..material import Material
+from ..basics.material import Material
 from .law import Pairing
 
 MIXING: dict[str, Callable[[float, float], float]] = {

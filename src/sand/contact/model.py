@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
-from ..errors import FORBID_EXTRA, BadInput, did_you_mean
-from ..grains import Grains
-from ..material import Material
-from ..ramps import rampable
-from ..units import format_quantity, si
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material
+from ..basics.ramps import rampable
+from ..basics.settings import For, Number, Settings, Word
+from ..basics.units import format_quantity
+from ..errors import BadInput
 from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
 from .law import LAWS, ContactLaw, Pairing
 from .mixing import MIXING, pairing_between
 
-LIMIT_RULES = ("clamp", "reset")
-STIFFNESS = ("frozen", "dt97")
-DAMPING = ("none", "critical", "constant", "viscoelastic")
-DAMPING_KEYS = {"damping_ratio": "critical", "damping_constant": "constant", "viscous_time": "viscoelastic"}
-"""Parameters of the kinds of damping, and the kind that each belongs to."""
 DEFAULT_DAMPING_RATIO = 0.2
 DAMPED_SPEED_GAIN = 3.4
 """Largest sticking speed with the default damping ratio over that without damping (docs/physics/contact-options.md)."""
-MAX_DAMPING_RATIO = 5.0
+_CONSTANT = "a number in kg/s, such as '1e-9 kg/s'"
+_VISCOUS_TIME = "a time in s, such as '1.25e-11 s' for silica; it depends on the material and the size of the grains"
 FACTORS = ("slide_factor", "roll_factor", "twist_factor", "surface_energy_factor")
 """Settings that multiply a constant of all contacts."""
 RAMPABLE = (
@@ -42,7 +38,7 @@ RAMPABLE = (
 @checked
 @rampable(*RAMPABLE)
 @dataclass(frozen=True)
-class Contact:
+class Contact(Settings):
     """Adhesive contacts: normal force of a contact law, and springs against sliding, rolling and twisting.
 
     Parameters
@@ -95,84 +91,34 @@ class Contact:
         If a setting is unknown or out of range; one line for each.
     """
 
-    slip: str = "clamp"
-    stiffness: str = "frozen"
-    slide_factor: Any = 1.0
-    roll_factor: Any = 1.0
-    twist_factor: Any = 1.0
-    surface_energy_factor: Any = 1.0
-    rolling_limit: Any = None
-    damping: str = "none"
-    damping_ratio: Any = None
-    damping_constant: Any = None
-    viscous_time: Any = None
-    bath_temperature: Any = None
-    settling_time: Any = None
-    mixing: str = "geometric"
-    law: str = "jkr"
+    slip: Annotated[str, Word("clamp", "reset")] = "clamp"
+    stiffness: Annotated[str, Word("frozen", "dt97")] = "frozen"
+    slide_factor: Annotated[Any, Number(least=0.0)] = 1.0
+    roll_factor: Annotated[Any, Number(least=0.0)] = 1.0
+    twist_factor: Annotated[Any, Number(least=0.0)] = 1.0
+    surface_energy_factor: Annotated[Any, Number(least=0.0)] = 1.0
+    rolling_limit: Annotated[Any, Number("m", above=0.0)] = None
+    damping: Annotated[str, Word("none", "critical", "constant", "viscoelastic")] = "none"
+    damping_ratio: Annotated[
+        Any, Number(above=0.0, most=5.0), For("damping", "critical", default=DEFAULT_DAMPING_RATIO)
+    ] = None
+    damping_constant: Annotated[Any, Number("kg/s", above=0.0), For("damping", "constant", needed=_CONSTANT)] = None
+    viscous_time: Annotated[Any, Number("s", above=0.0), For("damping", "viscoelastic", needed=_VISCOUS_TIME)] = None
+    bath_temperature: Annotated[Any, Number("K", above=0.0)] = None
+    settling_time: Annotated[Any, Number("s", above=0.0)] = None
+    mixing: Annotated[str, Word(among=MIXING)] = "geometric"
+    law: Annotated[str, Word(among=LAWS)] = "jkr"
 
-    __pydantic_config__ = FORBID_EXTRA
     name = "contact"
     references = (
         "Johnson, Kendall & Roberts 1971; Derjaguin, Muller & Toporov 1975; Dominik & Tielens 1997; "
         "Dominik & Nübold 2002, A.5–A.6"
     )
 
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        words = {"slip": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING}
-        words |= {"mixing": tuple(MIXING), "law": tuple(LAWS)}
-        for key, allowed in words.items():
-            if getattr(self, key) not in allowed:
-                given = getattr(self, key)
-                problems.append(f"contact: {key} = {given!r}; {did_you_mean(str(given), allowed)}")
-        for key in FACTORS:
-            try:
-                object.__setattr__(self, key, si(getattr(self, key), "1", f"contact: {key}", least=0.0))
-            except BadInput as error:
-                problems += error.problems
-        if self.damping == "critical" and self.damping_ratio is None:
-            object.__setattr__(self, "damping_ratio", DEFAULT_DAMPING_RATIO)
-        optional = {"rolling_limit": "m", "damping_constant": "kg/s", "viscous_time": "s", "bath_temperature": "K"}
-        optional["settling_time"] = "s"
-        for key, unit in (optional | {"damping_ratio": "1"}).items():
-            try:
-                if getattr(self, key) is not None:
-                    most = MAX_DAMPING_RATIO if key == "damping_ratio" else math.inf
-                    object.__setattr__(self, key, si(getattr(self, key), unit, f"contact: {key}", above=0.0, most=most))
-            except BadInput as error:
-                problems += error.problems
-        problems += self._damping_problems()
-        if problems:
-            raise BadInput(problems)
-
-    def _damping_problems(self) -> list[str]:
-        """Parameters of damping that are missing, or that belong to another kind of damping."""
-        if self.damping not in DAMPING:
-            return []
-        problems = [
-            f"contact: {key} is given, but damping = {self.damping!r} does not use it; remove it, or set "
-            f"damping = {kind!r}"
-            for key, kind in DAMPING_KEYS.items()
-            if getattr(self, key) is not None and self.damping != kind
-        ]
-        if self.damping == "constant" and self.damping_constant is None:
-            problems.append("contact: damping = 'constant' needs a damping_constant above 0, such as '1e-9 kg/s'")
-        if self.damping == "viscoelastic" and self.viscous_time is None:
-            problems.append(
-                "contact: damping = 'viscoelastic' needs a viscous_time above 0, such as '1.25e-11 s' for silica; "
-                "it depends on the material and the size of the grains"
-            )
-        if self.damping == "none" and self.bath_temperature is not None:
-            problems.append(
-                "contact: bath_temperature needs damping, which exchanges energy with the bath; "
-                "set damping = 'critical'"
-            )
-        return problems
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units; settings that are None are omitted."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """A bath without damping."""
+        if "damping" not in wrong and self.damping == "none" and self.bath_temperature is not None:
+            yield "bath_temperature needs damping, which exchanges energy with the bath; set damping = 'critical'"
 
     @property
     def contact_law(self) -> ContactLaw:

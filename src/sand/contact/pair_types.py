@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.state import PAIRS
 from ..compiler.jit import loop
-from ..state.state import PAIRS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 
 

@@ -1,14 +1,13 @@
 """The constants of existing contacts, computed anew after parameters of the contact model have changed."""
 
-import functools
-
+from ..basics.state import CONTACTS
+from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 
 
-@functools.cache
+@factory
 def renewal_stage(law: ContactLaw) -> Stage:
     """The stage that computes the constants of all contacts from the present parameters, for one contact law.
 

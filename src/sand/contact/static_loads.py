@@ -9,15 +9,15 @@ In a tree of grains the loads alone determine the load of each contact; in rings
 balanced: with inertia, f = F − m a and t = M − I α, their sum and their torque vanish.
 """
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
 
+from ..basics.state import CONTACTS
+from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..numerics.vec import across
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 from .mechanics import displacements_of, scaled_stiffness
 from .tangential import sliding
@@ -61,7 +61,7 @@ def responses(rows: np.ndarray) -> Responses:
     return Responses(*(rows[3 * k : 3 * k + 3].T for k in range(VECTORS)), *rows[3 * VECTORS :])
 
 
-@functools.cache
+@factory
 def responses_stage(law: ContactLaw) -> Stage:
     """The stage that measures poses, displacements, stiffnesses and limits of all contacts, for one contact law."""
     constants_at, radius_root, at_break = column_loops(law).at, law.radius_root, law.at_break

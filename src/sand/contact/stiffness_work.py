@@ -3,9 +3,9 @@
 import functools
 from collections.abc import Callable
 
+from ..basics.state import CONTACTS
 from ..compiler.jit import rare
-from ..state.state import CONTACTS
-from .columns import column_loops
+from .constants_table import column_loops
 from .law import ContactLaw
 from .losses import record_stiffness_loss
 from .mechanics import displacements_of, scaled_stiffness, stiffness_loss

@@ -8,9 +8,9 @@ import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from ..basics.state import BREAKING, FORMING
 from ..compiler.jit import loop
 from ..numerics.vec import dot, load
-from ..state.state import BREAKING, FORMING
 from .damping import DampingVariant, store_loads
 from .impact import note_impact
 from .law import ContactLaw

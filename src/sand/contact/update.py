@@ -18,19 +18,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..box import nearest_image
-from ..compiler.jit import COMPILED, formula, loop, rare
-from ..numerics.quaternion import turned, turned_back, turned_by
-from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
-from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
-from ..state.arrays import BLOCK as CONTACTS_PER_BLOCK
-from ..state.state import (
+from ..basics.arrays import BLOCK as CONTACTS_PER_BLOCK
+from ..basics.box import nearest_image
+from ..basics.state import (
     CONTACT_STEP,
     CONTACTS,
     SLIPPED,
 )
+from ..compiler.jit import COMPILED, formula, loop, rare
+from ..numerics.quaternion import turned, turned_back, turned_by
+from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
+from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
 from . import tangential
-from .columns import FASTEST_MODE, column_loops, uniform_contacts
+from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads
 from .law import ContactLaw
 from .losses import add_damping_energies, add_slip_energies, add_slip_losses

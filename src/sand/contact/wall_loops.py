@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..box import nearest_image
+from ..basics.box import nearest_image
+from ..basics.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME, WALL_CONTACTS
 from ..compiler.jit import caller, loop, rare
 from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, scale, sub
-from ..state.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME, WALL_CONTACTS
-from .columns import FASTEST_MODE, column_loops, load_pairing
+from .constants_table import FASTEST_MODE, column_loops, load_pairing
 from .damping import NONE, Held, Surfaces, damping_loops, relative_motion, store_loads
 from .events import compact_contacts
 from .law import ContactLaw, wall_constants

@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
-from ..arguments import MOST_GRAINS, checked
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.material import Material
+from ..basics.units import si, whole_number
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..integrate.verlet import Verlet
-from ..material import Material
 from ..setup.aggregates import chain, rest_distance
 from ..setup.encounters import combined
 from ..simulation.simulation import Simulation
-from ..units import si, whole_number
 
 SHAPES = ("T", "branched", "bent", "straight", "ring", "broken", "gone")
 PERPENDICULAR = 30.0

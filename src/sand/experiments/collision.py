@@ -13,20 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.paths import user_path
+from ..basics.units import seed_given, si
 from ..config.build import resume
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import Force
-from ..grains import Grains
-from ..integrate.base import Integrator
+from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
-from ..paths import user_path
 from ..setup.encounters import encounter, turned_at_random
 from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
-from ..units import seed_given, si
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
 from .parting import cannot_touch
 

@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field
 
-from ..arguments import MOST_GRAINS
+from ..basics.arguments import MOST_GRAINS
+from ..basics.grains import Grains
+from ..basics.material import PRESETS, Material
+from ..basics.settings import For, Number, Reading, Word
 from ..config.case import ForcesSection, MaterialSection, material_errors, with_absolute_files
 from ..config.commands import refuse_other_command
-from ..config.errors import validate
-from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, quantity, with_integrator, word
-from ..grains import Grains
+from ..config.key_errors import validate
+from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, with_integrator
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
-from ..material import PRESETS, Material
-from ..setup.aggregates import build
+from ..setup.aggregates import KINDS, build
 from ..setup.encounters import offset_of
 from ..setup.from_file import body_from_file
+from ..setup.grain_classes import BODY_FILE
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, prepare, run_to_end
 from .executors import results_of
 
-BodyKind = Literal[
-    "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
-]
-"""Names of the builders in `setup.aggregates.KINDS`, and "file"."""
+BodyKind = Annotated[str, Word("file", among=KINDS)]
+"""A builder, or "file"."""
 
 
 class BodySection(Section):
@@ -39,23 +39,23 @@ class BodySection(Section):
 
     kind: BodyKind
     """Builder (as for `sand build`), or `file`."""
-    file: PathName | None = None
+    file: Annotated[PathName | None, For("kind", "file", needed=BODY_FILE)] = None
     """File of the body, relative to the case file, in any format of `file` in [grains]; required with
     `kind = "file"`."""
-    length: str | None = None
+    length: Annotated[str | None, For("kind", "file")] = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
     grains: Count | None = None
     """Number of grains; required except for a grain, a lattice or a file."""
     shape: list[Count] | None = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
-    radius: Any = None
+    radius: Annotated[Any, Reading(lambda value, name: radii_of(value))] = None
     """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
     radii."""
     material: str = "silica"
     """Preset or name in [materials]."""
-    moment: Moment | None = None
+    moment: Annotated[Moment, For("kind", *KINDS)] = None
     """Moment of each magnetic grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moments."""
-    moments: word(MOMENT_MODES) | None = None  # type: ignore[valid-type]
+    moments: Annotated[str | None, Word(among=MOMENT_MODES)] = None
     """Directions of the moments: `random`, `aligned` or `relaxed`."""
     magnetic: Any = None
     """Fraction of the grains that have a moment, 0 … 1; none: 1."""
@@ -64,27 +64,17 @@ class BodySection(Section):
     prefactor: Any = None
     """Fractal prefactor; for `kind = "fractal"` only."""
 
-    @field_validator("radius")
-    @classmethod
-    def _radius(cls, value: Any) -> Any:
-        return value if value is None else radii_of(value)
-
-    @model_validator(mode="after")
-    def _whole(self) -> BodySection:
-        if self.kind == "file" and self.file is None:
-            raise ValueError("file is missing: which file holds the grains?")
-        if self.kind != "file" and self.radius is None:
-            raise ValueError("radius is missing; add it, for example radius = '0.1 um'")
+    def contradictions(self) -> Iterator[str]:
+        """Radii and numbers of grains that are missing, and a lattice that is too large."""
         regular = self.kind in ("lattice", "hexagonal")
+        if self.kind != "file" and self.radius is None:
+            yield "radius is missing; add it, for example radius = '0.1 um'"
         if self.kind not in ("grain", "file") and not regular and self.grains is None:
-            raise ValueError(f"grains is missing: how many does the {self.kind} have?")
+            yield f"grains is missing: how many does the {self.kind} have?"
         if regular and (self.shape is None or len(self.shape) != 3):
-            raise ValueError("shape is missing: three whole numbers, such as [5, 5, 5]")
+            yield "shape is missing: three whole numbers, such as [5, 5, 5]"
         if self.shape is not None and math.prod(self.shape) > MOST_GRAINS:
-            raise ValueError(f"shape = {self.shape} has more than {MOST_GRAINS:.0e} grains")
-        if self.moment is not None and self.kind == "file":
-            raise ValueError("moment: a file brings its own moments; leave it out")
-        return self
+            yield f"shape = {self.shape} has more than {MOST_GRAINS:.0e} grains"
 
     def build(self, materials: dict[str, Material], seed: int) -> Grains:
         """Build the body. Raises BadInput."""
@@ -97,12 +87,18 @@ class BodySection(Section):
         return build(self.kind, self.grains, shape=self.shape, seed=seed, material=materials[self.material], **given)
 
 
+def _offset(value: Any, name: str) -> Any:
+    """Check an impact parameter.  Raises BadInput."""
+    offset_of(value, 1.0)
+    return value
+
+
 class ImpactSection(Section):
     """Section [impact]: relative motion, orientations and seeds."""
 
-    speed: quantity("m/s", above=0.0)  # type: ignore[valid-type]
+    speed: Annotated[Any, Number("m/s", above=0.0)]
     """Relative speed of the centres of mass [m/s]."""
-    impact_parameter: Any = 0.0
+    impact_parameter: Annotated[Any, Reading(_offset)] = 0.0
     """Impact parameter [m], or a fraction of the sum of the outer radii, "0.5 b"."""
     along: Literal["x", "y", "z"] = "x"
     """Direction of flight of the projectile."""
@@ -112,12 +108,6 @@ class ImpactSection(Section):
     """One collision is run for each seed."""
     out: PathName | None = None
     """Folder of the results."""
-
-    @field_validator("impact_parameter")
-    @classmethod
-    def _offset(cls, value: Any) -> Any:
-        offset_of(value, 1.0)
-        return value
 
 
 class CollisionCase(Section):

@@ -12,10 +12,10 @@ import numpy as np
 from ..analysis.clusters import cluster_labels
 from ..analysis.quantities import material_names
 from ..analysis.shape import gyration_radius
-from ..grains import Grains
+from ..basics.grains import Grains
+from ..basics.state import LOST
+from ..basics.units import format_quantity
 from ..simulation.simulation import Simulation
-from ..state.state import LOST
-from ..units import format_quantity
 
 ENDS = {"stick": "they stick", "bounce": "they bounce", "fragment": "they break up", "miss": "they miss"}
 """Outcomes in words."""

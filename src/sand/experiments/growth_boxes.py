@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..basics.paths import user_path
 from ..config.build import resume, simulation_of
 from ..config.case import check_case
 from ..errors import BadInput, shown, warn
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
-from ..paths import user_path
 from ..simulation.serialise import case_of
 from .executors import results_of
 

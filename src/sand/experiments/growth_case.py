@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ..config.case import check_case, with_absolute_files
 from ..config.commands import refuse_other_command
-from ..config.errors import validate
+from ..config.key_errors import validate
 from ..config.sections import Section, Seed
 from ..errors import BadInput, ErrorCollector
 from ..io.run_folder import read_toml

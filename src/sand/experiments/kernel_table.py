@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.units import in_unit, si_array
 from ..errors import BadInput
 from ..io.run_folder import replace_file
 from ..io.table import write_table
 from ..theory.kinetics import CollisionKernel, KernelFunction
-from ..units import in_unit, si_array
 
 UNITS = ("kg", "kg", "m^2", "m/s")
 """Units of the numbers in a row of measurements."""

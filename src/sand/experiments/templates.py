@@ -18,11 +18,9 @@ from ..config.template import (
     summary,
     template,
 )
-from ..descriptions import parameter_docs
 from .collision_case import BodySection, ImpactSection
 from .growth_case import GrowSection
-from .scattering.case import FlightSection, MeasureSection, ScatterBody
-from .scattering.problem import flight
+from .scattering.scatter_case import FlightSection, MeasureSection, ScatterBody
 
 BODY = {"kind": "bpca", "grains": 16, "radius": "0.1 um", "material": "silica"}
 COLLISION: Values = {
@@ -73,12 +71,8 @@ def _scattering(name: str) -> str:
 
 
 def _flight_keys() -> list[Key]:
-    """Keys of [flight], with the meanings of the arguments of `flight`."""
-    meaning = parameter_docs(flight) | {"speed": f"{parameter_docs(flight)['speed']} One, or a list."}
-    return [
-        key._replace(meaning=meaning[key.name], default=REQUIRED if key.name == "speed" else key.default)
-        for key in keys_of(FlightSection)
-    ]
+    """Keys of [flight], of which the speed is required."""
+    return [key._replace(default=REQUIRED) if key.name == "speed" else key for key in keys_of(FlightSection)]
 
 
 def _growth(name: str) -> str:

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
+from ..basics.threads import set_threads
 from ..forces.own import import_modules
 from ..simulation.signals import STOPS, Signals, left_to_thread
-from ..threads import set_threads
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

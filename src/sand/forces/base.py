@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
-from ..box import Box
-from ..grains import Grains
+from ..basics.box import Box
+from ..basics.grains import Grains
 from .pair.cutoff import CutoffChoice
-from .pair.loops import LongRangeSums
+from .pair.long_range_loops import LongRangeSums
 
 
 @runtime_checkable

@@ -16,19 +16,19 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from ..box import Box
+from ..basics.box import Box
+from ..basics.descriptions import described
+from ..basics.grains import Grains
+from ..basics.units import finite_number
+from ..basics.vectors import components, three
 from ..compiler.jit import compile_error, formula
-from ..descriptions import described
 from ..errors import BadInput, did_you_mean
-from ..grains import Grains
-from ..units import finite_number
 from .external.formulas import GrainState
 from .pair.cutoff import CutoffForce, cutoff_for
 from .pair.generic_loops import PairGrain, PairParameters, pair_sums
-from .pair.loops import LongRangeSums
+from .pair.long_range_loops import LongRangeSums
 from .pair.pair_force import contact_energy, energy_at
 from .registry import FORCES, column_of
-from .vectors import components, three
 
 IMPORT = "import"
 """Key of a table [forces.NAME] that holds the import path of a user's force."""
@@ -303,8 +303,7 @@ class OwnPair(_Own, CutoffForce):
 
     def parameters(self) -> dict[str, Any]:
         """Import path, values in SI units and cut-off, as in a case file."""
-        cutoff = "none" if self.cutoff is None else self.cutoff
-        return super().parameters() | {"cutoff": cutoff, "cut": self.cut}
+        return _Own.parameters(self) | CutoffForce.parameters(self)
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings as for all cut-offs.  Raises BadInput if the formula cannot be compiled."""

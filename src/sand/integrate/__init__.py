@@ -2,8 +2,6 @@
 
 BUILT_IN = {
     "Verlet": "integrate.verlet",
-    "Adaptive": "integrate.adaptive",
-    "ForestRuth": "integrate.forest_ruth",
-    "RigidClusters": "integrate.rigid_clusters",
+    "RigidClusters": "integrate.rigid.rigid_clusters",
 }
 """Names in `sand` of the integrators, and their modules; a line here registers an integrator (`registry`)."""

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..basics.state import OUTSIDE
 from ..compiler.jit import loop
 from ..compiler.stage import stage
 from ..numerics.vec import add, dot, load, put, sub
-from ..state.state import OUTSIDE
 from .parts import DT
 
 HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)

@@ -13,14 +13,7 @@ The driver is compiled once, for all forces and contact laws: it calls their sta
 
 import math
 
-from ..compiler.jit import caller, loop, rare
-from ..compiler.program import call_stage, has_stage
-from ..compiler.stage import stage
-from ..contact.events import count_new_contacts
-from ..contact.update import load_contact_sums, log_contact_sums
-from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
-from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
-from ..state.state import (
+from ..basics.state import (
     BROKEN,
     COMPARED,
     CONTACTS,
@@ -42,6 +35,13 @@ from ..state.state import (
     STEPS,
     TIME,
 )
+from ..compiler.jit import caller, loop, rare
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import stage
+from ..contact.events import count_new_contacts
+from ..contact.update import load_contact_sums, log_contact_sums
+from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
+from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from .driven import HOLD, HOLD_IN_EVENTS, RELEASE, RELEASE_FROM_EVENTS, RESET
 from .force_calls import (
     add_external_loads,
@@ -51,9 +51,9 @@ from .force_calls import (
     sum_pair_forces,
     update_pairs_in_contact,
 )
-from .force_stages import ENERGY, PAIR_STAGES, RATES, WRAPPING
+from .force_stages import ENERGY, WRAPPING
 from .motion import kick, wrap_all
-from .parts import CYCLE_LENGTH, DRIVER_PARTS, DT, SINCE, Stop
+from .parts import DRIVER_PARTS, DT, SINCE, Stop
 from .respa import (
     add_constant_loads,
     add_long_range_loads,
@@ -66,6 +66,7 @@ from .stages import NEXT_STEP, StageNumber
 from .step_control import cycle_steps, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
+from .taylor import sum_rates
 
 
 @loop
@@ -76,17 +77,6 @@ def largest_speeds(queue, blocks):
         fastest = max(fastest, magnitude_bits(queue.speeds[b, 0]))
         fastest_spin = max(fastest_spin, magnitude_bits(queue.speeds[b, 1]))
     return float_from_bits(fastest), float_from_bits(fastest_spin)
-
-
-@rare
-def sum_rates(s, cycle):
-    """The rates of the Taylor series at the start of a cycle of `cycle` [s]; none for 0."""
-    if cycle > 0.0:
-        s.scratch[CYCLE_LENGTH] = cycle
-        call_stage(s, StageNumber.PREPARE_RATES)
-        for k in range(s.forces.pair):
-            call_stage(s, StageNumber.FIRST_FORCE + PAIR_STAGES * k + RATES)
-    call_stage(s, StageNumber.STORE_POSITIONS)
 
 
 @caller

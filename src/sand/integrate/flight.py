@@ -1,54 +1,49 @@
-"""What the integrators of grains without contacts share: checks of their settings, and the end of a step."""
+"""What an integrator with steps of its own for grains without contacts builds on.
 
-from __future__ import annotations
+`examples/plugins/forest_ruth.py` is such an integrator: its stage, `Integrator.flight`, calls these functions.
+"""
 
 import math
-from typing import Any, ClassVar
 
-from ..compiler.jit import caller
-from ..errors import BadInput, shown
-from ..neighbours.skin import invalidate_skins, invalidate_speeds
-from ..state.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
-from ..units import is_word, si
-from .force_calls import sum_external
+from ..basics.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
+from ..compiler.jit import caller, rare
+from ..compiler.program import call_stage
+from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement
+from ..numerics.vec import put
+from .force_calls import add_external_loads, sum_external, sum_pair_forces
 from .force_stages import ENERGY, WRAPPING
 from .motion import wrap_all
+from .parts import Stop
+from .respa import add_long_range_loads
+from .stages import StageNumber
 from .step_control import INCREASE_INTERVAL
-from .verlet import Verlet
+
+STALE_FRACTION = 0.25
+"""Largest displacement of a grain since the list was built, at the start of a step, in units of the list's margin."""
 
 
-class FlightSettings:
-    """Base class of the settings of an integrator that acts while there are no contacts.
+@caller
+def refresh_verlet_list(s):
+    """Rebuild the Verlet list once a quarter of its margin is used up; returns a `Stop`."""
+    if not s.search.listed:
+        return Stop.NONE.value
+    moved = largest_displacement(s.grains, s.long_range.anchor, s.span)
+    # written so that an anchor at infinity (no list yet) counts as stale
+    if not moved <= STALE_FRACTION * s.search.margin:
+        return call_stage(s, StageNumber.VERLET_LIST)
+    return Stop.NONE.value
 
-    Subclasses are frozen dataclasses with the fields of `UNITS` and `contact_stepping: Verlet`.
-    """
 
-    contact_stepping: Verlet
-    name: ClassVar[str]
-    UNITS: ClassVar[dict[str, str]]
-    """Numbers and their units; the first is below 1, the others may be "auto"."""
-
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        for rank, (key, unit) in enumerate(self.UNITS.items()):
-            if rank > 0 and is_word(getattr(self, key), "auto"):
-                continue
-            below = 1.0 if rank == 0 else math.inf
-            try:
-                value = si(getattr(self, key), unit, f"stepping: {key}", above=0.0, below=below)
-                object.__setattr__(self, key, value)
-            except BadInput as error:
-                problems.extend(error.problems)
-        if not isinstance(self.contact_stepping, Verlet):
-            problems.append(f"stepping: contact_stepping = {shown(self.contact_stepping)}; give sand.Verlet(…)")
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        contact_stepping = {k: v for k, v in self.contact_stepping.parameters().items() if k != "method"}
-        own = {key: getattr(self, key) for key in self.UNITS}
-        return {"method": self.name, **own, "contact_stepping": contact_stepping}
+@rare
+def sum_free_loads(s, time):
+    """Sum all loads of grains without contacts at their present positions."""
+    for i in range(s.grains.mass.size):
+        put(s.grains.force, i, (0.0, 0.0, 0.0))
+        put(s.grains.torque, i, (0.0, 0.0, 0.0))
+    add_external_loads(s, time)
+    if s.forces.pair > 0:
+        sum_pair_forces(s)
+        add_long_range_loads(s.grains, s.long_range)
 
 
 @caller

@@ -1,8 +1,8 @@
 """Loops over the forces of a simulation, each of which is called by address."""
 
+from ..basics.state import LONG_RANGE_SUMS
 from ..compiler.jit import caller
 from ..compiler.program import call_stage, has_stage
-from ..state.state import LONG_RANGE_SUMS
 from .force_stages import (
     BEGIN,
     END,

@@ -1,13 +1,13 @@
 """The stages of pair forces and of external forces: a few for each force, whatever other forces there are."""
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
+from ..compiler.recipes import factory
 from ..compiler.stage import PythonStage, Stage, stage
 from ..compiler.table import Table
-from ..forces.external.loops import external_energy, external_loads, external_power, wrapping_work
-from ..forces.pair.loops import LongRangeSums, Round, all_blocks
+from ..forces.external.external_loops import external_energy, external_loads, external_power, wrapping_work
+from ..forces.pair.long_range_loops import LongRangeSums, Round, all_blocks
 from .parts import EXTERNAL, LOAD_TIME
 from .respa import contact_pair_loops
 
@@ -28,7 +28,7 @@ ENERGY, POWER, WRAPPING = range(3)
 """Blocks of `WORK`: energy [J], power [W], change of the energy [J] by wrapping positions into the box."""
 
 
-@functools.cache
+@factory
 def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stage | PythonStage]:
     """The stages of one pair force by number."""
     begin, sum_block, end, blocks = sums.begin, sums.block, sums.end, sums.blocks
@@ -76,7 +76,7 @@ def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stag
     return found | {RATES: rates}
 
 
-@functools.cache
+@factory
 def _round_stage(given: Round) -> Stage | PythonStage:
     """The stage of one round of blocks."""
     begin, round_block = given.begin, given.block
@@ -109,7 +109,7 @@ def run_rounds(sums: LongRangeSums, long_vectors: bool, table: Table, parameters
             stages[number].run(table, parameters, block)
 
 
-@functools.cache
+@factory
 def external_force_stages(formula_of_grain: Callable) -> dict[int, Stage]:
     """The stages of one external force by number."""
     add_loads, energy = external_loads(formula_of_grain), external_energy(formula_of_grain)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..box import Span, nearest_image
+from ..basics.box import Span, nearest_image
 from ..compiler.jit import formula, loop
 from ..contact.gather import BLOCK, gather
 from ..numerics.quaternion import turn, turned

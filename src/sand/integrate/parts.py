@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 PARTS = (
     # arrays of the state
-    *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clusters", "walls", "wall_contacts"),
+    *("grains", "contacts", "pair_list", "long_range", "clusters", "walls", "wall_contacts"),
     *("bodies", "clock", "count", "lost"),
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
@@ -111,5 +111,5 @@ class StepParameters(NamedTuple):
     external_work: ExternalWork
     gas: GasSettings
     criteria: Any  # step_control.StepCriteria
-    flight_limits: Any  # of the integrator, such as adaptive.ErrorLimits
+    flight_limits: Any  # of the integrator, such as rigid_clusters.RigidLimits
     forces: ForceNumbers

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import BadInput, shown
 from . import BUILT_IN
-from .base import INTEGRATORS, Integrator
+from .integrator import INTEGRATORS, Integrator
 
 
 def checked_integrator(value: Any) -> Integrator:

@@ -1,6 +1,6 @@
-"""Multiple time stepping of the long-range loads: r-RESPA (Tuckerman et al. 1992) or Taylor extrapolation.
+"""Multiple time stepping of the long-range loads by r-RESPA (Tuckerman et al. 1992).
 
-With r-RESPA the long-range force F of a grain is summed at both ends of a cycle of length T and split:
+The long-range force F of a grain is summed at both ends of a cycle of length T and split:
 1. forces between grains in contact are evaluated in every step (`contact_pair_loops`);
 2. a constant part F̄, updated rarely (`update_constant_loads`), acts in every step;
 3. the remainder F − F̄ acts as an impulse ½T (F − F̄) at each end of the cycle.
@@ -13,12 +13,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..box import nearest_image
+from ..basics.box import nearest_image
+from ..basics.state import CONTACTS
 from ..compiler.jit import loop
 from ..contact.transitions import BROKEN_FLAG
 from ..contact.update import padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
-from ..state.state import CONTACTS
 
 CONSTANT_PART_CHANGE = 0.5
 """Relative change of a grain's long-range load at which its constant part is set to the present load.
@@ -104,14 +104,6 @@ def correct_angular_momentum(grains, long_range, span, weight):
 
 
 @loop
-def add_extrapolated_loads(grains, long_range, since):
-    """Add F + Ḟ t and M + Ṁ t (Eq. 51), t the time [s] since the last summation."""
-    for i in range(grains.mass.size):
-        accrue(grains.force, i, axpy(since, load(long_range.force_rate, i), load(long_range.force, i)))
-        accrue(grains.torque, i, axpy(since, load(long_range.torque_rate, i), load(long_range.torque, i)))
-
-
-@loop
 def apply_impulse(grains, long_range, dt):
     """v += ΔF dt/m, ω += ΔM dt/I, with the difference of the long-range loads from their constant part."""
     for i in range(grains.mass.size):
@@ -186,38 +178,3 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
                     accrue(long_range.torque, j, scale(sign, torque2))
 
     return add_contact_pairs, subtract_contact_pairs, reassign_contact_pairs
-
-
-@loop
-def store_positions(grains, long_range):
-    """Store positions and moments of this summation, for the mean rates at the next."""
-    for i in range(grains.mass.size):
-        put(long_range.past_position, i, load(grains.position, i))
-        put(long_range.past_moment, i, load(grains.moment, i))
-
-
-@loop
-def set_mean_velocities(grains, long_range, start, span, cycle, instantaneous):
-    """Replace `past_position` and `past_moment` by the rates ṙ and μ̇ of the Taylor series.
-
-    Grains in contact oscillate within the extrapolated time: their rates are means since the previous summation,
-    `cycle` [s] ago.  Free grains, and all grains if `instantaneous`, take v and ω×μ.
-    """
-    for i in range(grains.mass.size):
-        if instantaneous or start[i + 1] == start[i]:
-            put(long_range.past_position, i, load(grains.velocity, i))
-            put(long_range.past_moment, i, cross(load(grains.spin, i), load(grains.moment, i)))
-        else:
-            rate = 1.0 / cycle if cycle > 0.0 else 0.0
-            moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
-            turned = sub(load(grains.moment, i), load(long_range.past_moment, i))
-            put(long_range.past_position, i, scale(rate, moved))
-            put(long_range.past_moment, i, scale(rate, turned))
-
-
-@loop
-def clear_rates(long_range):
-    """Set the rates of all long-range forces and torques to 0."""
-    for i in range(long_range.force.shape[1]):
-        put(long_range.force_rate, i, (0.0, 0.0, 0.0))
-        put(long_range.torque_rate, i, (0.0, 0.0, 0.0))

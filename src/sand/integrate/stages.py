@@ -4,13 +4,14 @@ Their numbers are the entries of the program of a simulation (`program.build_pro
 and are compiled once for each; those of forces are in `force_stages`.
 """
 
-import functools
 import math
 from enum import IntEnum
 
 import numpy as np
 
+from ..basics.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from ..compiler.jit import loop
+from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import half_kick_weight, record_half_kicks, record_half_kicks_at_walls
 from ..contact.events import compact_contacts, forming_loops, settle_loop
@@ -21,15 +22,13 @@ from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import ContactStep, contact_pass_loop, contact_step, store_contact_sums
 from ..contact.wall_loops import FULL as WALLS_FULL
 from ..contact.wall_loops import WALL_PARTS, add_wall_loads, wall_loops, wall_step_loop
-from ..forces.gas.loops import gas_kick
+from ..forces.gas.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
-from ..state.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from .motion import UNBOUNDED, drift_for, gather_and_kick
-from .parts import CYCLE_LENGTH, DT, SINCE, Stop
-from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions
+from .parts import DT, Stop
 from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_finite, set_wall_step
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
@@ -73,7 +72,7 @@ INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
 
 
-@functools.cache
+@factory
 def drift_stage(magnetic: bool, long_vectors: bool) -> Stage:
     """First half kick and drift of a block of grains; stores the bits of the largest squared speed."""
     drift_some = drift_for(magnetic)
@@ -98,7 +97,7 @@ def verlet_list(grains, long_range, count, span, search):
     return Stop.LIST_FULL.value if full else Stop.NONE.value
 
 
-@functools.cache
+@factory
 def pair_list_stage(law: ContactLaw, celled: bool) -> Stage:
     """Rebuild the pair list of a contact law, with cells or without; returns a `Stop`."""
     build_pair_list = pair_list_loop(law, celled)
@@ -125,7 +124,7 @@ def inner_list(grains, pair_list, count, span, criteria):
     return 0
 
 
-@functools.cache
+@factory
 def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Stage:
     """Update of a block of contacts; stores its sums."""
     contact_pass = contact_pass_loop(law, damping)
@@ -142,7 +141,7 @@ def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Sta
     return pass_contacts
 
 
-@functools.cache
+@factory
 def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of contact events by number: work of stiffnesses, slip and breaking, forming."""
     settle, form_contacts = settle_loop(law, damping), forming_loops(law, damping).form
@@ -168,7 +167,7 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     return {StageNumber.STIFFNESS_WORK: stiffness_work, StageNumber.SETTLE: settle_contacts, StageNumber.FORM: form}
 
 
-@functools.cache
+@factory
 def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of walls by number, whose parameters are `contact.wall_loops.WallNumbers`: contacts, loads, step."""
     update, find_step = wall_loops(law, damping).update, wall_step_loop(law)
@@ -230,7 +229,7 @@ def remove_broken(contacts, count):
     return 0
 
 
-@functools.cache
+@factory
 def gather_stage(long_vectors: bool) -> Stage:
     """Sums of the contact loads of a block of grains."""
 
@@ -244,7 +243,7 @@ def gather_stage(long_vectors: bool) -> Stage:
     return gather_loads
 
 
-@functools.cache
+@factory
 def gather_and_kick_stage(long_vectors: bool) -> Stage:
     """Sums of the contact loads of a block of grains, and the second half kick; stores the largest speeds."""
 
@@ -257,30 +256,6 @@ def gather_and_kick_stage(long_vectors: bool) -> Stage:
         return 0
 
     return gather_loads_and_kick
-
-
-@stage("the rates of Taylor series")
-def prepare_rates(grains, contacts, long_range, clock, span, respa, scratch):
-    """Before the rates of pair forces are summed: mean velocities, and rates of 0."""
-    # a mean over much less than the extrapolated time is dominated by oscillations
-    past = clock[CYCLE] if clock[CYCLE] >= 0.5 * scratch[CYCLE_LENGTH] else 0.0
-    set_mean_velocities(grains, long_range, contacts.start, span, past, respa.instantaneous_rates)
-    clear_rates(long_range)
-    return 0
-
-
-@stage("the rates of Taylor series")
-def store_summation_positions(grains, long_range):
-    """Store positions and moments of this summation."""
-    store_positions(grains, long_range)
-    return 0
-
-
-@stage("the extrapolation of long-range loads")
-def extrapolate(grains, long_range, scratch):
-    """Add the extrapolated long-range loads."""
-    add_extrapolated_loads(grains, long_range, scratch[SINCE])
-    return 0
 
 
 @loop

@@ -5,13 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..box import nearest_image
-from ..compiler.jit import formula, loop, rare
-from ..contact.pair_types import pair_type_index
-from ..forces.external.formulas import stiffness_of_field
-from ..numerics.simd import float_bits, float_from_bits
-from ..numerics.vec import dot, load, sub
-from ..state.state import (
+from ..basics.box import nearest_image
+from ..basics.state import (
     CALM,
     CHECKED,
     CONTACT_STEP,
@@ -31,6 +26,11 @@ from ..state.state import (
     STEPS,
     WALL_STEP,
 )
+from ..compiler.jit import formula, loop, rare
+from ..contact.pair_types import pair_type_index
+from ..forces.external.formulas import stiffness_of_field
+from ..numerics.simd import float_bits, float_from_bits
+from ..numerics.vec import dot, load, sub
 
 CHECK_INTERVAL = 16
 """Steps between two evaluations of the criteria while contacts determine the step."""

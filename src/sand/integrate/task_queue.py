@@ -14,7 +14,7 @@ from ..compiler.atomics import fetch_add, read, write, yield_cpu
 from ..compiler.jit import caller, loop, rare
 from ..compiler.program import call_stage, stage_fails
 from ..compiler.stage import stage
-from ..forces.pair.loops import PARALLEL_FROM
+from ..forces.pair.long_range_loops import PARALLEL_FROM
 from .motion import BLOCK_OF_GRAINS
 
 WORD, SHARED, FAILED, FINISHED, ACTIVE = 0, 1, 2, 8, 16

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.settings import Number, Whole, Word
 from ..compiler.stage import Stage
-from ..errors import FORBID_EXTRA, BadInput, did_you_mean
-from ..grains import Grains
-from ..units import is_word, si, whole_number
-from .base import register
+from .integrator import IntegratorSettings, register
 
 IMPULSE_PERIODS = 0.48
 """Longest r-RESPA cycle in fastest contact periods; the first resonance of the impulses is at half a period."""
@@ -18,13 +17,12 @@ TAYLOR_STEPS = 70
 """k_max of the paper."""
 MAX_FAR_STEPS = 1_000_000
 """Largest `far_steps` accepted."""
-FAR = ("every step", "impulse", "taylor", "taylor-literal")
 
 
 @register
 @checked
 @dataclass(frozen=True)
-class Verlet:
+class Verlet(IntegratorSettings):
     """Velocity Verlet for translation, spin and rotation parameters; second order, conserves momenta to rounding.
 
     Parameters
@@ -57,49 +55,15 @@ class Verlet:
         If a parameter is out of range.
     """
 
-    steps_per_period: Any = 25.0
-    step: Any = "auto"
-    accuracy: Any = 1e-8
-    far: str = "impulse"
-    far_steps: Any = "auto"
+    steps_per_period: Annotated[Any, Number(least=10.0)] = 25.0
+    step: Annotated[Any, Number("s", above=0.0, auto=True)] = "auto"
+    accuracy: Annotated[Any, Number(above=0.0, below=1.0)] = 1e-8
+    far: Annotated[str, Word("every step", "impulse", "taylor", "taylor-literal")] = "impulse"
+    far_steps: Annotated[Any, Whole(1, MAX_FAR_STEPS, auto=True)] = "auto"
 
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "verlet"
+    clusters: ClassVar[str] = "grains"
     flight: ClassVar[Stage | None] = None
-
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-
-        def take(key: str, unit: str, **bounds: float) -> None:
-            try:
-                object.__setattr__(self, key, si(getattr(self, key), unit, f"stepping: {key}", **bounds))
-            except BadInput as error:
-                problems.extend(error.problems)
-
-        take("steps_per_period", "1", least=10.0)
-        take("accuracy", "1", above=0.0, below=1.0)
-        if not is_word(self.step, "auto"):
-            take("step", "s", above=0.0)
-        if self.far not in FAR:
-            problems.append(f"stepping: far = {self.far!r}; {did_you_mean(str(self.far), FAR)}")
-        if not is_word(self.far_steps, "auto"):
-            try:
-                whole_number(self.far_steps, "stepping: far_steps", 1, MAX_FAR_STEPS)
-            except BadInput as error:
-                problems += [f'{line}, or "auto"' for line in error.problems]
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        return {
-            "method": self.name,
-            "steps_per_period": self.steps_per_period,
-            "step": self.step,
-            "accuracy": self.accuracy,
-            "far": self.far,
-            "far_steps": self.far_steps,
-        }
 
     @property
     def contact_stepping(self) -> Verlet:
@@ -110,7 +74,7 @@ class Verlet:
         """These settings: the driver chooses the automatic step."""
         return self
 
-    def flight_limits(self, longest_displacement: float) -> tuple[()]:
+    def flight_limits(self, grains: Grains, longest_displacement: float) -> tuple[()]:
         """None: grains without contacts are moved in the same way."""
         return ()
 

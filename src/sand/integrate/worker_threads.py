@@ -8,10 +8,10 @@ import threading
 import weakref
 from typing import Any
 
+from ..basics.threads import threads
 from ..compiler.jit import COMPILED
 from ..compiler.stage import Stage
 from ..compiler.table import Table
-from ..threads import threads
 
 
 class WorkerThreads:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..grains import Grains
-from ..own_quantities import OwnQuantities
+from ..basics.grains import Grains
+from ..basics.own_quantities import OwnQuantities
 
 ANGSTROM = 1e-10
 SYMBOLS = {"iron": "Fe", "silica": "Si", "ice": "O", "graphite": "C", "forsterite": "Mg", "magnetite": "Fe"}

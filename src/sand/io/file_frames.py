@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import ROUNDED
+from ..basics.material import PRESETS, SILICA, Material, as_material
 from ..errors import BadInput, warn
-from ..grains import ROUNDED
-from ..material import PRESETS, SILICA, Material, as_material
-from .bodies import contacts_of, read_frame
 from .frame import Frame, FrameSequence
 from .frame_chunks import stored_frame
 from .grain_files import is_gsd, open_grains
+from .read_grains import contacts_of, read_frame
 from .trajectory import Frames
 
 

@@ -10,10 +10,10 @@ from typing import Any, overload
 
 import numpy as np
 
-from ..box import Box
+from ..basics.box import Box
+from ..basics.own_quantities import OwnQuantities
+from ..basics.units import format_quantity
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
-from ..own_quantities import OwnQuantities
-from ..units import format_quantity
 from .frame_chunks import IDENTITY, IN_FULL, OWN, REST, code_of, crc32_of, material_name
 
 

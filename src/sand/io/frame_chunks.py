@@ -43,8 +43,8 @@ from typing import Any
 
 import numpy as np
 
-from ..box import Box
-from ..grains import Grains
+from ..basics.box import Box
+from ..basics.grains import Grains
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""

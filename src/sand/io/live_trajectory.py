@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..basics.paths import user_path
 from ..errors import BadInput
-from ..paths import user_path
 from .frame import Frame, FrameSequence
 from .trajectory import Frames
 

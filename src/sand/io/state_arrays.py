@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadInput
-from ..schema import FIELDS
-from ..state.arrays import SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
-from ..state.state import (
+from ..basics.arrays import SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
+from ..basics.schema import FIELDS
+from ..basics.state import (
     CLOCK,
     CONTACTS,
     COUNT,
@@ -29,6 +28,7 @@ from ..state.state import (
     TIME,
     WALL_CONTACTS,
 )
+from ..errors import BadInput
 
 
 class ArraySpec(NamedTuple):

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ..box import Box
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.paths import user_path
+from ..basics.units import format_quantity, si
 from ..errors import BadInput, FilesFailed, shown, warn
-from ..grains import Grains
-from ..paths import user_path
-from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
 from .frame import Frame, FrameSequence

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..box import nearest_image
+from ..basics.arrays import CELLS_PER_GRAIN
+from ..basics.box import nearest_image
+from ..basics.state import LISTED
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
 from ..numerics.simd import SIMD_WIDTH
 from ..numerics.vec import dot, load, put, sub
-from ..state.arrays import CELLS_PER_GRAIN
-from ..state.state import LISTED
 
 FULL = -1
 """Returned when the arrays of a list are too short."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.arrays import NOT_SAVED, RATE_ARRAYS, SAVED_LONG_RANGE, UNIFORM_ARRAYS
+from ..basics.grains import Grains
+from ..basics.state import CONTACTS, GRAIN1, GRAIN2, PAIRS, WALL_CONTACTS, State
 from ..contact.gather import resort_contacts_by_grain
-from ..grains import Grains
-from ..state.arrays import NOT_SAVED, RATE_ARRAYS, SAVED_LONG_RANGE, UNIFORM_ARRAYS
-from ..state.state import CONTACTS, GRAIN1, GRAIN2, PAIRS, WALL_CONTACTS, State
 
 BITS = 21
 """Bits per coordinate; three coordinates fill 63 bits."""

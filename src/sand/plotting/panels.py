@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
 from ..analysis.ledger_columns import AWAKE, LOSSES
-from ..constants import BOLTZMANN
+from ..basics.constants import BOLTZMANN
+from ..basics.state import DAMPING, LOST
 from ..io.ledger_table import TEMPERATURES
-from ..state.state import DAMPING, LOST
 from .style import (
     BLUE,
     BROWN,

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..analysis.quantities import material_names
-from ..box import Box
+from ..basics.box import Box
 from ..io.run_folder import replace_file
 from .panels import (
     draw_balance,

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.grains import Grains
+from ..basics.material import PRESETS, Material, as_material
+from ..basics.units import dimensions, si
 from ..errors import BadInput, did_you_mean, shown
-from ..grains import Grains
-from ..material import PRESETS, Material, as_material
-from ..units import dimensions, si
 from .deposit import rbd
 from .fractal import fractal
 from .growing import bcca, bpca, dla, dlca

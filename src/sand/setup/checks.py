@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..analysis.clusters import labels_of
-from ..box import Box
+from ..basics.box import Box
+from ..basics.grains import ROUNDED, Grains
 from ..errors import BadInput, first_problems
-from ..grains import ROUNDED, Grains
 from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)

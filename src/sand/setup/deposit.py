@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material
 from ..errors import BadInput
-from ..grains import Grains
-from ..material import Material
 from ._kernels.deposition import deposit
 from .checks import largest_cluster
 from .growing import CELL, empty_hash_grid, require_all_placed

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.own_quantities import joined
+from ..basics.units import MOST, in_unit, si
 from ..errors import BadInput, shown
-from ..grains import Grains
-from ..own_quantities import joined
-from ..units import MOST, in_unit, si
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
+from ..basics.units import si
 from ..errors import BadInput
-from ..grains import Grains
-from ..units import si
 from ._kernels.cluster_cluster import CHOICES
 from .growing import aggregate, halves, merge_clusters
 from .population import Population

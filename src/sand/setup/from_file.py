@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.clusters import closes_through_boundary, in_one_piece
-from ..box import Box
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material
+from ..basics.paths import user_path
+from ..basics.units import format_quantity
 from ..errors import BadInput, warn
-from ..grains import Grains
 from ..io.run_folder import TRAJECTORY
-from ..material import Material
-from ..paths import user_path
-from ..units import format_quantity
 from .checks import ROUNDING, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
 from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
 from .overlap_fit import fit_overlaps
 
 if TYPE_CHECKING:
-    from ..io.bodies import ReadGrains
+    from ..io.read_grains import ReadGrains
 
 EXACT = 1e-6
 """Largest difference of an overlap from that of equilibrium, relative to it, that is left as it is."""
@@ -58,7 +58,7 @@ def body_from_file(path: str | Path, *arguments: Any, **named: Any) -> Grains:
         As `read_grains`; also for grains that overlap by more than a simulation allows at its start, and for grains
         without a contact to the rest. The first ten are named.
     """
-    from ..io.bodies import centred, read_grains
+    from ..io.read_grains import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
     _tell(found.notes)  # they tell how the file is understood, also if it is refused
@@ -100,7 +100,7 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
     BadInput
         As `read_grains`; also for grains that overlap by more than a simulation allows at its start.
     """
-    from ..io.bodies import centred, read_grains
+    from ..io.read_grains import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
     _tell(found.notes)  # they tell how the file is understood, also if it is refused

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import Box
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material, as_material
+from ..basics.units import format_quantity
 from ..errors import BadInput, did_you_mean, refuse_other
-from ..grains import Grains
-from ..material import Material, as_material
-from ..units import format_quantity
 from .overlap_fit import APART, ITERATIONS, deficit, least_shift, overlapping, scaled_box
 
 SINGLE = 6e-8

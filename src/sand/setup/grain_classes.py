@@ -2,32 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
-from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown, warn
-from ..grains import Grains, moment_size, vector_for_all
-from ..material import PRESETS, Material, as_material
-from ..paths import checked_name
-from ..units import dimensions, si, whole_number
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.grains import Grains, moment_size, vector_for_all
+from ..basics.material import PRESETS, Material, as_material
+from ..basics.paths import checked_name
+from ..basics.settings import For, Number, Reading, Settings, Whole, Word
+from ..basics.units import dimensions, si
+from ..errors import BadInput, shown, warn
 from .aggregates import KINDS, build
 from .encounters import combined, turned
 from .from_file import body_from_file, from_trajectory, is_own_trajectory, largest_body
 from .from_frame import StrainedContacts
 from .population import divided, drawn, fractions_of, radii_of, refuse_sum
 
-BUILDER_KEYS = ("grains", "shape", "moments", "magnetic", "dimension", "prefactor")
-FILE_KEYS = ("frame", "length")
+BUILDERS = tuple(kind for kind in KINDS if kind != "grain")
+"""Kinds of aggregates that are built."""
+BODY_FILE = "a file that holds the aggregate, such as 'body.xyz'"
+
+
+def radius_as_given(value: Any) -> Any:
+    """Check radii as `radii_of` does; a length becomes a number [m], a law stays as it is. Raises BadInput."""
+    radii = radii_of(value)
+    if isinstance(radii, np.ndarray):
+        return radii.tolist()
+    return radii if isinstance(radii, float) else value
+
+
+def moment_as_given(value: Any) -> Any:
+    """Check a moment as `moment_size` does; it stays as it is. Raises BadInput."""
+    if dimensions(value) == 0:  # an array is checked against the number of grains
+        moment_size(value, np.ones(1))
+    return value
+
+
+def material_as_given(value: Any) -> Any:
+    """Check the form of a material: a name, a list of names, or fractions; the names are not looked up.
+
+    Raises
+    ------
+    BadInput
+        If it has none of these forms, or the fractions do not add up to 1.
+    """
+    if isinstance(value, Mapping):
+        fractions_of(value, "material")
+    elif not isinstance(value, (str, Material, Sequence)):
+        raise BadInput(f"material = {shown(value)} must be a name, or fractions such as {{silica = 0.7, iron = 0.3}}")
+    return value
+
+
+def _charge_as_given(value: Any, name: str) -> Any:
+    """Check one charge [C]; an array is checked by `Grains`.  Raises BadInput."""
+    return si(value, "C", name) if dimensions(value) == 0 else value
+
+
+Radii = Annotated[Any, Reading(lambda value, name: radius_as_given(value), unit="m")]
+"""Radii: a length, which becomes SI, a law of radii as text, or a list."""
+Materials = Annotated[Any, Reading(lambda value, name: material_as_given(value))]
+"""A material, its name, a list of names, or fractions by name."""
+MOMENT = Reading(lambda value, name: moment_as_given(value), unit="A m^2")
+FILE = Reading(lambda value, name: checked_name(str(value), name))
 
 
 @checked
 @dataclass(frozen=True)
-class GrainClass:
+class GrainClass(Settings):
     """A class of equal or similar members of a gas: single grains, or aggregates.
 
     Keys that a class lacks, of `radius`, `material`, `moment` and `charge`, are those of the gas.
@@ -74,93 +119,31 @@ class GrainClass:
         If a value is invalid or does not belong to the kind; one line for each.
     """
 
-    share: Any = None
-    number: Any = None
-    kind: str = "grain"
-    radius: Any = None
-    material: Any = None
-    moment: Any = None
-    charge: Any = None
-    grains: Any = None
-    shape: Any = None
-    moments: Any = None
-    magnetic: Any = None
-    dimension: Any = None
-    prefactor: Any = None
-    file: Any = None
-    frame: Any = None
-    length: Any = None
+    share: Annotated[Any, Number(above=0.0, most=1.0)] = None
+    number: Annotated[Any, Whole(1, MOST_GRAINS)] = None
+    kind: Annotated[str, Word("file", among=KINDS)] = "grain"
+    radius: Radii = None
+    material: Materials = None
+    moment: Annotated[Any, MOMENT, For("kind", *KINDS)] = None
+    charge: Annotated[Any, Reading(_charge_as_given, unit="C")] = None
+    grains: Annotated[Any, Whole(1, MOST_GRAINS), For("kind", *BUILDERS)] = None
+    shape: Annotated[Any, For("kind", *BUILDERS)] = None
+    moments: Annotated[Any, For("kind", *BUILDERS)] = None
+    magnetic: Annotated[Any, For("kind", *BUILDERS)] = None
+    dimension: Annotated[Any, For("kind", *BUILDERS)] = None
+    prefactor: Annotated[Any, For("kind", *BUILDERS)] = None
+    file: Annotated[Any, FILE, For("kind", "file", needed=BODY_FILE)] = None
+    frame: Annotated[Any, Whole(-(2**31), 2**31 - 1), For("kind", "file")] = None
+    length: Annotated[Any, For("kind", "file")] = None
 
-    __pydantic_config__ = FORBID_EXTRA
+    place: ClassVar[str] = ""
 
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """The number of members, which is given in one way, and that of the grains of an aggregate."""
         if (self.share is None) == (self.number is None):
-            errors.problems.append("give either share, a fraction such as 0.5, or number")
-        known = (*KINDS, "file")
-        foreign: tuple[str, ...] = ()
-        if self.kind not in known:
-            errors.problems.append(f"kind = {shown(self.kind)}; {did_you_mean(str(self.kind), known)}")
-        elif self.kind == "grain":
-            foreign = (*BUILDER_KEYS, "file", *FILE_KEYS)
-        elif self.kind == "file":
-            foreign = (*BUILDER_KEYS, "moment")
-            if self.file is None:
-                errors.problems.append("file is missing: which file holds the aggregate?")
-        else:
-            foreign = ("file", *FILE_KEYS)
-            if self.grains is None and self.shape is None:
-                errors.problems.append(f"grains is missing: how many does the {self.kind} have?")
-        errors.problems += [
-            f"{name} is not for kind = '{self.kind}'; remove it, or change kind"
-            for name in foreign
-            if getattr(self, name) is not None
-        ]
-        readers: dict[str, Any] = {
-            "share": lambda v: si(v, "1", "share", above=0.0, most=1.0),
-            "number": lambda v: whole_number(v, "number", 1, MOST_GRAINS),
-            "grains": lambda v: whole_number(v, "grains", 1, MOST_GRAINS),
-            "frame": lambda v: whole_number(v, "frame", -(2**31), 2**31 - 1),
-            "file": lambda v: checked_name(str(v), "file"),
-            "radius": radius_as_given,
-            "material": material_as_given,
-            "moment": moment_as_given,
-            "charge": lambda v: si(v, "C", "charge") if dimensions(v) == 0 else v,  # an array is checked by Grains
-        }
-        for name, read in readers.items():
-            if (value := getattr(self, name)) is not None and name not in foreign:
-                object.__setattr__(self, name, errors.take(read, value))
-        errors.done()
-
-
-def radius_as_given(value: Any) -> Any:
-    """Check radii as `radii_of` does; a length becomes a number [m], a law stays as it is. Raises BadInput."""
-    radii = radii_of(value)
-    if isinstance(radii, np.ndarray):
-        return radii.tolist()
-    return radii if isinstance(radii, float) else value
-
-
-def moment_as_given(value: Any) -> Any:
-    """Check a moment as `moment_size` does; it stays as it is. Raises BadInput."""
-    if dimensions(value) == 0:  # an array is checked against the number of grains
-        moment_size(value, np.ones(1))
-    return value
-
-
-def material_as_given(value: Any) -> Any:
-    """Check the form of a material: a name, a list of names, or fractions; the names are not looked up.
-
-    Raises
-    ------
-    BadInput
-        If it has none of these forms, or the fractions do not add up to 1.
-    """
-    if isinstance(value, Mapping):
-        fractions_of(value, "material")
-    elif not isinstance(value, (str, Material, Sequence)):
-        raise BadInput(f"material = {shown(value)} must be a name, or fractions such as {{silica = 0.7, iron = 0.3}}")
-    return value
+            yield "give either share, a fraction such as 0.5, or number"
+        if "kind" not in wrong and self.kind in BUILDERS and self.grains is None and self.shape is None:
+            yield f"grains is missing: how many does the {self.kind} have?"
 
 
 def class_numbers(classes: Sequence[GrainClass], number: int | None) -> list[int]:
@@ -239,7 +222,10 @@ def members_of(
         if copied is not None:
             body, strained = copied
         else:
-            builder = {name: getattr(given, name) for name in ("radius", "moment", *BUILDER_KEYS[2:])}
+            builder = {
+                name: getattr(given, name)
+                for name in ("radius", "moment", "moments", "magnetic", "dimension", "prefactor")
+            }
             seed = int(rng.integers(2**62))
             body = build(given.kind, given.grains, shape=given.shape, seed=seed, material=material, **builder)
             strained = None

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.grains import Grains
 from ..errors import BadInput
-from ..grains import Grains
 from ._kernels.aggregation import grow_ballistic, grow_diffusing
 from ._kernels.cluster_cluster import join_ballistic, join_diffusing
 from ._kernels.hash_grid import EMPTY, TRIES, GrainSet, HashGrid, table_size

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..constants import MAGNETIC
+from ..basics.arguments import checked
+from ..basics.constants import MAGNETIC
+from ..basics.grains import Grains, moment_size, vector_for_all
+from ..basics.units import si
 from ..errors import BadInput, did_you_mean, warn
-from ..grains import Grains, moment_size, vector_for_all
-from ..units import si
 from ._kernels.moment_relaxation import alignment_energy, relax
 
 MOMENT_MODES = ("random", "aligned", "relaxed")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..box import Box
+from ..basics.box import Box
 
 APART = 1e-9
 """Gap, in mean radii, given to pairs without a contact that would overlap."""

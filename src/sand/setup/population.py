@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
+from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.grains import Grains, materials_of
+from ..basics.material import Material, as_material
+from ..basics.units import dimensions, format_quantity, in_unit, not_a_quantity, seed_given, si, whole_number
 from ..contact.jkr import rest_overlap, rest_radius
 from ..contact.mixing import pairing_between
 from ..errors import BadInput, shown
-from ..grains import Grains, materials_of
-from ..material import Material, as_material
-from ..units import dimensions, format_quantity, in_unit, not_a_quantity, seed_given, si, whole_number
 from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0

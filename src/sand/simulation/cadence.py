@@ -7,9 +7,9 @@ import re
 from decimal import Decimal
 from typing import Any, Literal, NamedTuple
 
-from ..arguments import MOST_STEPS
+from ..basics.arguments import MOST_STEPS
+from ..basics.units import LONGEST_TEXT, format_quantity, si, whole_number
 from ..errors import BadInput
-from ..units import LONGEST_TEXT, format_quantity, si, whole_number
 
 SHORTEST_DURATION = 1e-21
 """Shortest accepted time span [s]; light travels less than a picometre in it."""
@@ -185,6 +185,13 @@ class Schedule:
     def is_due(self, time: float, step: int) -> bool:
         """Whether the next output is due at this time [s] and step."""
         return self.due <= time or self.step_due <= step
+
+    def take(self, time: float, step: int) -> bool:
+        """Whether the next output is due at this time [s] and step; if so, move to the one after it."""
+        is_due = self.is_due(time, step)
+        if is_due:
+            self.advance(time, step)
+        return is_due
 
     def advance(self, time: float, step: int = 0) -> None:
         """Move to the first output after an output at this time [s] and step."""

@@ -10,20 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import unwrapped
-from ..box import Box, as_box
-from ..contact.model import Contact
-from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
-from ..forces.base import Force, LongRangeForce
-from ..forces.gas.model import Gas
-from ..grains import Grains
-from ..integrate.step_control import INCREASE_INTERVAL
-from ..numerics.quaternion import turned_back
-from ..own_quantities import own_values
-from ..quantity_array import QuantityArray
-from ..schema import BY_NAME, CHANGEABLE, stored
-from ..setup.checks import at_same_place
-from ..state.arrays import SAVED_LONG_RANGE
-from ..state.state import (
+from ..basics.arrays import SAVED_LONG_RANGE
+from ..basics.box import Box, as_box
+from ..basics.grains import Grains
+from ..basics.own_quantities import own_values
+from ..basics.quantity_array import QuantityArray
+from ..basics.schema import BY_NAME, CHANGEABLE, stored
+from ..basics.state import (
     BROKEN,
     CHECKED,
     COMPARED,
@@ -42,15 +35,22 @@ from ..state.state import (
     State,
     grains_from_arrays,
 )
-from ..units import has_unit_within, si
-from .assemble import build_engine, fitting_forces
-from .changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
-from .checks import outside_box
-from .driven import Driven, kept_driven, refuse_changed_motion
-from .engine import Engine
-from .initial_contacts import overlapping_pairs, refuse_overlaps
+from ..basics.units import has_unit_within, si
+from ..contact.model import Contact
+from ..engine.assemble import build_engine, fitting_forces
+from ..engine.changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
+from ..engine.driven import Driven, kept_driven, refuse_changed_motion
+from ..engine.engine import Engine
+from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
+from ..engine.input_checks import outside_box
+from ..engine.walls import Wall
+from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
+from ..forces.base import Force, LongRangeForce
+from ..forces.gas.model import Gas
+from ..integrate.step_control import INCREASE_INTERVAL
+from ..numerics.quaternion import turned_back
+from ..setup.checks import at_same_place
 from .settings import read_forces
-from .walls import Wall
 
 QUANTITIES = CHANGEABLE
 """Quantities of the grains that can be changed."""

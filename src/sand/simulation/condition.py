@@ -6,12 +6,12 @@ import contextlib
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..analysis.ledger_columns import AWAKE
+from ..basics.units import si
 from ..errors import BadInput, did_you_mean, shown
-from ..units import si
 from .ledger import MOMENTA, NUMBERS
 
 EVERY, EVERY_LONG = 100, 1
@@ -52,13 +52,7 @@ class Condition:
 
     text: str
     names: tuple[str, ...]
-    holds: Callable[[Row], bool]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Condition) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
+    holds: Callable[[Row], bool] = field(compare=False)
 
     def check(self, columns: Sequence[str]) -> None:
         """Refuse columns that the ledger lacks.  Raises BadInput."""

@@ -47,6 +47,10 @@ class Exclusive:
             self._calls.pop()
             self._lock.release()
 
+    def __contains__(self, what: str) -> bool:
+        """Whether a call goes on."""
+        return what in self._calls
+
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy of a simulation has a right of its own."""
         return Exclusive, ()

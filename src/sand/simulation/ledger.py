@@ -5,19 +5,21 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..analysis.body_motion import BodyMotion, temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
-from ..constants import BOLTZMANN
+from ..basics.constants import BOLTZMANN
+from ..basics.grains import Grains
+from ..basics.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from ..contact.measure import ENERGIES
+from ..engine.engine import Engine
+from ..engine.walls import wall_row
 from ..errors import BadInput
-from ..grains import Grains
 from ..io.ledger_table import TEMPERATURES
-from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
-from .walls import wall_row
 
 KINETIC = "translation", "rotation"
 """Columns of kinetic energies."""
@@ -121,7 +123,7 @@ def momenta(grains: Grains) -> list[float]:
 
 
 class Ledger(LedgerColumns):
-    """The ledger of a simulation: all rows so far, oldest first.
+    """The ledger of a simulation: all rows so far, oldest first, and the times [s] of those that have a frame.
 
     Parameters
     ----------
@@ -129,13 +131,13 @@ class Ledger(LedgerColumns):
         Names of the energy columns of long-range and per-grain forces.
     walls : Sequence[str], optional
         Columns of the walls, see `walls.wall_columns`.
-    rigid : bool, optional
-        Whether clusters at rest are rigid: with the column `awake`.
+    awake : bool, optional
+        Whether clusters may be at rest: with the column `awake`.
     """
 
-    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, rigid: bool = False):
+    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, awake: bool = False):
         others = [name for name in forces if name != MAGNETIC]
-        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if rigid else NUMBERS
+        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if awake else NUMBERS
         own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
@@ -144,13 +146,41 @@ class Ledger(LedgerColumns):
         lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
         of_state = (*lost, "total", *OF_MOTION, *numbers, *walls)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
+        self.frame_times: list[float] = []
+        # engine, counts of contacts, and numbers of clusters for these
+        self._clusters: tuple[Any, Any, dict[str, float]] = (None, None, {})
 
-    def add(self, row: dict[str, float]) -> bool:
+    @property
+    def last_time(self) -> float:
+        """Time of the last row [s]; −∞ without one."""
+        return self.rows[-1]["time"] if self.rows else -math.inf
+
+    def add(self, row: dict[str, float], with_frame: bool = False) -> bool:
         """Append a row; returns False if the ledger already has a row of this time."""
-        if self.rows and not row["time"] > self.rows[-1]["time"]:
+        if not row["time"] > self.last_time:
             return False
         self.rows.append(row)
+        if with_frame:
+            self.frame_times.append(row["time"])
         return True
+
+    def row_of(self, engine: Engine) -> dict[str, float]:
+        """The row of the present state of an engine."""
+        found = engine.losses().tolist(), self._cluster_numbers(engine), engine.body_motion()
+        row = log_row(engine.state, *found, engine.contact_energies(), engine.force_energies(), self.walls)
+        return dict.fromkeys(self.columns, 0.0) | row  # 0 for forces that a change left out
+
+    def counts_of(self, engine: Engine) -> dict[str, float]:
+        """The part of the row of the present state that needs no energies."""
+        return count_row(engine.state, self._cluster_numbers(engine))
+
+    def _cluster_numbers(self, engine: Engine) -> dict[str, float]:
+        """Numbers of clusters, found anew after contacts have formed or broken."""
+        state = engine.state
+        key = (len(state.grains), *(int(state.count[k]) for k in (CONTACTS, MADE, BROKEN)))
+        if self._clusters[:2] != (engine, key):
+            self._clusters = engine, key, cluster_numbers(state)
+        return self._clusters[2]
 
     def with_row(self, row: dict[str, float]) -> Ledger:
         """The ledger with one more row; the rows themselves if this time is the last one logged.
@@ -166,8 +196,10 @@ class Ledger(LedgerColumns):
         """All rows as an array (K, columns) for a checkpoint; integers below 2⁵³ are exact in it."""
         return np.array([[row[name] for name in self.columns] for row in self.rows], dtype=np.float64)
 
-    def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
+    def from_array(self, table: np.ndarray, columns: Sequence[str], frame_times: np.ndarray | None = None) -> None:
         """Restore the rows from the array of `to_array`; raises BadInput if it lacks a column of this ledger.
+
+        Without `frame_times` every row has a frame.
 
         Further columns are those of forces that a change left out. Without the column `awake` or the temperatures of
         bodies, as in checkpoints of versions that did not have them, the ledger goes on without them.
@@ -181,6 +213,7 @@ class Ledger(LedgerColumns):
         self.rows = [
             {name: kind(v) for name, kind, v in zip(columns, types, row, strict=True)} for row in table.tolist()
         ]
+        self.frame_times = [row["time"] for row in self.rows] if frame_times is None else frame_times.tolist()
 
     def runs_away(self, row: dict[str, float]) -> bool:
         """Whether the energy error exceeds half of all energies in this row plus all dissipation.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..descriptions import described
+from ..basics.descriptions import described
 from ..integrate.parts import Stop
 
 

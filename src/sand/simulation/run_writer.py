@@ -12,18 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import cache_folder
-from ..errors import BadInput, FilesFailed
-from ..io import run_folder as files
-from ..io.checkpoint import write_checkpoint
-from ..io.checkpoint_files import checkpoint_files
-from ..io.damage import sealed
-from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
-from ..io.lock import FolderLock
-from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
-from ..io.trajectory import TrajectoryWriter
-from ..paths import user_path
-from ..state.state import (
+from ..basics.paths import user_path
+from ..basics.state import (
     BODIES,
     CLOCK,
     CONTACT_STEPS,
@@ -40,6 +30,16 @@ from ..state.state import (
     SUBSTEPS,
     WOKEN,
 )
+from ..compiler.jit import cache_folder
+from ..errors import BadInput, FilesFailed
+from ..io import run_folder as files
+from ..io.checkpoint import write_checkpoint
+from ..io.checkpoint_files import checkpoint_files
+from ..io.damage import sealed
+from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
+from ..io.lock import FolderLock
+from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
+from ..io.trajectory import TrajectoryWriter
 from ..version import __version__
 from .cadence import read_cadence
 from .contact_table import measured_columns
@@ -132,9 +132,11 @@ class RunWriter:
             self._clean_up_earlier(simulation)
         self._stop_beside_others()
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
-        times = simulation._frame_times
+        times = simulation.ledger.frame_times
         resumed_at = (times[-1] if times else -math.inf) if self._resumed else None
-        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, resumed_at, times, simulation._warn)
+        self._trajectory = TrajectoryWriter(
+            self.folder / files.TRAJECTORY, resumed_at, times, simulation._warnings.show
+        )
         if not self._resumed:
             self._frame(simulation)
         self.save(simulation)
@@ -181,7 +183,7 @@ class RunWriter:
         """Of a resumed run: keep a copy of a damaged ledger, and delete a summary of steps that are taken again."""
         try:
             ledger = simulation.ledger
-            keep_if_damaged(self.folder / files.LEDGER, ledger.columns, ledger.rows, simulation._warn)
+            keep_if_damaged(self.folder / files.LEDGER, ledger.columns, ledger.rows, simulation._warnings.show)
             with contextlib.suppress(BadInput):
                 steps = read_json(self.folder / files.SUMMARY).get("steps")
                 if isinstance(steps, int) and steps > simulation.steps:
@@ -202,7 +204,7 @@ class RunWriter:
     def _frame(self, simulation: Simulation) -> None:
         assert self._trajectory is not None
         w, engine = simulation.state, simulation._engine
-        contacts = measured_columns(w, engine.law, engine._current_table(w))
+        contacts = measured_columns(w, engine.law, engine.table_of(w))
         self._trajectory.write(w.steps, w.time, w.grains, w.box, contacts, at_rest=w.at_rest)
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
@@ -242,9 +244,9 @@ class RunWriter:
             "warnings": simulation.warnings,
             "case": plain(self._case),
             **({} if self._written is None else {"case_written": self._written}),
-            "next_id": simulation._next_id,
+            "next_id": simulation._system.next_id,
             "own": regular.grains.own_units,
-            "chosen_cadence": None if simulation.frame_every is not None else simulation._chosen,
+            "chosen_cadence": None if simulation.frame_every is not None else simulation._continuation.chosen,
             "updaters": described(simulation.updaters),
             "ledger": simulation.ledger.columns,
             "clock": CLOCK,
@@ -253,9 +255,10 @@ class RunWriter:
             "cutoff": CUTOFF,
         }
         if simulation.is_sound:
-            arrays = {**regular.to_arrays(), "ledger": simulation.ledger.to_array()}
-            if len(simulation._frame_times) < len(simulation.ledger.rows):  # otherwise every row has a frame
-                arrays["frame_times"] = np.array(simulation._frame_times)
+            ledger = simulation.ledger
+            arrays = {**regular.to_arrays(), "ledger": ledger.to_array()}
+            if len(ledger.frame_times) < len(ledger.rows):  # otherwise every row has a frame
+                arrays["frame_times"] = np.array(ledger.frame_times)
             self._own = _stamp(write_checkpoint(self.folder, arrays, meta))
         self._saved = wall.monotonic()
         self._took = self._saved - begun

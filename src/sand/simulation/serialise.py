@@ -22,7 +22,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
         Condition that ends the run.
     """
     of_grains = simulation.grains.materials  # first, in the order of their indices
-    walls = simulation._walls
+    walls = simulation._system.walls
     materials = list({m.name: m for m in (*of_grains, *(wall.material for wall in walls))}.values())
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     if recipe["kind"] != "gas":  # a gas names the materials from which it is drawn

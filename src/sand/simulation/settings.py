@@ -1,15 +1,18 @@
-"""Checks of the arguments of a simulation, and protection against assigning them later."""
+"""Settings of a simulation in groups, checks of its arguments, and protection against assigning them later."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, ClassVar
 
-from ..arguments import objects_with
+from ..basics.arguments import objects_with
+from ..basics.schema import CHANGEABLE, FIELDS
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
 from ..forces.registry import FORCES
-from ..schema import CHANGEABLE, FIELDS
 from .cadence import read_cadence
 from .observers import Observer
 from .updater import read_updaters
@@ -17,17 +20,8 @@ from .updater import read_updaters
 ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
 """Arguments of a simulation that are fixed once it is built."""
 RESULTS = (
-    "time",
-    "steps",
-    "state",
-    "start",
-    "temperature",
-    "ledger",
-    "writer",
-    "choices",
-    "is_sound",
-    "wall_seconds",
-    "wall_times",
+    *("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound"),
+    *("wall_seconds", "wall_times"),
 )
 """Attributes of a simulation that follow from the run."""
 QUANTITIES = tuple(field.name for field in FIELDS)
@@ -98,44 +92,90 @@ def read_forces(value: Any) -> tuple[Force, ...]:
     return forces
 
 
+@dataclass
+class Output:
+    """Who takes part in a run, and when files are written; everything can be assigned, and is checked then."""
+
+    observers: Any
+    frame_every: Any
+    updaters: Any
+    row_every: Any
+    checkpoint_every: Any
+
+    CONVERTERS: ClassVar[dict[str, Callable[[Any], Any]]] = {
+        "observers": read_observers,
+        "updaters": read_updaters,
+        "frame_every": read_setting("frame_every"),
+        "row_every": read_setting("row_every"),
+        "checkpoint_every": read_setting("checkpoint_every", wall=True),
+    }
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Assign a setting.  Raises BadInput if it is invalid."""
+        object.__setattr__(self, name, Output.CONVERTERS[name](value))
+
+
+@dataclass
+class Origin:
+    """Where a simulation comes from, and where it was to end.
+
+    Attributes
+    ----------
+    recipe : dict or None
+        The [grains] table of the case file that described the grains.
+    origin : str
+        Description of the file that the grains come from.
+    title : str
+        What a figure says instead of the numbers of grains.
+    planned : tuple
+        Planned end of a resumed run: time [s], step and condition.
+    temperature : float
+        Kinetic temperature at the start [K].
+    choices : dict
+        Automatic choices of a resumed run, from its checkpoint.
+    """
+
+    temperature: float
+    recipe: dict[str, Any] | None = None
+    origin: str = ""
+    title: str = ""
+    planned: tuple[float, float, str | None] = (math.inf, math.inf, None)
+    choices: dict[str, str] = field(default_factory=dict)
+
+
+def held_by(group: str, name: str) -> Any:
+    """Make an attribute of a simulation that a group of its settings holds."""
+    return property(attrgetter(f"{group}.{name}"), lambda self, value: setattr(getattr(self, group), name, value))
+
+
 class ReadOnlySettings:
     """Base of `Simulation`: refuses assignments that would have no effect, and misspelt names.
 
-    `observers`, `updaters` and the cadences of output can be assigned at any time; subclasses of `Simulation` may add
-    attributes.
+    The settings of `Output` can be assigned at any time; subclasses of `Simulation` may add attributes.
     """
 
     _built = False
 
-    CONVERTERS: ClassVar[dict[str, Callable[[Any], Any]]] = {
-        "frame_every": read_setting("frame_every"),
-        "row_every": read_setting("row_every"),
-        "checkpoint_every": read_setting("checkpoint_every", wall=True),
-        "observers": read_observers,
-        "updaters": read_updaters,
-    }
     INTERNAL = ("recipe", "origin", "planned", "title")
     """Attributes that SAND itself assigns later."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Assign an attribute that may change.  Raises BadInput, which says what to write instead."""
-        if name in ReadOnlySettings.CONVERTERS:
-            value = ReadOnlySettings.CONVERTERS[name](value)
-        elif self._built and not name.startswith("_") and name not in ReadOnlySettings.INTERNAL:
+        changeable = (*Output.CONVERTERS, *ReadOnlySettings.INTERNAL)
+        if self._built and not name.startswith("_") and name not in changeable:
             # a subclass may use any name that a simulation does not have
             own = type(self).__module__.startswith("sand.")
             if (own or name in ARGUMENTS or name in RESULTS) and (refusal := _refusal(name)):
                 raise NoSuchAttribute(refusal)
             if own:
-                advice = did_you_mean(name, (*ReadOnlySettings.CONVERTERS, *ARGUMENTS))
-                raise NoSuchAttribute(f"a simulation has no '{name}'; {advice}")
+                raise NoSuchAttribute(
+                    f"a simulation has no '{name}'; {did_you_mean(name, (*Output.CONVERTERS, *ARGUMENTS))}"
+                )
         object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
         """Refuse unknown names with a suggestion; Python calls it only for those."""
         if name.startswith("_") or hasattr(type(self), name):
             return object.__getattribute__(self, name)  # raises the original error
-        public = [
-            own for own in {**vars(self), **vars(ReadOnlySettings), **vars(type(self))} if not own.startswith("_")
-        ]
+        public = {own for own in (*vars(self), *dir(type(self))) if not own.startswith("_")}
         raise NoSuchAttribute(f"a simulation has no '{name}'; {did_you_mean(name, sorted(public))}")

@@ -4,53 +4,77 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..box import as_box
+from ..basics.arguments import checked
+from ..basics.box import Box, as_box
+from ..basics.grains import Grains
+from ..basics.state import CONTACTS, OUTSIDE, State
+from ..basics.units import format_quantity, seed_given
 from ..contact.model import Contact
-from ..errors import BadInput, FilesFailed, Interrupted, warn
+from ..engine.assemble import build_engine, fitting_forces
+from ..engine.driven import Driven, read_driven
+from ..engine.walls import Wall, WallState, read_walls, wall_columns, wall_states
+from ..errors import BadInput, FilesFailed
 from ..forces.base import Force
 from ..forces.pair.dipoles import kinetic_temperature
-from ..grains import Grains
-from ..integrate.base import Integrator
+from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
-from ..neighbours.settings import Neighbours
+from ..limits.solid_limits import grain_warnings
+from ..limits.truncation import truncation_warnings
+from ..neighbours.search import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import BROKEN, CONTACTS, LATE, MADE, OUTSIDE, State
-from ..units import format_quantity, seed_given
-from .assemble import build_engine, fitting_forces
 from .cadence import Chosen, chosen_cadence
 from .change import Change, as_chosen, changed_engine
-from .condition import GIVEN, OwnCondition
+from .condition import GIVEN, Condition
 from .contact_table import ContactTable
-from .cost import StepTimer
+from .cost.cost import StepTimer
 from .displays import DISPLAYS
-from .driven import read_driven
 from .exclusive import Exclusive, exclusive
-from .ledger import Ledger, cluster_numbers, count_row, kinetic_energies, log_row
+from .ledger import Ledger, kinetic_energies
 from .observers import Observer
-from .outcome import Outcome, Result
-from .run_loop import run_loop
-from .run_writer import RunWriter, is_mostly_awake
-from .settings import ReadOnlySettings, read_forces
+from .outcome import Result
+from .run_loop import Continuation, RunLoop
+from .run_warnings import RunWarnings
+from .run_writer import RunWriter
+from .settings import Origin, Output, ReadOnlySettings, held_by, read_forces
 from .signals import Signals
-from .solid_limits import extreme_warnings, grain_warnings
-from .stop import StopCriteria, stop_criteria
-from .truncation import truncation_warnings
+from .stop import stop_criteria
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
 from .wall_clock import WallClock
-from .walls import Wall, WallState, read_walls, wall_columns, wall_states
 
 ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting")
 """Columns of a contact's elastic energy."""
+
+
+@dataclass(frozen=True)
+class System:
+    """What is simulated; a change replaces it.
+
+    Attributes
+    ----------
+    start : Grains
+        The grains at the start, or after the last change.
+    next_id : int
+        Identity of the next grain that is added.
+    """
+
+    start: Grains
+    forces: tuple[Force, ...]
+    box: Box
+    stepping: Integrator
+    neighbours: Neighbours
+    seed: int | None
+    walls: tuple[Wall, ...]
+    driven: tuple[Driven, ...]
+    next_id: int
 
 
 @checked
@@ -104,6 +128,24 @@ class Simulation(ReadOnlySettings):
         If arguments are invalid or do not fit together; all problems at once, one line each.
     """
 
+    forces: tuple[Force, ...] = held_by("_system", "forces")
+    box: Box = held_by("_system", "box")
+    stepping: Integrator = held_by("_system", "stepping")
+    neighbours: Neighbours = held_by("_system", "neighbours")
+    seed: int | None = held_by("_system", "seed")
+    driven: tuple[Driven, ...] = held_by("_system", "driven")
+    start: Grains = held_by("_system", "start")
+    observers: list[Observer] = held_by("_output", "observers")
+    updaters: list[Updater] = held_by("_output", "updaters")
+    frame_every: float | str | None = held_by("_output", "frame_every")
+    row_every: float | str | None = held_by("_output", "row_every")
+    checkpoint_every: float | str | None = held_by("_output", "checkpoint_every")
+    temperature: float = held_by("_origin", "temperature")
+    recipe: dict[str, Any] | None = held_by("_origin", "recipe")
+    origin: str = held_by("_origin", "origin")
+    title: str = held_by("_origin", "title")
+    planned: tuple[float, float, str | None] = held_by("_origin", "planned")
+
     def __init__(
         self,
         grains: Grains,
@@ -125,71 +167,46 @@ class Simulation(ReadOnlySettings):
         driven: Any = (),
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        self.forces, self._walls = read_forces(forces), read_walls(walls)
-        self.driven = read_driven(driven)
-        self.box, self.neighbours = as_box(box), neighbours or Neighbours()
-        self.seed = None if seed is None else seed_given(seed, bits=63)
-        self.observers, self.frame_every = observers, frame_every
-        self.updaters = () if updaters is None else updaters
-        self.row_every, self.checkpoint_every = row_every, checkpoint_every
-        self._choices_at_start: dict[str, str] = {}  # of a resumed run, from its checkpoint
-        self.recipe: dict[str, Any] | None = None  # the [grains] table of the case file that described the grains
-        self.origin = ""  # description of the file that the grains come from
-        self.title = ""  # what a figure says instead of the numbers of grains
-        self.planned: tuple[float, float, str | None] = (math.inf, math.inf, None)  # end of a resumed run
-        self.start = grains.copy()
+        forces, walls, driven, box = read_forces(forces), read_walls(walls), read_driven(driven), as_box(box)
+        seed = None if seed is None else seed_given(seed, bits=63)
+        self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
-        self.forces = fitting_forces(self.forces, integrator)
-        parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
-        saved = None if restart is None else restart[0].get("cutoff")
-        moved = (self.driven, self._walls)
-        self._engine = build_engine(*parts, *moved, fresh=restart is None, contacts=contacts, cutoff=saved)
-        self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
-        self.temperature = kinetic_temperature(grains)
-        self.ledger = Ledger(
-            [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)],
-            wall_columns(self._walls),
-            rigid=self._engine.state.at_rest is not None,
+        forces = fitting_forces(forces, integrator)
+        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), driven, walls)
+        arrays, meta = ({}, {}) if restart is None else restart
+        is_new = restart is None
+        self._engine = engine = build_engine(*parts, fresh=is_new, contacts=contacts, cutoff=arrays.get("cutoff"))
+        fitted = engine.stepping, engine.neighbours
+        self._system = System(
+            grains.copy(), forces, box, *fitted, seed, walls, driven, meta.get("next_id", len(grains))
         )
-        written = None if restart is None else restart[1].get("case_in_file")
-        self.writer = None if out is None else RunWriter(out, overwrite, restart is not None, written)
-        self._clock, self._exclusive = WallClock(), Exclusive()
+        self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
+        self._origin.origin = self._origin.choices.get("start", "")
+        self.ledger = Ledger(engine.columns(), wall_columns(walls), awake=engine.state.at_rest is not None)
+        self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
+        self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None
-        self._has_begun = restart is not None
-        # engine, counts of contacts, and numbers of clusters for these
-        self._clusters: tuple[Any, Any, dict[str, float]] = (None, None, {})
-        self._frame_times: list[float] = []  # [s], of all frames so far
-        self._chosen: Chosen | None = None  # cadence of frames of the present or last run, if the user gives none
-        self._met: tuple[Any, int] | None = None  # the condition that was met, and the step
-        self._notes_shown: set[str] = set()  # kinds of notes that were shown as warnings
-        self._warned: list[str] = []
-        self._failure = ""  # why the simulation cannot continue
-        self._updating = False  # whether an updater acts now
-        self._changing = False  # whether the block of a `change` is open
-        self._owed: tuple[int, list[int]] = (-1, [])  # step, and updaters that have still to act at it
-        self._stops = False  # whether the updater that acts ends the run
-        self._stopped_by = ""  # the updater that ended the last run
-        self._next_id = len(grains)  # identity of the next grain that is added
-        if restart is not None:
-            arrays, meta = restart
-            self._engine.load_state(arrays, meta.get("output_time"))
-            self.temperature, self._clock = meta["temperature"], WallClock(meta["wall_seconds"], meta.get("wall_times"))
-            self._choices_at_start, self._warned = meta.get("choices", {}), list(meta.get("warnings", []))
-            self.origin = self._choices_at_start.get("start", "")
-            self._next_id = int(meta.get("next_id", len(grains)))
-            self._chosen = Chosen(*meta["chosen_cadence"]) if meta.get("chosen_cadence") else None
-            check_updaters(updaters, self.updaters, meta.get("updaters", []))
-            if "ledger" in arrays:  # a state without a ledger starts a new one
-                self.ledger.from_array(arrays["ledger"], meta["ledger"])
-                self._notes_shown = set(self._notes(self.ledger.rows))
-                every_row = [row["time"] for row in self.ledger.rows]
-                self._frame_times = arrays["frame_times"].tolist() if "frame_times" in arrays else every_row
-            if meta.get("condition_met"):
-                self._met = (meta["condition_met"], self.steps)
+        self._has_begun = not is_new
+        self._warnings, self._continuation = RunWarnings(meta.get("warnings", [])), Continuation()
+        self._run: RunLoop | None = None  # the present run
+        if is_new:
+            self._warnings.take(engine)
         else:
-            self._warn_of_engine()
-        self._engine.warnings.clear()
+            self._continue(arrays, meta)
+            check_updaters(updaters, self.updaters, meta.get("updaters", []))
+        engine.warnings.clear()
         self._built = True
+
+    def _continue(self, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+        """Take state, ledger and what runs leave for the next one from a checkpoint."""
+        self._engine.load_state(arrays, meta.get("output_time"))
+        if meta.get("chosen_cadence"):
+            self._continuation.chosen = Chosen(*meta["chosen_cadence"])
+        if meta.get("condition_met"):
+            self._continuation.met = (meta["condition_met"], self.steps)
+        if "ledger" in arrays:  # a state without a ledger starts a new one
+            self.ledger.from_array(arrays["ledger"], meta["ledger"], arrays.get("frame_times"))
+            self._warnings.kinds = set(self._notes(self.ledger.rows))
 
     @property
     @exclusive
@@ -232,9 +249,10 @@ class Simulation(ReadOnlySettings):
     @property
     def met_condition(self) -> str | None:
         """The condition that ended the last run, if the simulation is still at that step; "given" for a function."""
-        if self._met is None or self._met[1] != self.steps:
+        condition, step = self._continuation.met or (None, -1)
+        if step != self.steps:
             return None
-        return GIVEN if callable(self._met[0]) else str(self._met[0])
+        return GIVEN if callable(condition) else str(condition)
 
     @property
     @exclusive
@@ -247,14 +265,14 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.law, self._engine._current_table(self.state))
+        return ContactTable(self.state, self._engine.law, self._engine.table_of(self.state))
 
     @property
     @exclusive
     def walls(self) -> tuple[WallState, ...]:
         """The walls at `time`: position, velocity, force, impulse, work, number of contacts."""
         self._begin()
-        return wall_states(self._walls, self.state)
+        return wall_states(self._system.walls, self.state)
 
     @property
     @exclusive
@@ -263,8 +281,8 @@ class Simulation(ReadOnlySettings):
         follower = self._engine.cutoff
         now = "" if follower is None else follower.present(self._engine.state)
         present = {"dipoles cut-off now": now} if now else {}
-        if self._choices_at_start:
-            return self._choices_at_start | present
+        if self._origin.choices:
+            return self._origin.choices | present
         choices = {"start": self.origin} if self.origin else {}
         choices["boundary"] = self.box.describe()
         for force in self.forces:
@@ -289,8 +307,7 @@ class Simulation(ReadOnlySettings):
         """
         self._begin()
         row = self._log_row()
-        own = [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
-        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *own))
+        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.columns()))
         return {
             "force": self.grains.force.copy(),
             "torque": self.grains.torque.copy(),
@@ -356,17 +373,17 @@ class Simulation(ReadOnlySettings):
         Interrupted
             After Ctrl-C, SIGTERM, SIGUSR1, SIGUSR2, SIGHUP or SIGXCPU, when the checkpoint is written.
         """
-        if self._failure:
-            raise BadInput(f"this simulation cannot continue: {self._failure}")
+        last = self._continuation
+        if last.failure:
+            raise BadInput(f"this simulation cannot continue: {last.failure}")
         if self._clock.runs:
             raise BadInput("this simulation runs already; an updater or observer cannot call run")
-        if self._changing:
+        if "change" in self._exclusive:
             raise BadInput("run within `with sim.change()` is not possible; end the block first")
         criteria = stop_criteria(until, steps, stop, self.time, self.steps, self.planned)
-        end, _, condition = criteria
-        if condition is not None and not isinstance(condition, OwnCondition):
-            condition.check(self.ledger.columns)
-        self._chosen = chosen_cadence(self.time, end, self._chosen)
+        if isinstance(criteria.condition, Condition):
+            criteria.condition.check(self.ledger.columns)
+        last.chosen = chosen_cadence(self.time, criteria.time, last.chosen)
         try:
             with self._clock.run():
                 with self._clock.measure("start"):
@@ -374,18 +391,20 @@ class Simulation(ReadOnlySettings):
                     if self.writer:
                         self.writer.open(self, criteria)
                 with Signals() as signals:
+                    self._run = RunLoop(self, criteria, signals)
                     try:
-                        outcome = run_loop(self, criteria, signals, self._timer)
+                        outcome = self._run.run()
                         self._timer.record()
                     finally:
                         self._engine.restore_user_order()
-            return self._close(outcome, criteria)
+            return self._run.close(outcome)
         except FilesFailed as error:
             if self.writer:
                 self.writer.rescue()
-            self._failure = f"its files could not be written ({error}); continue with sand.resume, or start again"
+            last.failure = f"its files could not be written ({error}); continue with sand.resume, or start again"
             raise
         finally:
+            self._run = None
             if self.writer:
                 self.writer.release()
 
@@ -397,9 +416,9 @@ class Simulation(ReadOnlySettings):
         BadInput
             Outside of `act`.
         """
-        if not self._updating:
+        if self._run is None or not self._run.updates.acting:
             raise BadInput("stop ends a run from the act of an updater only; to end a run: run(until=…, stop=…)")
-        self._stops = True
+        self._run.updates.stops = True
 
     @contextlib.contextmanager
     def change(self) -> Iterator[Change]:
@@ -425,25 +444,22 @@ class Simulation(ReadOnlySettings):
             If grains do not exist, overlap or lie outside the box, no grain would remain, a quantity is out of range,
             a force has no column in the ledger, or the contact model differs; all problems at once.
         """
-        if self._failure:
-            raise BadInput(f"this simulation cannot be changed: {self._failure}")
-        if self._clock.runs and not self._updating:
+        if self._continuation.failure:
+            raise BadInput(f"this simulation cannot be changed: {self._continuation.failure}")
+        if self._clock.runs and not (self._run and self._run.updates.acting):
             raise BadInput("a simulation that runs can be changed by an updater only: Simulation(updaters=[…])")
-        if self._changing:
+        if "change" in self._exclusive:
             raise BadInput("a change within a change is not possible; make both in one block of `with sim.change()`")
         with self._exclusive.held("change"):
-            self._changing = True
-            try:
-                yield from self._change()
-            finally:
-                self._changing = False
+            yield from self._change()
 
     def _change(self) -> Iterator[Change]:
         """The change that the user makes, and its effect at the end of the block."""
         self._begin()
         present = tuple(as_chosen(force, self.start, self.box) for force in self.forces)
         pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
-        change = Change(self.grains, present, self.box, pair, self._next_id)
+        system = self._system
+        change = Change(self.grains, present, self.box, pair, system.next_id)
         yield change
         if change.is_of_own:
             own = change.checked_grains().arrays.own
@@ -452,16 +468,15 @@ class Simulation(ReadOnlySettings):
             if self.writer:
                 self.writer.changed(self)
             return
-        seed, fixed = int(self.seed or 0), (self.driven, self._walls)
-        engine, forces, driven = changed_engine(change, present, self._engine, self.ledger.columns, seed, *fixed)
+        fixed = int(self.seed or 0), self.driven, system.walls
+        engine, forces, driven = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
         before = self._log_row()["total"]
-        self._engine, self._next_id = engine, change._next_id
-        start = self.grains.copy()
-        for name, value in {"forces": forces, "box": change.box, "driven": driven, "start": start}.items():
-            object.__setattr__(self, name, value)
-        for text in truncation_warnings(self.grains, forces, change.box):
-            self._warn(text, text.partition(",")[0])
-        self._choices_at_start = {}  # chosen anew
+        self._engine = engine
+        start, box, next_id = self.grains.copy(), change.box, change._next_id
+        self._system = replace(system, start=start, forces=forces, box=box, driven=driven, next_id=next_id)
+        for text in truncation_warnings(self.grains, forces, box):
+            self._warnings.show(text, text.partition(",")[0])
+        self._origin.choices = {}  # chosen anew
         if change.regroups:  # the description of the grains in a case file no longer holds
             self.recipe = None
         engine.regular_state.lost[OUTSIDE] += before - self._log_row()["total"]
@@ -498,15 +513,12 @@ class Simulation(ReadOnlySettings):
 
         It has the state, the ledger and the settings of this one, but no observers, and writes no files.
         """
-        memo: dict[int, Any] = {}
+        memo: dict[int, Any] = {id(self.observers): []}
         other = object.__new__(type(self))
         for name, value in vars(self).items():
-            given = (
-                None if name in ("writer", "_measured") else [] if name == "observers" else copy.deepcopy(value, memo)
-            )
-            object.__setattr__(other, name, given)
+            left_out = name in ("writer", "_measured", "_run")
+            object.__setattr__(other, name, None if left_out else copy.deepcopy(value, memo))
         other._clock.end()  # of a simulation that runs, in an observer
-        object.__setattr__(other, "_updating", False)
         return other
 
     @exclusive
@@ -522,8 +534,8 @@ class Simulation(ReadOnlySettings):
             f"largest {row['largest_cluster']}",
             f"energy error {self.ledger.with_row(row).drift:.2g}",
         ]
-        if self._clock.stepping > 0.0 and self.steps:
-            parts.append(f"{self.steps / self._clock.stepping:.2g} steps/s")
+        if (seconds := self.wall_times["stepping"]) > 0.0 and self.steps:
+            parts.append(f"{self.steps / seconds:.2g} steps/s")
         return ", ".join(parts)
 
     def __repr__(self) -> str:
@@ -545,22 +557,7 @@ class Simulation(ReadOnlySettings):
     @property
     def warnings(self) -> list[str]:
         """Texts of the warnings about this run so far, also before it was resumed; each is shown once."""
-        return list(self._warned)
-
-    def _warn(self, text: str, about: str = "") -> None:
-        """Warn once of each text, and of one text that begins with `about`; of these the latest is kept."""
-        earlier = [k for k, one in enumerate(self._warned) if one == text or (about and one.startswith(about))]
-        if earlier:
-            self._warned[earlier[0]] = text
-            return
-        self._warned.append(text)
-        warn(text)
-
-    def _warn_of_engine(self) -> None:
-        while self._engine.warnings:
-            self._warn(self._engine.warnings.pop(0))
-        for about, text in extreme_warnings(self._engine.clock).items():
-            self._warn(text, about)
+        return list(self._warnings.texts)
 
     def _notes(self, rows: Sequence[dict[str, float]]) -> dict[str, str]:
         damped = any(isinstance(force, Contact) and force.damping != "none" for force in self.forces)
@@ -580,23 +577,7 @@ class Simulation(ReadOnlySettings):
         return self._measured
 
     def _log_row(self) -> dict[str, float]:
-        engine = self._engine
-        found = engine.losses().tolist(), self._cluster_numbers(), engine.body_motion()
-        energies = engine.contact_energies(), engine.force_energies()
-        row = log_row(self.state, *found, *energies, wall_columns(self._walls))
-        return dict.fromkeys(self.ledger.columns, 0.0) | row  # 0 for forces that a change left out
-
-    def _cluster_numbers(self) -> dict[str, float]:
-        """Numbers of clusters, found anew after contacts have formed or broken."""
-        state, engine = self.state, self._engine
-        key = (len(state.grains), *(int(state.count[k]) for k in (CONTACTS, MADE, BROKEN)))
-        if self._clusters[:2] != (engine, key):
-            self._clusters = engine, key, cluster_numbers(state)
-        return self._clusters[2]
-
-    def _count_row(self) -> dict[str, float]:
-        """The part of a row of the ledger that needs no energies."""
-        return count_row(self.state, self._cluster_numbers())
+        return self.ledger.row_of(self._engine)
 
     def _record_output(self, with_frame: bool = True) -> None:
         """Add a row to the ledger, write it, with a frame or without, and call the observers."""
@@ -605,40 +586,12 @@ class Simulation(ReadOnlySettings):
 
     def _write_output(self, with_frame: bool) -> None:
         row = self._log_row()
-        if not self.ledger.add(row):
+        if not self.ledger.add(row, with_frame):
             return
-        if with_frame:
-            self._frame_times.append(row["time"])
-        for about, text in grain_warnings(self.grains, self.forces).items():
-            if not any(one.startswith(about) for one in self._warned):
-                self._warn(text)
-        for kind, text in self._notes([self.ledger.rows[0], row]).items():
-            if kind not in self._notes_shown:
-                self._warn(text)
-                self._notes_shown.add(kind)
+        notes = grain_warnings(self.grains, self.forces) | self._notes([self.ledger.rows[0], row])
+        for kind, text in notes.items():
+            self._warnings.show_first(kind, text)
         if self.writer:
             self.writer.write(self, row, with_frame)
         for observer in self.observers:
             observer.see(self, row)
-
-    def _close(self, outcome: Outcome, criteria: StopCriteria) -> Result:
-        grains = self._engine.limiting_grains() if outcome.is_physics else ()
-        if outcome is Outcome.RUNAWAY:
-            grains = tuple(sorted(np.argsort(np.add(*kinetic_energies(self.grains)))[-2:].tolist()))
-        if outcome.is_physics:
-            self._record_output()
-        ledger = self.ledger.with_row(self._log_row())
-        self._warn_of_engine()
-        if is_mostly_awake(self):
-            self._warn("clusters were awake most of the time: clusters = 'grains' (sand.Verlet) costs no more")
-        if self.regular_state.count[LATE]:
-            self._warn("grains of two bodies overlapped before their touch was seen; halve step_fraction in [stepping]")
-        met = (self._stopped_by or criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
-        result = Result(outcome, self.steps, self.time, ledger.drift, grains, met)
-        if self.writer:
-            self.writer.close(self, result, ledger)
-        for observer in self.observers:
-            observer.close(self, result)
-        if outcome is Outcome.INTERRUPTED:
-            raise Interrupted(result)
-        return result

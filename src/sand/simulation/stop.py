@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from ..arguments import MOST_STEPS
+from ..basics.arguments import MOST_STEPS
+from ..basics.units import si, whole_number
 from ..errors import BadInput, shown
-from ..units import si, whole_number
 from .cadence import SHORTEST_DURATION, duration
 from .condition import GIVEN, Condition, OwnCondition, read_condition
 

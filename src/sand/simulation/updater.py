@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..arguments import objects_with
+from ..basics.arguments import objects_with
 from ..errors import BadInput, shown, warn
 from .cadence import Cadence, Schedule, read_cadence
 
@@ -81,23 +81,32 @@ def check_updaters(given: Any, updaters: Iterable[Updater], saved: Sequence[str]
 
 
 class UpdateSchedule:
-    """When the updaters of a run act, and their calls."""
+    """When the updaters of a run act, and their calls.
+
+    Attributes
+    ----------
+    is_near : bool
+        Whether the next step may pass the moment of an update, so that steps are taken one by one.
+    acting : bool
+        Whether an updater acts now.
+    stops : bool
+        Whether the updater that acts ends the run.
+    """
 
     def __init__(self, simulation: Simulation):
         self._simulation = simulation
+        self.acting = self.stops = False
         self._updaters = [(each, cadence_of(each)) for each in simulation.updaters]
-        self._is_near = False  # whether the next step reaches the moment of an update
-        self._schedules: list[Schedule] = []
+        self.is_near = False
+        self._schedules = [Schedule(None, 0.0)] * len(self._updaters)
         self._plan(range(len(self._updaters)))
 
     def _plan(self, which: Iterable[int]) -> None:
         """Find the next moment of updaters after the present regular state: a function of this state alone."""
         engine = self._simulation._engine
-        while len(self._schedules) < len(self._updaters):
-            self._schedules.append(Schedule(None, 0.0))
         for k in which:
             self._schedules[k] = Schedule(self._updaters[k][1], engine.regular_time, engine.steps)
-        self._is_near = False
+        self.is_near = False
 
     @property
     def step_due(self) -> float:
@@ -106,18 +115,13 @@ class UpdateSchedule:
 
     def limit(self, goal: float, most_steps: float) -> tuple[float, float]:
         """Time [s] and number of steps for the engine, given those of the output, that pass no update."""
-        if self._is_near:
+        if self.is_near:
             return goal, min(most_steps, 1)
         return min([goal, *(each.due for each in self._schedules)]), most_steps
 
     def approach(self, time: float) -> None:
         """Note that the next step would pass this time [s], which may be that of an update."""
-        self._is_near = self._is_near or time in [each.due for each in self._schedules]
-
-    @property
-    def is_near(self) -> bool:
-        """Whether the next step may pass the moment of an update, so that steps are taken one by one."""
-        return self._is_near
+        self.is_near = self.is_near or time in [each.due for each in self._schedules]
 
     def act(self) -> str:
         """Call the updaters that are due; returns the name of the first that ends the run, or "".
@@ -133,26 +137,26 @@ class UpdateSchedule:
 
     def act_again(self) -> str:
         """Call the updaters that have not acted at this step, because one raised an exception; returns as `act`."""
-        step, owed = self._simulation._owed
+        step, owed = self._simulation._continuation.owed
         return self._call(owed) if owed and step == self._simulation._engine.steps else ""
 
     def _call(self, due: list[int]) -> str:
         """Call these updaters; returns and raises as `act`."""
         simulation, ended = self._simulation, ""
         for number, k in enumerate(due):
-            updater, simulation._stops, simulation._updating = self._updaters[k][0], False, True
-            simulation._owed = (simulation._engine.steps, due[number:])
+            updater, self.stops, self.acting = self._updaters[k][0], False, True
+            simulation._continuation.owed = (simulation._engine.steps, due[number:])
             try:
                 found = updater.act(simulation)
             finally:
-                simulation._updating = False
+                self.acting = False
             if found is not None and not isinstance(found, bool):
                 raise BadInput(
                     f"{name_of(updater)}.act returned {shown(found)}; return True to end the run, or nothing"
                 )
-            if (found or simulation._stops) and not ended:
+            if (found or self.stops) and not ended:
                 ended = name_of(updater)
         if due:
-            simulation._owed = (-1, [])
+            simulation._continuation.owed = (-1, [])
             self._plan(due)
         return ended

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..constants import BOLTZMANN
+from ..basics.constants import BOLTZMANN
+from ..basics.units import format_quantity
 from ..contact.model import DAMPED_SPEED_GAIN, DEFAULT_DAMPING_RATIO
-from ..units import format_quantity
 
 HOT = 100.0
 """Internal kinetic energy per grain, in k_B T of the grains at the start, from which a run says so."""

@@ -42,11 +42,6 @@ class WallClock:
         return self._before + (time.monotonic() - self._began if self.runs else 0.0)
 
     @property
-    def stepping(self) -> float:
-        """Wall time of the steps [s]."""
-        return self._seconds["stepping"]
-
-    @property
     def parts(self) -> dict[str, float]:
         """Wall time of each part [s]; they sum to the total."""
         return self._seconds | {"other": max(self.total - sum(self._seconds.values()), 0.0)}

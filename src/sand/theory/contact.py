@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.material import Material, as_material
+from ..basics.units import si
 from ..contact import jkr
 from ..contact.dmt import tabor_parameter
 from ..contact.law import contact_constants, contact_periods
 from ..contact.mixing import MIXING, pairing_between
 from ..errors import BadInput, did_you_mean
-from ..material import Material, as_material
-from ..units import si
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.units import si
 from ..errors import BadInput, did_you_mean
-from ..units import si
 
 REMANENCE = 0.63
 """γ of Eq. 16, from the paper's simulations of accretional remanence."""

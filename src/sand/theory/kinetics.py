@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
-from ..constants import BOLTZMANN
+from ..basics.arguments import checked
+from ..basics.constants import BOLTZMANN
+from ..basics.units import si, si_array
 from ..errors import BadInput, did_you_mean
-from ..units import si, si_array
 from . import growth, magnetic
 
 SPEEDS = ("impact", "thermal")

@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..arguments import checked
-from ..constants import BOLTZMANN, MAGNETIC
+from ..basics.arguments import checked
+from ..basics.constants import BOLTZMANN, MAGNETIC
+from ..basics.units import si
+from ..basics.vectors import three
 from ..errors import BadInput
 from ..forces.pair import dipole_formulas as dipole
-from ..forces.vectors import three
-from ..units import si
 
 
 @checked

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..arguments import checked
-from ..constants import BOLTZMANN, MAGNETIC
+from ..basics.arguments import checked
+from ..basics.constants import BOLTZMANN, MAGNETIC
+from ..basics.material import Material, as_material
+from ..basics.units import si
 from ..errors import BadInput
-from ..material import Material, as_material
-from ..units import si
 
 ATTEMPT_TIME = 1e-9
 """τ₀ [s] of Néel relaxation, between 1e-11 and 1e-9 s in the literature."""

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..basics.arguments import checked
+from ..basics.units import si, si_array
 from ..errors import BadInput, SandError, did_you_mean, shown
-from ..units import si, si_array
 from .kinetics import KernelFunction
 from .size_distribution import COMPLETED, MASS_LOST, SIZE_REACHED, SizeDistribution
 

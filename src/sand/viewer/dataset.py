@@ -12,10 +12,10 @@ import numpy as np
 from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import own_label
 from ..analysis.tracking import SINGLE, Lineage
+from ..basics.paths import user_path
 from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
-from ..paths import user_path
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
 from ..version import __version__

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.ramps import ramps_of
+from ..basics.units import format_quantity
 from ..errors import BadInput
 from ..forces.external.magnetic_field import Field
 from ..io.run_folder import CASE, read_toml
 from ..numerics.vec import norm
-from ..ramps import ramps_of
-from ..units import format_quantity
 
 
 class FieldDescription(NamedTuple):

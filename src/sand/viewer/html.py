@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.fractal import FEWEST
+from ..basics.paths import user_path
 from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import replacing
-from ..paths import user_path
 from .dataset import RunDataset
 from .dimensions import Dimensions
 from .packets import compact_json

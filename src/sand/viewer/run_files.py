@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.ledger_columns import LedgerColumns
+from ..basics.paths import user_path
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_rows
-from ..paths import user_path
 
 STALE_AFTER = 3600.0
 """Seconds without a new frame after which a run without summary is reported as possibly killed."""

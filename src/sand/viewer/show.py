@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.ledger_columns import LedgerColumns
+from ..basics.paths import user_path
 from ..errors import BadInput
 from ..io.frame import Frame
 from ..io.frame_chunks import stored_frame
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import TRAJECTORY, VIEW
-from ..paths import user_path
 from ..plotting.run_figure import in_notebook
 from .browser import open_page
 from .dataset import RunDataset, run_dataset

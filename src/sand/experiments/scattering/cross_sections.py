@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ...arguments import checked
+from ...basics.arguments import checked
+from ...basics.units import si
 from ...errors import BadInput, warn
-from ...units import si
 from ..executors import results_of
 from .encounters import Flight
 from .flight_driver import BOUND, FAILED, HIT

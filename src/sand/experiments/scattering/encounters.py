@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...constants import MAGNETIC
+from ...basics.constants import MAGNETIC
+from ...basics.grains import Grains
 from ...forces.pair import dipole_formulas as dipole
-from ...grains import Grains
 from .flight_driver import Limits
 from .initial_conditions import InitialConditions
 from .two_aggregates import TWO_AGGREGATES, Aggregates, Body

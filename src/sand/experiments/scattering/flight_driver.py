@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853 as SCHEME
 
-from ...compiler.jit import kernel, loop, rare
-from ...integrate.runge_kutta import step_size_factor
+from ...compiler.jit import formula, kernel, loop, rare
 from ...numerics.vec import dot, norm
 from .initial_conditions import R, U, draw_path, vector_at
 from .two_spheres import Model
@@ -22,6 +21,8 @@ STAGES = SCHEME.n_stages
 """12 stages; the rates at the new state, number 13, are the first stage of the next step."""
 ORDER = 8.0
 """Order of the error estimate of a step."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+"""Step-size control: safety factor, smallest and largest ratio of successive steps."""
 HIT, MISS, BOUND, FAILED = range(4)
 """Ends of a flight: contact, escape, still together after the largest number of steps, state not finite."""
 RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
@@ -44,6 +45,14 @@ class Workspace(NamedTuple):
     error: np.ndarray  # (size,)
     zeros: np.ndarray  # (size,) zeros
     history: np.ndarray  # (rows, 1 + size) time and state after each of the first `rows` steps of the last flight
+
+
+@formula
+def step_size_factor(error):
+    """Ratio of the next step to this one: 0.9 err^(−1/8), limited to 0.2 … 5; 5 for err = 0."""
+    if error == 0.0:
+        return GROW
+    return min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / ORDER)))
 
 
 def allocate_workspace(size: int, rows: int = 0) -> Workspace:
@@ -153,7 +162,7 @@ def flight_of(model: Model) -> Callable:
             dt = min(dt, longest_step)
             error_ratio = trial_step(work, parameters, dt) / limits.tolerance
             if not error_ratio <= 1.0:
-                dt *= step_size_factor(error_ratio, ORDER)
+                dt *= step_size_factor(error_ratio)
                 if not dt > SMALLEST * first:
                     return FAILED, time, steps, closest, 0.0
                 continue
@@ -166,7 +175,7 @@ def flight_of(model: Model) -> Callable:
                 y[row] = new[row]
                 rate[0, row] = rate[STAGES, row]
             gap, time, steps = new_gap, time + dt, steps + 1
-            dt *= step_size_factor(error_ratio, ORDER)
+            dt *= step_size_factor(error_ratio)
             closest = min(closest, gap)
             record_step(work.history, steps, time, y)
             r, u = vector_at(y, R), vector_at(y, U)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ...basics.grains import Grains
+from ...basics.units import si
 from ...errors import BadInput
-from ...grains import Grains
-from ...units import si
 from .encounters import Flight
 from .flight_driver import HIT, RESULTS, allocate_workspace, flights_of
 from .initial_conditions import R, U

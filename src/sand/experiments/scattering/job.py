@@ -16,11 +16,11 @@ from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_to
 from ...io.table import GrowingTable, write_table
 from ...plotting.run_figure import save
 from ...simulation.run_writer import versions
-from .case import ScatterCase
 from .cross_sections import measure, seed_of
 from .encounters import Flight
 from .flights import COLUMNS, LARGEST_DRIFT, Trajectory, trajectory
 from .maps import probability_map
+from .scatter_case import ScatterCase
 
 POINTS = 1001
 """Number of rows of a trajectory in results.csv, equally spaced in time."""

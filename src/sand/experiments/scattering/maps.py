@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from ...arguments import checked
+from ...basics.arguments import checked
 from ...errors import BadInput, shown, warn
 from .cross_sections import rows_by_flight, run_flights, seed_of
 from .encounters import Flight

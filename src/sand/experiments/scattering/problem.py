@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ...arguments import checked
-from ...constants import BOLTZMANN
+from ...basics.arguments import checked
+from ...basics.constants import BOLTZMANN
+from ...basics.grains import Grains
+from ...basics.material import Material, as_material
+from ...basics.units import dimensions, format_quantity, in_unit, is_word, si
+from ...basics.vectors import three
 from ...errors import BadInput, ErrorCollector, did_you_mean
-from ...forces.vectors import three
-from ...grains import Grains
-from ...material import Material, as_material
 from ...theory.magnetic import thermal_speed
-from ...units import dimensions, format_quantity, in_unit, is_word, si
 from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 

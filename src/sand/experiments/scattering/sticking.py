@@ -10,11 +10,11 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
+from ...basics.grains import Grains
 from ...contact import jkr
 from ...contact.model import Contact
 from ...forces.external.magnetic_field import Field
 from ...forces.pair.dipoles import Dipoles
-from ...grains import Grains
 from ...simulation.simulation import Simulation
 from .encounters import Flight, body_of
 from .initial_conditions import R, U

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from ...arguments import checked
-from ...box import Box
-from ...errors import FORBID_EXTRA
-from ...grains import Grains
-from ...ramps import rampable
-from ..vectors import along_z
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import AlongZ, Settings
 from .formulas import UniformElectric, uniform_electric
 
 
 @checked
 @rampable("strength")
 @dataclass(frozen=True)
-class ElectricField:
+class ElectricField(Settings):
     """A uniform electric field: force q E, energy −q E·x.
 
     Parameters
@@ -31,20 +30,12 @@ class ElectricField:
         If `strength` is not one or three finite numbers in V/m; one line each.
     """
 
-    strength: Any
+    strength: Annotated[Any, AlongZ("V/m")]
 
-    __pydantic_config__ = FORBID_EXTRA
     name = "electric"
     references = "Jackson 1975"
     formula = staticmethod(uniform_electric)
     position_dependent = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "strength", along_z(self.strength, "V/m", "electric: strength"))
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        return {"strength": list(self.strength)}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings: no grain has a charge."""

@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from ...arguments import checked
-from ...box import Box
-from ...errors import FORBID_EXTRA, BadInput
-from ...grains import Grains
-from ...ramps import rampable
-from ..vectors import along_z, components
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import Reading, Settings
+from ...basics.vectors import along_z, components
+from ...errors import BadInput, shown
 from .formulas import UniformGravity, uniform_gravity
+
+
+def _downwards(value: Any, name: str) -> tuple[float, float, float]:
+    """Three components, or one magnitude along −z.  Raises BadInput."""
+    g = along_z(value, "m/s^2", name, direction=-1.0)
+    if components(value) is None and g[2] > 0.0:
+        raise BadInput(
+            f"{name} = {shown(value)} is a magnitude along −z and must be at least 0 m/s^2; "
+            "for another direction give three components"
+        )
+    return g
 
 
 @checked
 @rampable("acceleration")
 @dataclass(frozen=True)
-class Gravity:
+class Gravity(Settings):
     """A uniform acceleration: force m g, energy −m g·x.
 
     Parameters
@@ -31,27 +43,12 @@ class Gravity:
         If `acceleration` is not one or three finite numbers in m/s^2, or one number below 0; one line each.
     """
 
-    acceleration: Any
+    acceleration: Annotated[Any, Reading(_downwards, unit="m/s^2")]
 
-    __pydantic_config__ = FORBID_EXTRA
     name = "gravity"
     references = "Newton 1687"
     formula = staticmethod(uniform_gravity)
     position_dependent = True
-
-    def __post_init__(self) -> None:
-        given = self.acceleration
-        g = along_z(given, "m/s^2", "gravity: acceleration", direction=-1.0)
-        if components(given) is None and g[2] > 0.0:
-            raise BadInput(
-                f"gravity: acceleration = {given!r} is a magnitude along −z and must be at least 0 m/s^2; "
-                "for another direction give three components"
-            )
-        object.__setattr__(self, "acceleration", g)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        return {"acceleration": list(self.acceleration)}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """No warnings: every grain has a mass."""

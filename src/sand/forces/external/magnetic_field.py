@@ -4,38 +4,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Callable, Iterator, Set
+from dataclasses import dataclass
+from typing import Annotated, Any
 
-from ...arguments import checked
-from ...box import Box
-from ...errors import FORBID_EXTRA, BadInput, did_you_mean, shown
-from ...grains import Grains
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import force_at, forces_at_points, rampable, ramps_of
+from ...basics.settings import AlongZ, Direction, For, Number, Reading, Settings, Word
+from ...basics.units import si
+from ...errors import BadInput
 from ...numerics.vec import across, add, cross, dot, norm, scale, sub
-from ...ramps import force_at, forces_at_points, rampable, ramps_of
-from ...units import si
-from ..vectors import along_z, three
 from .formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
 
-SHAPES: dict[str, tuple[str, ...]] = {
-    "constant": (),
-    "oscillating": ("amplitude", "frequency", "phase"),
-    "rotating": ("amplitude", "frequency", "phase", "axis"),
-    "ramp": ("final", "start", "end"),
-}
-"""Time dependence of B, and the keys that each shape requires besides `flux_density`."""
-DEFAULTS = {"phase": 0.0, "start": 0.0}
-"""Defaults of optional keys."""
-EXPECTED = {
-    "flux_density": "one value along z or three components, in T, such as '1 mT', or 0",
-    "amplitude": "one value along z or three components, in T, such as '1 mT'",
-    "frequency": "oscillations or rotations per second, in Hz, such as '1 MHz'",
-    "axis": "three numbers, such as [0, 0, 1]",
-    "final": "one value along z or three components, in T, such as '1 mT'",
-    "end": "a time in s, such as '5 us'",
-}
-"""Description of each required value, for error messages."""
+_WAVE = "oscillating", "rotating"
+_ALONG_Z = "one value along z or three components, in T, such as '1 mT'"
 STEPS_PER_PERIOD = 200
 """Least number of steps in a period of the field."""
 STEPS_PER_RAMP = 100
@@ -56,31 +40,10 @@ def _frequency(value: Any, name: str) -> float:
     return si(value, "Hz", name, above=0.0)
 
 
-def _axis(value: Any, name: str) -> tuple[float, float, float]:
-    """Three numbers, not all 0; not normalised."""
-    axis = three(value, "1", name)
-    if axis == _ZERO:
-        raise BadInput(f"{name} = {value!r} has no direction; give three numbers, not all 0, such as [0, 0, 1]")
-    return axis
-
-
-READERS: dict[str, Callable[[Any, str], Any]] = {
-    "flux_density": lambda value, name: along_z(value, "T", name),
-    "amplitude": lambda value, name: along_z(value, "T", name),
-    "frequency": _frequency,
-    "phase": lambda value, name: si(value, "rad", name),
-    "axis": _axis,
-    "final": lambda value, name: along_z(value, "T", name),
-    "start": lambda value, name: si(value, "s", name),
-    "end": lambda value, name: si(value, "s", name),
-}
-"""Conversion of each key to SI."""
-
-
 @checked
 @rampable("flux_density", "amplitude")
 @dataclass(frozen=True)
-class Field:
+class Field(Settings):
     """A uniform magnetic flux density: torque μ×B(t), energy −μ·B(t) (Eqs. 40, 41).
 
     With B0 = `flux_density` and B1 = `amplitude`:
@@ -119,65 +82,37 @@ class Field:
         If a value is invalid or out of range, or the shape requires or does not use a key; one line each.
     """
 
-    flux_density: Any
-    shape: str = "constant"
-    amplitude: Any = None
-    frequency: Any = None
-    phase: Any = None
-    axis: Any = None
-    final: Any = None
-    start: Any = None
-    end: Any = None
+    flux_density: Annotated[Any, AlongZ("T")]
+    shape: Annotated[str, Word("constant", "oscillating", "rotating", "ramp")] = "constant"
+    amplitude: Annotated[Any, AlongZ("T"), For("shape", *_WAVE, needed=_ALONG_Z)] = None
+    frequency: Annotated[
+        Any,
+        Reading(_frequency, unit="Hz"),
+        For("shape", *_WAVE, needed="oscillations or rotations per second, in Hz, such as '1 MHz'"),
+    ] = None
+    phase: Annotated[Any, Number("rad"), For("shape", *_WAVE, default=0.0)] = None
+    axis: Annotated[Any, Direction(), For("shape", "rotating", needed="three numbers, such as [0, 0, 1]")] = None
+    final: Annotated[Any, AlongZ("T"), For("shape", "ramp", needed=_ALONG_Z)] = None
+    start: Annotated[Any, Number("s"), For("shape", "ramp", default=0.0)] = None
+    end: Annotated[Any, Number("s"), For("shape", "ramp", needed="a time in s, such as '5 us'")] = None
 
-    __pydantic_config__ = FORBID_EXTRA
     name = "field"
     references = "Dominik & Nübold 2002, Eqs. 40, 41"
 
-    def __post_init__(self) -> None:
-        shapes = list(SHAPES)
-        problems = []
-        used = tuple(READERS)  # for an unknown shape no key is reported as unused
-        if self.shape in shapes:
-            used = ("flux_density", *SHAPES[self.shape])
-        else:
-            problems.append(f"field: shape = {self.shape!r}; {did_you_mean(str(self.shape), shapes)}")
-        for key, read in READERS.items():
-            given = getattr(self, key)
-            if given is None and self.shape in shapes and key in used:
-                given = DEFAULTS.get(key)
-                if given is None:
-                    problems.append(f"field: {key} is missing: shape = '{self.shape}' needs {EXPECTED[key]}")
-            elif given is not None and key not in used:
-                problems.append(self._unused(key))
-                continue
-            try:
-                object.__setattr__(self, key, None if given is None else read(given, f"field: {key}"))
-            except BadInput as error:
-                problems += error.problems
-        if problems := problems or self._inconsistencies():
-            raise BadInput(problems)
-
-    def _unused(self, key: str) -> str:
-        """The error message for a key that belongs to other shapes."""
-        others = " or ".join(f"'{shape}'" for shape, keys in SHAPES.items() if key in keys)
-        return (
-            f"field: {key} = {shown(getattr(self, key))} is not used by shape = '{self.shape}'; leave it out, "
-            f"or give shape = {others}"
-        )
-
-    def _inconsistencies(self) -> list[str]:
-        """Error messages for keys that are valid by themselves but contradict each other."""
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """A ramp that ends before its start, and an amplitude along the axis."""
+        if wrong:
+            return
         if self.shape == "ramp" and not self.end > self.start:
-            return [f"field: end = {self.end!r} must be after start = {self.start!r}, in s"]
+            yield f"end = {self.end!r} must be after start = {self.start!r}, in s"
         if self.shape == "rotating":
             n, amplitude = self._normal(), self.amplitude
             if abs(dot(amplitude, n)) > MAX_COSINE * norm(amplitude):
                 across_axis = ", ".join(f"{b:.9g}" for b in across(amplitude, n))
-                return [
-                    f"field: amplitude = {list(amplitude)} must be perpendicular to axis = {list(self.axis)}; "
+                yield (
+                    f"amplitude = {list(amplitude)} must be perpendicular to axis = {list(self.axis)}; "
                     f"its component perpendicular to the axis is [{across_axis}] T"
-                ]
-        return []
+                )
 
     def _normal(self) -> tuple[float, float, float]:
         """Unit vector along the axis."""
@@ -195,8 +130,7 @@ class Field:
 
     def parameters(self) -> dict[str, Any]:
         """Settings of the shape in SI units, as in a case file; for a constant field its flux density alone."""
-        given = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items() if v is not None}
-        return given if self.time_dependent else {"flux_density": given["flux_density"]}
+        return {k: v for k, v in super().parameters().items() if self.time_dependent or k != "shape"}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings: no grain has a moment."""

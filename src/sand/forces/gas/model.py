@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterator, Set
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
-from ...arguments import checked
-from ...box import Box
-from ...constants import BOLTZMANN, LIGHT
-from ...errors import FORBID_EXTRA, BadInput
-from ...grains import Grains
-from ...ramps import rampable
-from ...units import MELTED, format_quantity, si
-from ..vectors import three
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import BOLTZMANN, LIGHT
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import Flag, Number, Settings, Vector
+from ...basics.units import MELTED, format_quantity
 from . import drag as law
-from .loops import GasParameters, shortest_stopping_time
+from .gas_loops import GasParameters, shortest_stopping_time
 
 MIN_KNUDSEN = 10.0
 """Least mean free path in radii for free molecular flow."""
@@ -30,7 +30,7 @@ underestimates drag by 6 % (specular reflection) or 4 % (diffuse reflection)."""
 @checked
 @rampable("temperature", "density", "pressure", "accommodation", "wind")
 @dataclass(frozen=True)
-class Gas:
+class Gas(Settings):
     """A rarefied gas: drag (Epstein) and Brownian motion of every grain.
 
     Grains do not influence the gas around other grains. Valid for radii much smaller than the mean free path of the
@@ -66,56 +66,25 @@ class Gas:
         If a parameter is out of range, or both or neither of density and pressure are given; one line each.
     """
 
-    temperature: Any
-    density: Any = None
-    pressure: Any = None
-    molecule_mass: Any = law.NEBULA_MOLECULE * law.ATOMIC_MASS
-    accommodation: Any = 1.0
-    brownian: bool = True
-    wind: Any = (0.0, 0.0, 0.0)
-    cross_section: Any = None
+    temperature: Annotated[Any, Number("K", above=0.0)]
+    density: Annotated[Any, Number("kg/m^3", above=0.0)] = None
+    pressure: Annotated[Any, Number("Pa", above=0.0)] = None
+    molecule_mass: Annotated[Any, Number("kg", above=0.0)] = law.NEBULA_MOLECULE * law.ATOMIC_MASS
+    accommodation: Annotated[Any, Number(least=0.0, most=1.0)] = 1.0
+    brownian: Annotated[bool, Flag()] = True
+    wind: Annotated[Any, Vector("m/s")] = (0.0, 0.0, 0.0)
+    cross_section: Annotated[Any, Number("m^2", above=0.0)] = None
 
-    __pydantic_config__ = FORBID_EXTRA
     name = "gas"
     references = "Epstein 1924; Uhlenbeck & Ornstein 1930; Salmon et al. 2011"
 
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        units = {"temperature": "K", "molecule_mass": "kg"}
-        optional = {"density": "kg/m^3", "pressure": "Pa", "cross_section": "m^2"}
-        units |= {key: unit for key, unit in optional.items() if getattr(self, key) is not None}
-        for key, unit in units.items():
-            try:
-                object.__setattr__(self, key, si(getattr(self, key), unit, f"gas: {key}", above=0.0))
-            except BadInput as error:
-                problems += error.problems
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """Density and pressure, of which one is given; molecules faster than light."""
         if (self.density is None) == (self.pressure is None):
             which = "neither" if self.density is None else "both"
-            problems.append(f"gas: give either the density in kg/m^3 or the pressure in Pa; {which} is given")
-        given = self.accommodation
-        try:
-            object.__setattr__(self, "accommodation", si(given, "1", "gas: accommodation", least=0.0))
-            if self.accommodation > 1.0:
-                problems.append(f"gas: accommodation = {given!r} is a fraction of the molecules and must be at most 1")
-        except BadInput as error:
-            problems += error.problems
-        if not isinstance(self.brownian, bool):
-            problems.append(f"gas: brownian = {self.brownian!r} must be true or false")
-        try:
-            object.__setattr__(self, "wind", three(self.wind, "m/s", "gas: wind"))
-        except BadInput as error:
-            problems += error.problems
-        if not problems and law.mean_speed(BOLTZMANN * self.temperature, self.molecule_mass) >= LIGHT:
-            problems.append(
-                f"gas: temperature = {self.temperature:g} K: the mean speed of its molecules would exceed that of light"
-            )
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file; of density and pressure the one given."""
-        given = {key: value for key, value in asdict(self).items() if value is not None}
-        return given | {"wind": list(self.wind)}
+            yield f"give either the density in kg/m^3 or the pressure in Pa; {which} is given"
+        elif not wrong and law.mean_speed(BOLTZMANN * self.temperature, self.molecule_mass) >= LIGHT:
+            yield (f"temperature = {self.temperature:g} K: the mean speed of its molecules would exceed that of light")
 
     def numbers(self) -> GasParameters:
         """Run-time parameters of the kernels."""

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
-from ...box import Box
-from ...errors import FORBID_EXTRA, BadInput, did_you_mean, shown
-from ...grains import Grains
-from ...units import format_quantity, is_word, si
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.settings import Number, Settings, Word
+from ...basics.units import format_quantity, is_word
+from ...errors import BadInput
 from .dipole_formulas import Cutoff
 
-CUTS = ("smooth", "sharp")
 SHELL = 0.2
 """Width of the outer shell in which a smooth cut-off switches the interaction off, in units of the cut-off radius."""
 SHARP = 1e15
@@ -40,37 +39,35 @@ def cutoff_for(radius: float | None, cut: str) -> Cutoff:
     return Cutoff(radius**2, 1.0 / (radius**2 - inner**2))
 
 
-class CutoffForce:
+class _Radius(Number):
+    """A radius [m], "auto", or None, in case files "none"."""
+
+    def read(self, value: Any, name: str) -> Any:
+        """The radius."""
+        return None if value is None or is_word(value, "none") else super().read(value, name)
+
+    def write(self, value: Any) -> Any:
+        """The radius, as in a case file."""
+        return "none" if value is None else value
+
+
+CutoffRadius = Annotated[Any, _Radius("m", above=0.0, auto=True)]
+"""Type of a cut-off radius."""
+Cut = Annotated[str, Word("smooth", "sharp")]
+"""Type of the way in which an interaction ends."""
+
+
+class CutoffForce(Settings):
     """Base class of the long-range forces: their cut-off and its warnings.
 
-    Subclasses are frozen dataclasses with the fields `cutoff: Any = "auto"` and `cut: str = "smooth"`.
+    Subclasses are frozen dataclasses with the fields `cutoff: CutoffRadius = "auto"` and `cut: Cut = "smooth"`.
     """
 
-    cutoff: Any
-    cut: str
+    cutoff: CutoffRadius
+    cut: Cut
 
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str]
     no_effect: ClassVar[str]  # warning if no grain is subject to the force
-
-    def __post_init__(self) -> None:
-        problems = []
-        if not isinstance(self.cut, str) or self.cut not in CUTS:
-            problems.append(f"{self.name}: cut = {shown(self.cut)}; {did_you_mean(shown(self.cut), CUTS)}")
-        if self.cutoff is None or is_word(self.cutoff, "none"):  # "none" is the spelling of case files
-            object.__setattr__(self, "cutoff", None)
-        elif not is_word(self.cutoff, "auto"):
-            try:
-                object.__setattr__(self, "cutoff", si(self.cutoff, "m", f"{self.name}: cutoff", above=0.0))
-            except BadInput as error:
-                problems += error.problems
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        given = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-        return given | {"cutoff": "none" if self.cutoff is None else self.cutoff}
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings in SI units with the cut-off as a number or "none", for a run that is resumed."""
@@ -121,7 +118,7 @@ class CutoffForce:
             If a setting is invalid or has no effect in this box.
         """
         choice = self.choose(grains, box)
-        if choice.radius is None and self.cut != CUTS[0]:
+        if choice.radius is None and self.cut != "smooth":
             raise BadInput(
                 f"{self.name}: cut = {self.cut!r} has no effect without a cut-off ({choice.reason}); "
                 "give cutoff, or leave cut out"

@@ -4,19 +4,19 @@ Sums over all pairs use Newton's third law.  In the Verlet list each pair is in 
 row is an independent sum that vectorises.
 """
 
-import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...box import nearest_image
+from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
+from ...compiler.recipes import factory
 from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, load, put, sub
 from .dipole_formulas import pair_load, pair_load_cut
 from .dipole_rates import pair_rates
-from .loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
+from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
 
 MAX_REMAINDER = 3
 """Remaining pairs of a row up to which scalar arithmetic is faster than a partly filled SIMD vector."""
@@ -146,7 +146,7 @@ def cut_pair(position1, position2, span, moment1, moment2, parameters, real):
     return pair_load_cut(apart, moment1, moment2, k, parameters.cutoff)
 
 
-@functools.cache
+@factory
 def listed_block_of(pair_loads: Callable) -> Callable:
     """The loop over a block of list rows; each row is the sum over the neighbours of one grain.
 
@@ -187,7 +187,7 @@ def listed_block_of(pair_loads: Callable) -> Callable:
     return block
 
 
-@functools.cache
+@factory
 def rows_of(pair_loads: Callable) -> Callable:
     """The loop over the rows first…last − 1 (uint64) of the triangle of all pairs j < i, each pair once.
 
@@ -246,7 +246,7 @@ def add_blocks_and_torques(grains, long_range, span, parameters):
     add_torques(grains, long_range, span, parameters)
 
 
-@functools.cache
+@factory
 def all_pairs_block_of(pair_loads: Callable) -> Callable:
     """The loop over a block of the triangle of all pairs, which adds to two arrays of its own."""
     add_rows = rows_of(pair_loads)

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...arguments import checked
-from ...box import Box
-from ...constants import BOLTZMANN, MAGNETIC
-from ...grains import Grains
-from ...ramps import rampable
-from ...units import format_quantity
-from .cutoff import HALF_BOX_RATIO, CutoffChoice, cutoff_for
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import BOLTZMANN, MAGNETIC
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import Word
+from ...basics.units import format_quantity
+from .cutoff import HALF_BOX_RATIO, Cut, CutoffChoice, CutoffRadius, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
 from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParameters
 from .ewald import degree_for, ewald_parameters
 from .ewald_fit import DIPOLES, Sources
-from .ewald_force import DEFAULT_ACCURACY, EwaldForce
+from .ewald_force import DEFAULT_ACCURACY, PERIODIC, Accuracy, Boundary, EwaldForce, Reciprocal
 from .ewald_loops import EwaldParameters, MeshEwaldParameters, ewald_sums
-from .loops import LongRangeSums
+from .long_range_loops import LongRangeSums
 from .tree import TREE_FROM, TreeChoice, choose_tree, tree_parameters
 from .tree_loops import TREE, TreeParameters
 
@@ -91,13 +92,13 @@ class Dipoles(EwaldForce):
         axis, `open` or `cut` have no effect in the box, or an Ewald sum would need too many wave vectors and nodes.
     """
 
-    cutoff: Any = "auto"
-    cut: str = "smooth"
-    periodic: str = "nearest image"
-    open: str = "auto"
-    accuracy: Any = DEFAULT_ACCURACY
-    boundary: str = "tin-foil"
-    reciprocal: str = "auto"
+    cutoff: CutoffRadius = "auto"
+    cut: Cut = "smooth"
+    periodic: Annotated[str, Word(*PERIODIC)] = "nearest image"
+    open: Annotated[str, Word("auto", "pairs", "tree")] = "auto"
+    accuracy: Accuracy = DEFAULT_ACCURACY
+    boundary: Boundary = "tin-foil"
+    reciprocal: Reciprocal = "auto"
 
     name: ClassVar[str] = "dipoles"
     no_effect: ClassVar[str] = "dipoles are switched on but no grain has a magnetic moment"

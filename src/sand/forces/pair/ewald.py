@@ -20,12 +20,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...box import Box
+from ...basics.box import Box
 from ...errors import BadInput
 from ...numerics.simd import padded_size
 from .ewald_fit import DIPOLES, Sources, erfc, fitted
 from .ewald_loops import UNUSED, Buffers, EwaldParameters, MeshEwaldParameters, Waves
-from .loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
+from .long_range_loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
 from .mesh import MOST_NODES, mesh_errors, mesh_sums, new_mesh, nodes_for, widest_cells
 from .mesh_loops import ORDERS
 

@@ -11,15 +11,15 @@ Q is the net charge; its uniform background, of charge −Q, gives the last term
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 
 from ...compiler.jit import formula, loop
+from ...compiler.recipes import factory
 from ...numerics.vec import accrue, dot
 from .ewald_formulas import real_part_of_charges
 from .ewald_loops import with_waves
 from .generic_loops import ZERO, sums_of
-from .loops import LongRangeSums, all_blocks
+from .long_range_loops import LongRangeSums, all_blocks
 from .mesh_loops import MESH_CHARGES, add_mesh_forces, mesh_rounds, remove_self_waves
 
 
@@ -46,7 +46,7 @@ def with_mesh_potential(potential, parameters, i):
     return potential - parameters.mesh.field[0, i]
 
 
-@functools.cache
+@factory
 def add_energies_of(with_reciprocal: Callable) -> Callable:
     """The loop that adds ½ q (reciprocal part of φ, less that of the own charge, with that of the background) [J]."""
 
@@ -62,7 +62,7 @@ def add_energies_of(with_reciprocal: Callable) -> Callable:
     return add_energies
 
 
-@functools.cache
+@factory
 def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0) -> LongRangeSums:
     """The loops of charges, with a polynomial of this degree, over the pairs of the Verlet list or over all pairs.
 

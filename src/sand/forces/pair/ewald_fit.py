@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ...constants import COULOMB, MAGNETIC
+from ...basics.constants import COULOMB, MAGNETIC
 
 erfc = np.vectorize(math.erfc, otypes=[float])
 """Complementary error function; the one of SciPy, which is slow to import, is not faster here."""

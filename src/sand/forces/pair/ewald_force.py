@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import fields, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from ...box import Box
-from ...errors import BadInput, ErrorCollector, did_you_mean, shown
-from ...grains import Grains
-from ...units import si
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.settings import Number, Word
+from ...errors import BadInput, ErrorCollector, shown
 from .cutoff import CutoffChoice, CutoffForce
 from .ewald import EwaldChoice, choose_ewald, sides
 from .ewald_fit import Sources
 from .tree import ACCURACIES as TREE_ACCURACIES
 
 PERIODIC = ("nearest image", "ewald")
-AUTO = "auto", *PERIODIC
-"""With a choice by box and cut-off."""
-BOUNDARIES = ("tin-foil", "vacuum")
-RECIPROCALS = ("auto", "direct", "mesh")
-OPEN = ("auto", "pairs", "tree")
-ACCURACIES = 1e-8, 0.1
-"""Smallest and largest accuracy of an Ewald sum."""
+Accuracy = Annotated[Any, Number(least=1e-8, most=0.1)]
+"""Type of the accuracy of an Ewald sum."""
+Boundary = Annotated[str, Word("tin-foil", "vacuum")]
+"""Type of what surrounds the images of an Ewald sum."""
+Reciprocal = Annotated[str, Word("auto", "direct", "mesh")]
+"""Type of the way in which the reciprocal part of an Ewald sum is computed."""
 DEFAULT_ACCURACY = 1e-3
 SMALLEST_RADIUS = 6.0
 """Smallest radius of the real part of an Ewald sum, in radii of the largest grain, if the box allows it."""
@@ -30,9 +30,9 @@ SMALLEST_RADIUS = 6.0
 class EwaldForce(CutoffForce):
     """A long-range force with the fields `periodic`, `accuracy` and `boundary` beside those of `CutoffForce`.
 
-    Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, or "auto", `accuracy: Any =
-    DEFAULT_ACCURACY`, `boundary: str = "tin-foil"` and `reciprocal: str = "auto"`; with `open: str = "auto"` if there
-    is a tree.
+    Subclasses are frozen dataclasses with `periodic`, by default "nearest image" or "auto", `accuracy: Accuracy =
+    DEFAULT_ACCURACY`, `boundary: Boundary = "tin-foil"` and `reciprocal: Reciprocal = "auto"`; with `open`, "auto" by
+    default, if there is a tree.
 
     periodic = "auto" is the Ewald sum in a box that is periodic along all axes if neither `cutoff` nor `cut` is given
     and the sum is possible, else nearest images, or all pairs in an open box.
@@ -46,66 +46,43 @@ class EwaldForce(CutoffForce):
 
     sources: ClassVar[Sources]
 
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
-        words = (
-            ("periodic", self._periodic_words()),
-            ("boundary", BOUNDARIES),
-            ("reciprocal", RECIPROCALS),
-            ("open", OPEN),
-        )
-        for name, allowed in words:
-            value = getattr(self, name)
-            if value not in allowed:
-                errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
-        accuracy = errors.take(si, self.accuracy, "1", f"{self.name}: accuracy", least=ACCURACIES[0])
-        if accuracy is not None:
-            object.__setattr__(self, "accuracy", accuracy)
-            if accuracy > ACCURACIES[1]:
-                errors.problems.append(f"{self.name}: accuracy = {accuracy:g} must be at most {ACCURACIES[1]:g}")
-            elif self.open == "tree" and accuracy < TREE_ACCURACIES[0]:
-                errors.problems.append(
-                    f"{self.name}: accuracy = {accuracy:g} must be at least {TREE_ACCURACIES[0]:g} with open = 'tree'; "
-                    "open = 'pairs' is exact"
-                )
-        errors.take(super().__post_init__)
-        errors.problems += self._contradictions()
-        errors.done()
-
-    def _contradictions(self) -> list[str]:
+    def contradictions(self, wrong: Set[str]) -> list[str]:
         """Settings that cannot be given together, or are not used; a misspelt word is not judged."""
-        problems, ewald = [], "periodic = 'ewald'"
+        problems: list[str] = []
+        ewald = "periodic = 'ewald'"
+        if not wrong & {"open", "accuracy"} and self.open == "tree" and self.accuracy < TREE_ACCURACIES[0]:
+            problems.append(
+                f"accuracy = {self.accuracy:g} must be at least {TREE_ACCURACIES[0]:g} with open = 'tree'; "
+                "open = 'pairs' is exact"
+            )
+        if "periodic" in wrong:
+            return problems
         if self.periodic == "ewald":
             for name in self._given("cutoff", "cut"):
                 problems.append(
-                    f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with {ewald}, "
+                    f"{name} = {shown(getattr(self, name))} cannot be given with {ewald}, "
                     "which sums all images and chooses the radius of its real part; leave one of them out"
                 )
             if self._given("open"):
                 problems.append(
-                    f"{self.name}: open = {shown(self.open)} is for open boxes and {ewald} for periodic ones; "
-                    "leave one of them out"
+                    f"open = {shown(self.open)} is for open boxes and {ewald} for periodic ones; leave one of them out"
                 )
-        elif self.periodic in self._periodic_words():
+        else:
             uses = {"boundary": ewald, "reciprocal": ewald}
-            if self.open != "tree":
+            if "open" in wrong or self.open != "tree":
                 uses["accuracy"] = f"{ewald} or open = 'tree'" if type(self).open == "auto" else ewald
             for name in self._given(*uses) if self.periodic != "auto" else ():
-                problems.append(f"{self.name}: {name} is used only with {uses[name]}; add that, or leave it out")
+                problems.append(f"{name} is used only with {uses[name]}; add that, or leave it out")
             for name in self._given(*uses) if self.periodic == "auto" and self._given("cutoff", "cut") else ():
                 given = " and ".join(self._given("cutoff", "cut"))
-                problems.append(f"{self.name}: {name} is used only by an Ewald sum, which has no {given}; leave it out")
-            for name in self._given("cutoff", "cut") if self._given("open") and self.open in OPEN else ():
+                problems.append(f"{name} is used only by an Ewald sum, which has no {given}; leave it out")
+            for name in self._given("cutoff", "cut") if self._given("open") and "open" not in wrong else ():
                 if getattr(self, name) is not None:
                     problems.append(
-                        f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with open = "
+                        f"{name} = {shown(getattr(self, name))} cannot be given with open = "
                         f"{shown(self.open)}, which sums all pairs; leave one of them out"
                     )
         return problems
-
-    def _periodic_words(self) -> tuple[str, ...]:
-        """Values of `periodic`."""
-        return AUTO if type(self).periodic == "auto" else PERIODIC
 
     def _given(self, *names: str) -> list[str]:
         """Of these fields the ones that differ from their defaults."""

@@ -16,15 +16,15 @@ Each column needs no other one, so that columns are shared among threads in bloc
 part of dipoles is summed by the pair loops of `dipole_loops`, that of charges in `ewald_charges`.
 """
 
-import functools
 import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from ...box import nearest_image
+from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
+from ...compiler.recipes import factory
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, add, cross, load, put, scale, sub
 from .dipole_formulas import pair_load
@@ -40,7 +40,7 @@ from .dipole_loops import (
     separation_if,
 )
 from .ewald_formulas import real_part
-from .loops import LongRangeSums, all_blocks, listed_blocks
+from .long_range_loops import LongRangeSums, all_blocks, listed_blocks
 from .mesh_loops import MESH_DIPOLES, Mesh, add_mesh_field, add_mesh_forces, mesh_rounds, remove_self_waves
 
 
@@ -128,7 +128,7 @@ def prepare_phases(grains, span, waves):
                 sine[axis, m, i] = sine[axis, m - 1, i] * c + cosine[axis, m - 1, i] * s
 
 
-@functools.cache
+@factory
 def column_loops(dipoles: bool) -> tuple[Callable, Callable]:
     """The loops before and after the waves of a column, of dipoles or of charges."""
 
@@ -175,7 +175,7 @@ def column_loops(dipoles: bool) -> tuple[Callable, Callable]:
     return begin_column, end_column
 
 
-@functools.cache
+@factory
 def wave_loops(dipoles: bool) -> tuple[Callable, Callable]:
     """The loops of the waves n_z = m and −m of a column, of dipoles or of charges."""
 
@@ -220,7 +220,7 @@ def wave_loops(dipoles: bool) -> tuple[Callable, Callable]:
     return structure_factors, add_wave_pair
 
 
-@functools.cache
+@factory
 def wave_block_of(dipoles: bool) -> Callable:
     """The loop over one block of columns, which computes forces, and flux densities or potentials."""
     (begin_column, end_column), (structure_factors, add_wave_pair) = column_loops(dipoles), wave_loops(dipoles)
@@ -258,7 +258,7 @@ def wave_block_of(dipoles: bool) -> Callable:
     return wave_block
 
 
-@functools.cache
+@factory
 def with_waves(begin_pairs: Callable, pair_block: Callable, blocks_of_pairs: Callable, dipoles: bool) -> tuple:
     """`begin`, `block` and `blocks` of `LongRangeSums` that sum waves, in the first blocks, and pairs."""
     wave_block = wave_block_of(dipoles)
@@ -322,7 +322,7 @@ def bare_pair(grains, span, parameters, i, j):
     return force, cross(moment1, b1), cross(moment2, b2)
 
 
-@functools.cache
+@factory
 def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
     """The loops of dipoles, with a polynomial of this degree, over the pairs of the Verlet list or over all pairs.
 

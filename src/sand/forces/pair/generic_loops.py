@@ -17,12 +17,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...box import nearest_image
+from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
+from ...compiler.recipes import factory
 from ...numerics.vec import accrue, axpy, dot, load, put, scale, sub
 from .dipole_formulas import cut_weight
 from .dipole_rates import cut_curvature
-from .loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
+from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -63,7 +64,7 @@ def packed_grain(packed, s):
     return PairGrain((packed[3, s], packed[4, s], packed[5, s]), packed[6, s], packed[7, s], packed[8, s])
 
 
-@functools.cache
+@factory
 def cut_pair(pair_formula: Callable, torques: bool) -> Callable:
     """The formula for the energy S U: force on a, torques on a and on b, and energy of a pair with its cut-off."""
 
@@ -105,7 +106,7 @@ def cut_rate(pair_formula: Callable, rate: Callable) -> Callable:
     return rate_of_pair
 
 
-@functools.cache
+@factory
 def pair_sums(pair_formula: Callable, rate: Callable | None, torques: bool, listed: bool) -> LongRangeSums:
     """The loops of one pair force.
 
@@ -130,7 +131,7 @@ def pair_sums(pair_formula: Callable, rate: Callable | None, torques: bool, list
     return sums_of(cut_pair(pair_formula, torques), torques, listed)._replace(rates=rates)
 
 
-@functools.cache
+@factory
 def sums_of(of_pair: Callable, torques: bool, listed: bool) -> LongRangeSums:
     """The loops, without rates, of one function of a pair, over all pairs or over the Verlet list.
 

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import COULOMB, GRAVITATION
+from ...basics.grains import Grains
+from ...basics.ramps import rampable
+from ...basics.settings import Word
+from ...basics.units import format_quantity
 from ...compiler.jit import formula
-from ...constants import COULOMB, GRAVITATION
-from ...errors import ErrorCollector
-from ...grains import Grains
 from ...numerics.vec import axpy, dot, scale
-from ...ramps import rampable
-from ...units import format_quantity
+from .cutoff import Cut, CutoffRadius
 from .ewald import degree_for, ewald_parameters, mean_field
 from .ewald_charges import ewald_charge_sums
 from .ewald_fit import CHARGES, Sources
-from .ewald_force import DEFAULT_ACCURACY, EwaldForce
-from .loops import LongRangeSums
+from .ewald_force import DEFAULT_ACCURACY, PERIODIC, Accuracy, Boundary, EwaldForce, Reciprocal
+from .long_range_loops import LongRangeSums
 from .pair_force import PairForce
 
 NEUTRAL = 1e-9
@@ -132,12 +134,12 @@ class Charges(EwaldForce, InverseSquare):
         axis, or an Ewald sum would need too many wave vectors and nodes.
     """
 
-    cutoff: Any = "auto"
-    cut: str = "smooth"
-    periodic: str = "auto"
-    accuracy: Any = DEFAULT_ACCURACY
-    boundary: str = "tin-foil"
-    reciprocal: str = "auto"
+    cutoff: CutoffRadius = "auto"
+    cut: Cut = "smooth"
+    periodic: Annotated[str, Word("auto", *PERIODIC)] = "auto"
+    accuracy: Accuracy = DEFAULT_ACCURACY
+    boundary: Boundary = "tin-foil"
+    reciprocal: Reciprocal = "auto"
 
     name: ClassVar[str] = "charges"
     no_effect: ClassVar[str] = "charges are switched on but no grain is charged"
@@ -151,15 +153,15 @@ class Charges(EwaldForce, InverseSquare):
     constant: ClassVar[float] = COULOMB
     sources: ClassVar[Sources] = CHARGES
 
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
-        errors.take(super().__post_init__)
-        if self.periodic != "nearest image" and self.boundary == "vacuum":
-            errors.problems.append(
-                f"{self.name}: boundary = 'vacuum' is for dipoles only: its energy depends on the total dipole moment "
+    def contradictions(self, wrong: Set[str]) -> list[str]:
+        """As for all Ewald sums; images in vacuum."""
+        problems = super().contradictions(wrong)
+        if not wrong & {"periodic", "boundary"} and self.periodic != "nearest image" and self.boundary == "vacuum":
+            problems.append(
+                "boundary = 'vacuum' is for dipoles only: its energy depends on the total dipole moment "
                 "of the charges in the box, which jumps when a charge crosses a wall; use 'tin-foil'"
             )
-        errors.done()
+        return problems
 
     def without_ewald(self, grains: Grains | None, box: Box) -> str:
         """Why there is no Ewald sum in this box; "" if there is one."""
@@ -222,8 +224,8 @@ class Attraction(InverseSquare):
         If a parameter is invalid; later, if the cut-off exceeds half the box.
     """
 
-    cutoff: Any = "auto"
-    cut: str = "smooth"
+    cutoff: CutoffRadius = "auto"
+    cut: Cut = "smooth"
 
     name: ClassVar[str] = "attraction"
     no_effect: ClassVar[str] = "attraction is switched on but no grain has a mass"

@@ -18,7 +18,6 @@ over its own grains, in a fixed order), transformed, and read.  Blocks depend on
 results: the bits are the same for any number of threads, and for any division into blocks.
 """
 
-import functools
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -26,10 +25,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.jit import formula, loop
+from ...compiler.recipes import factory
 from ...numerics.simd import SIMD_WIDTH
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
-from .loops import Round
+from .long_range_loops import Round
 
 ORDERS = 5, 6, 7, 8
 """Orders of the splines that are compared; at most `SIMD_WIDTH`."""
@@ -233,7 +233,7 @@ def _complex(spectrum: np.ndarray) -> np.ndarray:
     return spectrum.view(np.complex128)[..., 0]
 
 
-@functools.cache
+@factory
 def mesh_rounds(order: int, source: MeshSource) -> tuple[Round, ...]:
     """The rounds of a mesh sum with splines of this order, which set `mesh.force` and `mesh.field`.
 
@@ -335,7 +335,7 @@ def mesh_rounds(order: int, source: MeshSource) -> tuple[Round, ...]:
     )
 
 
-@functools.cache
+@factory
 def remove_self_waves(source: MeshSource) -> Callable:
     """The loop that removes a part of the interaction of a grain with itself through the mesh.
 

@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...box import Box
-from ...grains import Grains
-from ...ramps import forces_at_points
+from ...basics.box import Box
+from ...basics.grains import Grains
+from ...basics.ramps import forces_at_points
 from .cutoff import CutoffForce, cutoff_for
 from .generic_loops import PairGrain, PairParameters, pair_sums
-from .loops import LongRangeSums
+from .long_range_loops import LongRangeSums
 
 
 class PairForce(CutoffForce):

@@ -10,18 +10,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
-from ...arguments import checked
-from ...box import Box
+from ...basics.arguments import checked
+from ...basics.box import Box
+from ...basics.constants import COULOMB
+from ...basics.grains import Grains
+from ...basics.ramps import forces_at_points, rampable
+from ...basics.settings import Number
+from ...basics.units import format_quantity
 from ...compiler.jit import formula
-from ...constants import COULOMB
-from ...errors import ErrorCollector
-from ...grains import Grains
 from ...numerics.vec import dot, scale
-from ...ramps import forces_at_points, rampable
-from ...units import format_quantity, si
-from .cutoff import HALF_BOX_RATIO, CutoffChoice
+from .cutoff import HALF_BOX_RATIO, Cut, CutoffChoice, CutoffRadius
 from .pair_force import PairForce
 
 CUTOFF_LENGTHS = 10.0
@@ -79,22 +79,15 @@ class ScreenedCharges(PairForce):
         If a parameter is missing or invalid; later, if the cut-off exceeds half the box.
     """
 
-    screening_length: Any
-    cutoff: Any = "auto"
-    cut: str = "smooth"
+    screening_length: Annotated[Any, Number("m", above=0.0)]
+    cutoff: CutoffRadius = "auto"
+    cut: Cut = "smooth"
 
     name: ClassVar[str] = "screened_charges"
     no_effect: ClassVar[str] = "screened charges are switched on but no grain is charged"
     column: ClassVar[str] = "yukawa"
     references: ClassVar[str] = "Shukla & Eliasson 2009, Rev. Mod. Phys. 81, 25"
     formula = staticmethod(screened_coulomb)
-
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
-        length = errors.take(si, self.screening_length, "m", f"{self.name}: screening_length", above=0.0)
-        errors.take(super().__post_init__)
-        errors.done()
-        object.__setattr__(self, "screening_length", length)
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
         """Ten screening lengths, at least two grain diameters, at most `largest`."""

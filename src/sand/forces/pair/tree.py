@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...constants import MAGNETIC
+from ...basics.constants import MAGNETIC
 from ...numerics.simd import padded_size
-from .loops import PARALLEL_FROM
+from .long_range_loops import PARALLEL_FROM
 from .multipoles import LANES, tables
 from .tree_cells import LARGE_FROM, LEAF, MOST_BLOCKS, SOME_BLOCKS, Cells
 from .tree_loops import SOURCES, Scratch, TreeParameters

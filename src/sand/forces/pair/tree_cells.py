@@ -12,7 +12,7 @@ import numpy as np
 
 from ...compiler.jit import loop
 from ...numerics.vec import add, dot, load, put, scale, sub
-from .loops import PARALLEL_FROM
+from .long_range_loops import PARALLEL_FROM
 
 LEAF = 40
 """Most grains in a leaf."""

@@ -25,7 +25,7 @@ from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load
 from .dipole_loops import COPIES, MAX_REMAINDER, energy_shares, separation_if
 from .ewald_loops import bare_pair
-from .loops import LongRangeSums
+from .long_range_loops import LongRangeSums
 from .multipoles import LANES, Tables, add_shifted_expansion, complete
 from .tree_cells import Cells, build_cells, first_grain, levels_below, tree_blocks
 from .tree_operators import add_batch, add_far, clear, harmonics_at, set_offset, sum_moments

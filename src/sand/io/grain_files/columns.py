@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...arguments import MOST_GRAINS
+from ...basics.arguments import MOST_GRAINS
+from ...basics.units import in_unit
 from ...errors import BadInput
-from ...units import in_unit
 from .data import LENGTHS, NAMED, GrainData, GrainFile, data_of, known_as, numbers
 
 COMMENTS = "#%!"

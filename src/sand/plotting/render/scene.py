@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ...analysis.clusters import cluster_labels, cluster_sizes, unwrapped
-from ...box import Box
+from ...basics.box import Box
 from ..style import LARGEST_COLOURS, MUTED, OTHER_COLOURS, SINGLE_COLOUR, TEXT_COLOUR, format_si, rgb, round_length
 from .spheres import Spheres, render_spheres
 

@@ -1,0 +1,1 @@
+"""Ground of all packages: units, constants, checks of arguments, materials, box, grains, and the state as arrays."""

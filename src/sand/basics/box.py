@@ -1,0 +1,202 @@
+"""Simulation box: open or periodic along each axis, centred on the origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compiler.jit import formula
+from ..errors import BadInput, shown
+from .arguments import checked
+from .units import dimensions, exact_quantity, format_quantity, is_word, si, si_array
+
+ALL_PAIRS_UP_TO = 200
+"""Number of points up to which `Box.close_pairs` examines all pairs."""
+
+
+class Span(NamedTuple):
+    """Box for kernels: lengths L [m] and 1/L per axis, both 0 on an open axis."""
+
+    x: float
+    y: float
+    z: float
+    inverse_x: float
+    inverse_y: float
+    inverse_z: float
+
+
+@formula
+def nearest_image(v, span):
+    """Shortest periodic image of a separation v [m]; components along open axes are unchanged.
+
+    np.rint vectorises.  A component of exactly L/2 may get either sign.
+    """
+    return (
+        v[0] - span.x * np.rint(v[0] * span.inverse_x),
+        v[1] - span.y * np.rint(v[1] * span.inverse_y),
+        v[2] - span.z * np.rint(v[2] * span.inverse_z),
+    )
+
+
+@checked
+@dataclass(frozen=True, repr=False)
+class Box:
+    """Simulation box, created with `Box.open` or `Box.periodic`.
+
+    Parameters
+    ----------
+    lengths : tuple of float or None, optional
+        Length of each axis [m] > 0; None for an open axis.
+
+    Raises
+    ------
+    BadInput
+        If a length is not positive and finite.
+    """
+
+    lengths: tuple[float | None, float | None, float | None] = (None, None, None)
+
+    def __post_init__(self) -> None:
+        if not all(
+            length is None
+            or (isinstance(length, (int, float)) and not isinstance(length, bool) and 0.0 < length < float("inf"))
+            for length in self.lengths
+        ):
+            raise BadInput(f"lengths = {shown(self.lengths)} must be lengths in m or None; see sand.Box.periodic")
+
+    def __repr__(self) -> str:
+        given = [None if length is None else exact_quantity(float(length), "m") for length in self.lengths]
+        texts = ", ".join(map(repr, given[:1] if len(set(given)) == 1 else given))
+        return "Box.open()" if self.is_open else f"Box.periodic({texts})"
+
+    @classmethod
+    def open(cls) -> Box:
+        """Open box: free space."""
+        return cls()
+
+    @classmethod
+    @checked
+    def periodic(cls, x: Any, y: Any = "same", z: Any = "same") -> Box:
+        """Periodic box.
+
+        Parameters
+        ----------
+        x : float, str or None
+            Length along x [m] > 0, None or "open" for an open axis; by default also along y and z.
+        y, z : float, str or None, optional
+            Lengths along y and z [m] > 0; None or "open" for an open axis.
+
+        Returns
+        -------
+        Box
+            The box.
+
+        Raises
+        ------
+        BadInput
+            If a length is not positive or has a wrong unit.
+        """
+        y = x if isinstance(y, str) and y == "same" else y
+        z = x if isinstance(z, str) and z == "same" else z
+        lengths = tuple(
+            None if v is None or is_word(v, "open") else si(v, "m", f"box length {axis}", above=0.0)
+            for v, axis in zip((x, y, z), "xyz", strict=True)
+        )
+        return cls(lengths)  # type: ignore[arg-type]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether all axes are open."""
+        return all(v is None for v in self.lengths)
+
+    @property
+    def shortest(self) -> float:
+        """Length of the shortest periodic axis [m]; infinite in an open box."""
+        return min((v for v in self.lengths if v is not None), default=float("inf"))
+
+    @property
+    def volume(self) -> float:
+        """Volume [m³]; infinite if any axis is open."""
+        return float(np.prod([v if v is not None else np.inf for v in self.lengths]))
+
+    @property
+    def span(self) -> Span:
+        """The box as a tuple for kernels."""
+        return Span(
+            *(v if v is not None else 0.0 for v in self.lengths),
+            *(1.0 / v if v is not None else 0.0 for v in self.lengths),
+        )
+
+    def nearest(self, separation: np.ndarray) -> np.ndarray:
+        """Shortest periodic images of separations (…, 3) [m]."""
+        separation = si_array(separation, "m", "separation")
+        if not separation.ndim or separation.shape[-1] != 3:
+            raise BadInput(f"separation has shape {separation.shape} but must be (…, 3), in m")
+        return np.stack(nearest_image(np.moveaxis(separation, -1, 0), self.span), axis=-1)
+
+    def wrap(self, position: np.ndarray) -> np.ndarray:
+        """Positions (…, 3) [m] wrapped into −L/2 … L/2 on periodic axes."""
+        return self.nearest(position)
+
+    def image(self, position: np.ndarray) -> np.ndarray:
+        """Periodic image of each position (…, 3), int32: 1 where it is one length beyond the box, 0 on open axes."""
+        return np.rint(np.asarray(position) * np.array(self.span[3:])).astype(np.int32)
+
+    def close_pairs(self, position: np.ndarray, reach: float) -> np.ndarray:
+        """All pairs of points that are at most `reach` apart, by nearest images on periodic axes.
+
+        Parameters
+        ----------
+        position : ndarray
+            (N, 3) points [m].
+        reach : float
+            Distance [m], below half the shortest periodic axis.
+
+        Returns
+        -------
+        ndarray
+            (P, 2) indices i < j, sorted.
+        """
+        if len(position) <= ALL_PAIRS_UP_TO:
+            first, second = np.triu_indices(len(position), 1)
+            separation = self.nearest(position[first] - position[second])
+            return np.stack([first, second], axis=1)[(separation**2).sum(axis=1) <= reach**2]
+
+        pairs = self.tree(position).query_pairs(reach, output_type="ndarray")
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+    def tree(self, position: np.ndarray) -> Any:
+        """`scipy.spatial.cKDTree` of points (N, 3) [m], wrapped into 0 … L on periodic axes."""
+        from scipy.spatial import cKDTree  # slow import
+
+        lengths = np.array([0.0 if v is None else v for v in self.lengths])
+        wrapped = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)
+        wrapped = np.where((lengths > 0.0) & (wrapped >= lengths), 0.0, wrapped)  # np.mod(−1e-300, L) is L
+        return cKDTree(wrapped, boxsize=lengths)
+
+    def describe(self) -> str:
+        """Description in one line, for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
+        if self.is_open:
+            return "open"
+        return "periodic " + " x ".join("open" if v is None else format_quantity(v, "m") for v in self.lengths)
+
+
+def as_box(value: Any) -> Box:
+    """Box from a Box, a length, three lengths, or None for an open box.
+
+    Raises
+    ------
+    BadInput
+        If the value is none of these.
+    """
+    if isinstance(value, Box):
+        return value
+    if value is None:
+        return Box.open()
+    if isinstance(value, (list, tuple)) or dimensions(value) == 1:
+        if len(value) != 3:
+            raise BadInput(f'box = {shown(value)} must be one length or three; for an open axis give None or "open"')
+        return Box.periodic(*value)
+    return Box.periodic(value)

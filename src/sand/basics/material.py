@@ -1,0 +1,130 @@
+"""Materials of grains, and presets with values from the literature."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Set
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from ..errors import BadInput, did_you_mean, shown
+from .arguments import checked
+from .settings import Number, Settings, Word
+
+
+@checked
+@dataclass(frozen=True)
+class Material(Settings):
+    """Properties of one material. Numbers are in SI or text with a unit.
+
+    Parameters
+    ----------
+    name : str
+        Name in case files and tables.
+    density : float or str
+        Density ρ [kg/m³] > 0.
+    surface_energy : float or str or None
+        Energy γ of one free surface [J/m²] ≥ 0. None if there is no recommended value; a contact of such grains raises
+        BadInput.
+    young_modulus : float or str
+        Young's modulus E [Pa] > 0.
+    poisson_ratio : float or str
+        Poisson's ratio ν, −1 < ν ≤ 0.5.
+    rolling_limit : float or str, optional
+        Critical rolling displacement ξ_c [m] > 0, 10 Å by default (Dominik & Nübold 2002, A.5).
+    specific_moment : float or str, optional
+        Magnetic moment per mass [A m²/kg] ≥ 0, at saturation.
+    anisotropy : float or str, optional
+        Magnetic anisotropy K [J/m³]: of a uniaxial grain > 0, or the first cubic constant K₁ ≠ 0 of a cubic crystal. No
+        force depends on it or on the next two: with them SAND reports where moments fixed in the grains are no good
+        model (`sand.theory.magnetic_limits`).
+    exchange_stiffness : float or str, optional
+        Exchange stiffness A [J/m] > 0.
+    anisotropy_kind : str, optional
+        "uniaxial", energy per volume −K cos²θ from one easy axis: of a hexagonal crystal, or of an elongated grain with
+        its effective K. "cubic", K₁ (α₁²α₂² + α₂²α₃² + α₃²α₁²) with the direction cosines α: a round grain of a cubic
+        crystal.
+
+    Raises
+    ------
+    BadInput
+        If numbers are invalid; one line for each.
+    """
+
+    name: str
+    density: Annotated[Any, Number("kg/m^3", above=0.0)]
+    surface_energy: Annotated[Any, Number("J/m^2", least=0.0, none=True)]
+    young_modulus: Annotated[Any, Number("Pa", above=0.0)]
+    poisson_ratio: Annotated[Any, Number(above=-1.0, most=0.5)]
+    rolling_limit: Annotated[Any, Number("m", above=0.0)] = "10 angstrom"
+    specific_moment: Annotated[Any, Number("A m^2/kg", least=0.0)] = 0.0
+    anisotropy: Annotated[Any, Number("J/m^3")] = None
+    exchange_stiffness: Annotated[Any, Number("J/m", above=0.0)] = None
+    anisotropy_kind: Annotated[str, Word("uniaxial", "cubic")] = "uniaxial"
+
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """A K that the kind of anisotropy does not allow."""
+        k, kind = self.anisotropy, self.anisotropy_kind
+        if k is None or wrong & {"anisotropy", "anisotropy_kind"}:
+            return
+        if k == 0.0 or (k < 0.0 and kind == "uniaxial"):
+            allowed = "must be above 0 J/m^3" if kind == "uniaxial" else "must not be 0 J/m^3"
+            cubic = "; K1 of a cubic crystal may be negative: anisotropy_kind = 'cubic'" if k < 0.0 else ""
+            yield f"anisotropy = {k:g} {allowed} if it is {kind}{cubic}"
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus G = E / (2 (1 + ν)) [Pa]."""
+        return float(self.young_modulus / (2.0 * (1.0 + self.poisson_ratio)))
+
+    def but(self, **changes: Any) -> Material:
+        """Return a copy with some values changed: `sand.IRON.but(surface_energy="1 J/m^2")`."""
+        known = [f.name for f in dataclasses.fields(self)]
+        for key in changes:
+            if key not in known:
+                raise BadInput(f"a material has no '{key}'; {did_you_mean(key, known)}")
+        return dataclasses.replace(self, **changes)
+
+
+# Sources: DT97 = Dominik & Tielens 1997; Wada et al. 2007; the paper = Dominik & Nübold 2002.
+ICE = Material("ice", 1000.0, 0.10, 7.0e9, 0.25, rolling_limit=8e-10)
+"""Water ice, γ after Wada et al. (2007); DT97 use 0.37 J/m²."""
+SILICA = Material("silica", 2650.0, 0.025, 54.0e9, 0.17)
+"""Quartz or silica glass (DT97)."""
+GRAPHITE = Material("graphite", 2200.0, 0.075, 10.0e9, 0.32)
+"""Graphite (DT97)."""
+FORSTERITE = Material("forsterite", 3210.0, 0.07, 204.0e9, 0.24)
+"""Forsterite."""
+IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, "10 angstrom", 200.0, 4.8e4, 2e-11, "cubic")
+"""Iron (DT97), 200 A m²/kg as in the paper. K₁ (cubic) and A at room temperature are recalled from the literature, not
+read at the source: check them before you rely on the limits that follow."""
+MAGNETITE = Material("magnetite", 5200.0, None, 230.0e9, 0.26, "10 angstrom", 92.0, -1.1e4, 1.2e-11, "cubic")
+"""Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`. K₁ (cubic) and A
+at room temperature are recalled from the literature, as for iron."""
+
+PRESETS = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
+PRESETS["quartz"] = SILICA.but(name="quartz")
+
+
+def material_named(name: str) -> Material:
+    """Look up a preset by name (case ignored). Raises BadInput that suggests the nearest name."""
+    try:
+        return PRESETS[name.lower()]
+    except KeyError:
+        raise BadInput(f"unknown material '{name}'; {did_you_mean(name.lower(), list(PRESETS))}") from None
+
+
+def like_preset(preset: str, name: str) -> Material:
+    """Look up the preset from which a material `name` is derived. Raises BadInput if `name` is a different preset."""
+    found = material_named(preset)
+    if PRESETS.get(name.lower(), found).name != found.name:
+        raise BadInput(f"'{name}' is the name of a preset, but like = '{preset}'; choose another name")
+    return found
+
+
+def as_material(given: Any, name: str = "material") -> Material:
+    """Convert a Material or the name of a preset to a Material. Raises BadInput."""
+    found = material_named(given) if isinstance(given, str) else given
+    if not isinstance(found, Material):
+        raise BadInput(f"{name} = {shown(given)}; give a sand.Material or the name of a preset: {', '.join(PRESETS)}")
+    return found

@@ -1,0 +1,195 @@
+"""Compilation of all stages that a program lacks, side by side in several processes, before it runs.
+
+This process and its helpers (`helper`) go through one list of stages.  Each compiles into the cache what is not there
+and what no other process has begun: the locks of the cache say what has begun, so that any number of programs that
+start at once share the work.  A stage without a recipe, such as one with a formula of the user, is compiled by this
+process alone.  If there are no locks, or too little is missing, stages are compiled when they are first called.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import multiprocessing
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from multiprocessing import spawn
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from .jit import COMPILE_TIMES, COMPILED, cache_folder, compile_if_free, in_cache
+from .memory import free_memory
+from .program import before_first_calls
+from .progress import compile_times, making_code, shown_line
+from .recipes import NoRecipe, made_from, recipe_of
+from .stage import PythonStage, Stage
+from .table import Table, structure_of
+
+__all__ = ["compile_ahead", "compile_free", "kernel_from", "number_of_helpers", "share_compilation"]
+
+WORTH_HELPERS = 6.0
+"""Expected time [s] of compilation from which on helpers save time."""
+HELPER_BYTES = 4.5e8
+"""Memory that a helper needs (measured)."""
+LOOK = 0.05
+"""Wall time [s] between two looks whether other processes have compiled the last stages."""
+SHORTEST = 1.0
+"""Least time [s] that the line of progress announces."""
+PACKAGE = Path(__file__).parents[2]
+"""Folder that contains SAND."""
+COMMAND = "import sys; sys.path[:] = sys.argv[1:]; from sand.compiler.helper import main; main()"
+
+
+class Task(NamedTuple):
+    """A stage that is not compiled."""
+
+    kernel: tuple[Any, Any]  # numba's dispatcher, and the signature
+    seconds: float  # expected time of compilation
+    recipe: Any  # from which another process makes the kernel; None: only this process can
+
+
+_looked_at = set[Any]()
+"""Stages and types of parts that `compile_ahead` has seen in this process."""
+_is_one_of_several = [multiprocessing.parent_process() is not None]
+
+
+def share_compilation() -> None:
+    """Start no helpers in this process, one of several that share the cores and compile the same stages."""
+    _is_one_of_several[0] = True
+
+
+def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], processes: int) -> None:
+    """Compile what is missing of the stages of a program, if that takes long enough for several processes.
+
+    Parameters
+    ----------
+    stages : iterable of (Table, Stage, parameters)
+        The stages that a run may call.
+    processes : int
+        Most processes at work, this one included.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        After Ctrl-C; all helpers have ended then.
+    """
+    if not COMPILED:
+        return
+    tasks = _missing(stages)
+    total = sum(each.seconds for each in tasks)
+    if total < WORTH_HELPERS:
+        return
+    helpers = 0 if _is_one_of_several[0] else number_of_helpers(processes, total, max(each.seconds for each in tasks))
+    if not (helpers or _is_one_of_several[0]):
+        return
+    began = time.perf_counter()
+
+    def progress() -> str:
+        left = [each.seconds for each in tasks if not in_cache(*each.kernel)]
+        rest = max(total / (helpers + 1) - time.perf_counter() + began, 0.5 * sum(left) / (helpers + 1), SHORTEST)
+        return f"compiling {len(tasks) - len(left)} of {len(tasks)} stages, {rest:.0f} s left; done once"
+
+    with making_code, _helpers([each.recipe for each in tasks if each.recipe], helpers), shown_line(progress):
+        left = compile_free(each.kernel for each in tasks)
+        while left:
+            time.sleep(LOOK)
+            left = compile_free(left)
+
+
+def compile_free(kernels: Iterable[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
+    """Compile kernels into the cache; returns those that other processes compile now."""
+    taken = []
+    for each in kernels:
+        for check in before_first_calls:
+            check()
+        if not compile_if_free(*each):
+            taken.append(each)
+    return taken
+
+
+def _missing(stages: Iterable[tuple[Table, Stage | PythonStage, Any]]) -> list[Task]:
+    """Stages that are not compiled: first those that only this process can compile, then the longest."""
+    known, found = compile_times(COMPILE_TIMES), list[Task]()
+    for table, each, parameters in stages:
+        key = isinstance(each, Stage) and (each, each.key(table, parameters))
+        if not key or key in _looked_at:
+            continue
+        _looked_at.add(key)
+        if each.is_cached and not each.is_compiled(table, parameters):
+            kernel = each.to_compile(table.place, structure_of(parameters))
+            found.append(Task(kernel, known.get(each.purpose, each.seconds), _recipe(each, table, parameters)))
+    return sorted(found, key=lambda task: (task.recipe is not None, -task.seconds))
+
+
+def _recipe(each: Stage, table: Table, parameters: Any) -> Any:
+    """What another process makes the kernel of a stage from; None if it cannot."""
+    try:
+        places = {name: recipe_of(table.place(name)) for name in each.parts}
+        return {"stage": recipe_of(each), "places": places, "parameters": recipe_of(structure_of(parameters))}
+    except NoRecipe:
+        return None
+
+
+def kernel_from(recipe: Any) -> tuple[Any, Any]:
+    """Numba's dispatcher and the signature of a stage, from the recipes of the stage and of the types of its parts."""
+    places = {name: made_from(place) for name, place in recipe["places"].items()}
+    return made_from(recipe["stage"]).to_compile(places.__getitem__, made_from(recipe["parameters"]))
+
+
+def number_of_helpers(processes: int, total: float, longest: float) -> int:
+    """How many helpers shorten a compilation of so many seconds, `longest` of them for one stage.
+
+    With this process no more than `processes`, and no more than fit into the memory.
+    """
+    free, useful = free_memory(), min(processes, math.ceil(total / longest)) - 1
+    return max(useful if free is None else min(useful, int(free / HELPER_BYTES)), 0)
+
+
+@contextmanager
+def _helpers(recipes: list[Any], number: int) -> Iterator[None]:
+    """Helper processes in the block, which compile kernels; they end with it, and with this process."""
+    started = list[subprocess.Popen]()
+    text = json.dumps(recipes).encode() + b"\n"
+    try:
+        with contextlib.suppress(OSError):  # no further process can be started
+            for _ in range(number if recipes else 0):
+                started.append(_start())
+                threading.Thread(target=_send, args=(started[-1].stdin, text), daemon=True).start()
+        yield
+    finally:
+        for each in started:
+            each.kill()
+        for each in started:
+            each.wait()
+
+
+def _start() -> subprocess.Popen:
+    """Start a helper: a new interpreter that imports no file of the user, out of reach of Ctrl-C."""
+    script = getattr(sys.modules.get("__main__"), "__file__", None)
+    of_user = {"", os.getcwd(), os.path.dirname(os.path.abspath(script)) if script else ""}
+    path = [str(PACKAGE), *(each for each in sys.path if each not in of_user)]
+    flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
+    group: dict[str, Any] = {"process_group": 0}
+    if sys.platform == "win32":
+        group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    return subprocess.Popen(
+        [os.fsdecode(spawn.get_executable() or sys.executable), *flags, "-P", "-c", COMMAND, *path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"SAND_CACHE": str(cache_folder().parent)},
+        **group,
+    )
+
+
+def _send(pipe: Any, text: bytes) -> None:
+    """Send the recipes; the pipe stays open, for its end tells a helper that this process has ended."""
+    with contextlib.suppress(OSError):
+        pipe.write(text)
+        pipe.flush()

@@ -1,0 +1,70 @@
+"""Kinds of engines: what an integrator changes at the assembly of an engine besides its settings."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..contact.model import Contact
+from ..forces.base import ExternalForce, Force, LongRangeForce
+from ..forces.gas.model import Gas
+from ..integrate.integrator import Integrator
+from ..integrate.parts import StepParameters
+from ..neighbours.search import Neighbours
+from .driven import Driven
+from .engine import Engine
+from .walls import Wall
+
+KINDS = {"rigid-clusters": "rigid.assembly"}
+"""Modules of the integrators, by name, whose engines are not those of grains; each has a class `Kind`."""
+
+Build = Callable[[Sequence[Force], Neighbours], Engine]
+"""Builds an engine of the same grains with other forces, whose grains take contact steps."""
+
+
+class ForcesByType(NamedTuple):
+    """The forces of a simulation by type."""
+
+    contact: Contact | None
+    long_range: list[LongRangeForce]  # the forces that act on at least one grain
+    external: list[ExternalForce]
+    gas: list[Gas]  # at most one
+
+
+class Kind:
+    """An engine of grains."""
+
+    keeps_order = False
+    """Whether grains keep the order in which they were given."""
+
+    def check(
+        self, forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall], neighbours: Neighbours
+    ) -> list[str]:
+        """Refuse what such an engine cannot do, all problems at once (BadInput); returns warnings."""
+        return []
+
+    def pair_gap(self, grains: Grains, box: Box) -> float:
+        """Largest gap [m] of pairs whose approach limits the step."""
+        return float(grains.radius.min())
+
+    def limiting_steps(self, forces: ForcesByType) -> ForcesByType:
+        """The forces that limit the step."""
+        return forces
+
+    def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> Any:
+        """The run-time numbers of the integrator, with those that depend on forces and grains."""
+        return parameters.flight_limits
+
+    def complete(self, engine: Engine, forces: Sequence[Force], build: Build) -> None:
+        """Give an engine what such engines need besides those of grains."""
+
+
+def kind_of(stepping: Integrator) -> Kind:
+    """The kind of engine of an integrator."""
+    if stepping.name not in KINDS:
+        return Kind()
+    found: Kind = importlib.import_module(f".{KINDS[stepping.name]}", __package__).Kind()
+    return found

@@ -1,0 +1,476 @@
+"""Steps of rigid clusters: bodies take long steps, grains of awake clusters contact steps, quick bodies substeps."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import wraps
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from ...basics.arrays import SAVED_BODIES
+from ...basics.state import (
+    BODIES,
+    CONTACTS,
+    CYCLE,
+    LEFT,
+    LONG_RANGE_SUMS,
+    OUTSIDE,
+    QUIETING,
+    RESTED,
+    SLIPPED,
+    STAGE,
+    STEP,
+    STEPS,
+    TIME,
+    WOKEN,
+    State,
+)
+from ...compiler.stage import PythonStage, Stage
+from ...compiler.table import Table
+from ...contact.gather import resort_contacts_by_grain
+from ...integrate.parts import DT, Stop
+from ...integrate.rigid.awake_clusters import (
+    ClusterMeasures,
+    cluster_measures,
+    kick_clusters,
+    measure_clusters_stage,
+    store_rest,
+)
+from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
+from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
+from ...integrate.stages import finish_gas
+from ..engine import Engine, GrainSteps
+from ..part import MOVING, Part
+from .cluster_bodies import (
+    body_number,
+    describe_body,
+    form_bodies,
+    members,
+    rest_cluster,
+    rest_grain,
+    set_friction,
+    sort_members,
+)
+from .rigid_loads import may_stay_at_rest, rest_with_loads
+
+T = TypeVar("T")
+PERIODS = 10.0
+"""Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
+more than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
+SLIP_LOSSES = slice(1, 4)
+"""Rows of `ContactArrays.lost` that change when a contact slides, rolls or twists beyond a limit."""
+SPANS = (
+    "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
+    "rigid body, and takes contact steps all the time; use a larger box"
+)
+MOVING_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
+"""Arrays of bodies that change in a step."""
+
+
+class Substeps(Protocol):
+    """Substeps of quick bodies within a step of all bodies (`quick_bodies.QuickBodies`)."""
+
+    def drivers(self) -> list[tuple[Stage, Any]]:
+        """Stages of substeps, with their parameters."""
+
+    def take(self, engine: Engine) -> Stop:
+        """The first half of a step of all bodies, and the substeps of the quick ones; returns why they failed."""
+
+    def slow_loads(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and torques on all grains that did not act in the substeps."""
+
+
+def timed(method: Callable[[Any, Engine], T]) -> Callable[[Any, Engine], T]:
+    """Count the processor time of a method as work on awake clusters."""
+
+    @wraps(method)
+    def call(self: Any, engine: Engine) -> T:
+        began = time.thread_time()
+        try:
+            return method(self, engine)
+        finally:
+            engine.taken.seconds += time.thread_time() - began
+
+    return call
+
+
+@dataclass
+class BodySteps(GrainSteps):
+    """Steps of clusters at rest as rigid bodies.
+
+    The state of the engine is that of all grains.  While clusters are awake, their grains are copied to a part, which
+    takes contact steps; it begins anew in each step of the bodies, so that the state of all grains and the bodies
+    determine all that follows.
+
+    Attributes
+    ----------
+    awake : Part
+        The grains of awake clusters.
+    quick : Substeps or None
+        Substeps of quick bodies; None: no body takes any.
+    """
+
+    awake: Part
+    quick: Substeps | None = None
+    _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
+    _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
+    _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
+    _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
+    _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
+    _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+    _had_substeps: bool = field(init=False, default=False)  # of the present step
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> BodySteps:
+        """A copy whose parts have tables of their own."""
+        return BodySteps(copy.deepcopy(self.awake, memo), copy.deepcopy(self.quick, memo))
+
+    def for_part(self) -> BodySteps:
+        """As `GrainSteps.for_part`, without substeps."""
+        return BodySteps(self.awake.anew())
+
+    def drivers(self) -> list[tuple[Stage, Any]]:
+        """Stages of bodies; those of awake grains are the ones of all grains with other loops over pairs."""
+        quick = [] if self.quick is None else self.quick.drivers()
+        return [*super().drivers(), (advance_bodies, ()), (mark_near_bodies, ()), *quick]
+
+    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Stages of awake clusters."""
+        inner = self.awake.engine
+        own: list[tuple[Stage, Any]] = [
+            (measure_clusters_stage(inner.law), cluster_measures(1)),
+            (kick_clusters, (self._remainder,)),
+            (resort_contacts_by_grain, ()),
+        ]
+        own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
+        of_inner = inner.first_table()
+        return [(table, store_rest, ()), *inner.stages(of_inner), *((of_inner, *each) for each in own)]
+
+    def begin(self, engine: Engine) -> None:
+        """Make a body of each grain without contacts; clusters are awake."""
+        state = engine.regular_state
+        form_bodies(state)
+        self._list_awake(state)
+        if self._awake.size:  # the search for touches needs mass and inertia of awake clusters
+            present = self._take_awake(state)
+            self._vibrated = np.zeros(len(self._awake), bool)
+            self._measure_vibrations(engine)
+            for _, own in self._awake_clusters():
+                describe_body(state, self._awake[own], present.clusters.offset[:, own])
+        self.sum_outer_loads(engine)
+
+    def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """As `GrainSteps.with_missing`: a state without bodies, after a change, gets them with its loads."""
+        return {f"bodies/{name}": getattr(engine.regular_state.bodies, name) for name in SAVED_BODIES} | saved
+
+    def loaded(self, engine: Engine) -> None:
+        """As `GrainSteps.loaded`."""
+        state, gas = engine.regular_state, engine.parameters.gas.gas
+        self.sort_members(state)
+        if gas.on:
+            firsts, sizes = np.unique(state.bodies.first, return_counts=True)
+            for first in firsts[(sizes > 1) & (state.bodies.asleep[firsts] == 1)].tolist():
+                set_friction(state, gas, members(state, first))
+
+    def sort_members(self, state: State) -> None:
+        """Lists of the grains of each body, and of awake grains."""
+        sort_members(state)
+        self._list_awake(state)
+
+    def _list_awake(self, state: State) -> None:
+        """Lists of the grains of awake clusters, and of their contacts."""
+        awake = state.bodies.asleep == 0
+        self._awake, self._columns = np.flatnonzero(awake), contacts_of(state, awake)
+
+    def sum_outer_loads(self, engine: Engine) -> None:
+        """Sum the loads of all bodies on each other."""
+        state = engine.regular_state
+        sums = int(state.count[LONG_RANGE_SUMS])
+        state.count[STAGE], state.clock[STEP] = 1, 0.0
+        before = state.time
+        engine.run_driver(advance_bodies, -math.inf, state.steps + 1)
+        state.clock[TIME], state.count[LONG_RANGE_SUMS] = before, sums
+
+    def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
+        """Steps of all grains before the first step, else of bodies, quick bodies and awake clusters."""
+        state = engine.regular_state
+        if state.count[BODIES] == 0 or (state.count[STAGE] == 1 and state.clock[STEP] == 0.0):
+            return super().call(engine, until, last, shorten)
+        self._list_awake(state)  # of a copy of the state, or a loaded one
+        before: dict[str, np.ndarray] = {}
+        while True:
+            if self._awake.size and state.count[STAGE] == 0:
+                before = {name: array.copy() for name, array in _moving_arrays(state).items()}
+            stop = engine.run_driver(advance_bodies, until, last, shorten)
+            if stop is Stop.TOUCH_AHEAD:
+                self._wake(engine)
+            elif stop is Stop.AWAKE_STEPS:
+                failed = self._take_contact_steps(engine)
+                if failed is not Stop.NONE:
+                    self._return_to(before, state)
+                    return failed
+            elif stop is Stop.AWAKE_LOADS:
+                self._finish_step(engine)
+            elif stop is Stop.SUBSTEPS:
+                failed = self._take_substeps(engine)
+                if failed is not Stop.NONE:
+                    return failed
+                self._list_awake(state)
+            else:
+                return stop
+
+    @timed
+    def _take_substeps(self, engine: Engine) -> Stop:
+        """The first half of a step of all bodies, and the substeps of the quick ones; returns why they failed."""
+        assert self.quick is not None
+        failed = self.quick.take(engine)
+        self._had_substeps = failed is Stop.NONE
+        return failed
+
+    def _wake(self, engine: Engine) -> None:
+        """Wake all bodies that may touch, or the loads of whose contacts are near a limit."""
+        state, woken = engine.regular_state, False
+        bodies = state.bodies
+        for first in np.flatnonzero((bodies.near >= LOADED) & (bodies.asleep == 1)).tolist():
+            if bodies.near[first] == LOADED and may_stay_at_rest(state, engine.law, engine.table_of(state), first):
+                continue
+            bodies.asleep[members(state, first)] = 0
+            bodies.event[first] = bodies.vibration[first] = state.time
+            state.count[WOKEN] += 1
+            woken = True
+        if woken:
+            self.sort_members(state)
+
+    def _take_awake(self, state: State) -> State:
+        """The state of the awake grains, with contacts as they are and everything else as at a start."""
+        if self._measures.size.size != len(self._awake):
+            self._measures = cluster_measures(len(self._awake))
+            self._remainder = np.zeros((2, 3, len(self._awake)))
+        return self.awake.take(state, self._awake, self._columns)
+
+    @timed
+    def _take_contact_steps(self, engine: Engine) -> Stop:
+        """Contact steps of the awake grains for one step of the bodies."""
+        self._had_substeps = False
+        state = engine.regular_state
+        present, inner = self._take_awake(state), self.awake.engine
+        before, end = state.time, state.time + float(state.clock[STEP])
+        if engine.parameters.external_work.time_dependent:
+            # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
+            for outer in engine.external:
+                state.lost[OUTSIDE] += inner.external_energy(outer, end) - inner.external_energy(outer, before)
+        present.count[STAGE] = 1
+        present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
+        inner.drive(-math.inf, 1)
+        present.count[STEPS] = 0
+        self._kick_by_far_loads(state)
+        self._vibrated = np.zeros(len(self._awake), bool)
+        pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / _limits(engine).longest_awake)
+        for k in range(1, pieces):
+            stop = inner.drive(before + (end - before) * k / pieces, math.inf, shorten=True)
+            if stop is not Stop.TIME_REACHED:
+                break
+            self._measure_vibrations(engine)
+        else:
+            stop = inner.drive(end, math.inf, shorten=True)
+        if stop is not Stop.TIME_REACHED:
+            return stop
+        if engine.parameters.gas.gas.on:  # since their last kick, so that none is left for the next step
+            finish_gas.run(inner.table_of(present))
+        self._slipped = self._slips(state, present)
+        self.awake.give_back(state)
+        self._columns = self.awake.columns
+        return Stop.NONE
+
+    def _return_to(self, before: dict[str, np.ndarray], state: State) -> None:
+        """Return to the state at the start of a step, in whose contact steps something failed, and name the grains."""
+        for name, array in _moving_arrays(state).items():
+            array[...] = before[name]
+        self.sort_members(state)
+        self.awake.name_limiting(state)
+
+    def _measure_vibrations(self, engine: Engine) -> None:
+        """Measure awake clusters; notes the grains of those that vibrate too much to come to rest."""
+        measures, inner = self._measures, self.awake.engine
+        measure_clusters_stage(inner.law).run(inner.table_of(self.awake.state), measures)
+        allowed = _vibration_at_rest(engine, measures.size, measures.limit)
+        self._vibrated |= (measures.vibration > allowed)[measures.first.astype(np.int64)]
+
+    def _awake_clusters(self) -> list[tuple[int, np.ndarray]]:
+        """First grain and all grains of each awake cluster that was measured, as indices of awake grains."""
+        numbers = self._measures.first.astype(np.int64)
+        order = np.argsort(numbers, kind="stable")
+        starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+        return list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
+
+    def _kick_by_far_loads(self, state: State) -> None:
+        """Half a kick of the awake clusters by the loads of all grains that the inner engine does not sum."""
+        full, near = state.long_range, self.awake.state.long_range
+        if full.force.size:
+            self._remainder[0] = full.force[:, self._awake] - near.force
+            self._remainder[1] = full.torque[:, self._awake] - near.torque
+            self._kick(float(state.clock[STEP]))
+
+    def _kick(self, step: float) -> None:
+        """Half a kick of the awake clusters by the loads `_remainder`, for a step [s]."""
+        table = self.awake.engine.table_of(self.awake.state)
+        table["scratch"][DT] = 0.5 * step
+        kick_clusters.run(table, (self._remainder,))
+
+    def kick_awake(self, state: State, force: np.ndarray, torque: np.ndarray, step: float) -> None:
+        """Half a kick of the awake clusters between steps.
+
+        Parameters
+        ----------
+        force : ndarray
+            (3, N) forces on the grains of the state [N].
+        torque : ndarray
+            (3, N) torques [N m].
+        step : float
+            Length of the step [s].
+        """
+        self._list_awake(state)
+        if not self._awake.size:
+            return
+        self._take_awake(state)
+        self._remainder[0], self._remainder[1] = force[:, self._awake], torque[:, self._awake]
+        self._kick(step)
+        self._store_velocities(state)
+
+    def _store_velocities(self, state: State) -> None:
+        """Copy velocities and spins of awake grains to the state of all grains."""
+        for name in ("velocity", "spin"):
+            getattr(state.grains.arrays, name)[..., self._awake] = getattr(self.awake.state.grains.arrays, name)
+
+    def _slips(self, state: State, present: State) -> np.ndarray:
+        """Which awake grains have contacts that slipped in this step of bodies: losses of these have grown."""
+        slipped = np.zeros(len(self._awake), bool)
+        if not present.count[SLIPPED]:
+            return slipped
+        contacts, columns, used = state.contacts, self._columns, int(present.count[CONTACTS])
+        lost = [each.tobytes() for each in contacts.lost[SLIP_LOSSES, columns].T]
+        before = dict(zip(map(frozenset, contacts.pair[:, columns].T.tolist()), lost, strict=True))
+        pairs = present.contacts.pair[:, :used].T
+        for pair, now in zip(pairs, present.contacts.lost[SLIP_LOSSES, :used].T, strict=True):
+            if before.get(frozenset(self._awake[pair].tolist())) != now.tobytes():
+                slipped[pair] = True
+        return slipped
+
+    @timed
+    def _finish_step(self, engine: Engine) -> None:
+        """The second half kick of awake clusters; those that had no substeps, and are at rest, become bodies."""
+        state = engine.regular_state
+        if self._had_substeps:
+            assert self.quick is not None
+            self.kick_awake(state, *self.quick.slow_loads(state), float(state.clock[STEP]))
+            return
+        present, bodies = self.awake.state, state.bodies
+        self._kick_by_far_loads(state)
+        self._store_velocities(state)
+        measures = self._measures
+        self._measure_vibrations(engine)
+        clusters, firsts = self._awake_clusters(), self._awake[measures.first.astype(np.int64)]
+        if not np.array_equal(firsts, bodies.first[self._awake]):
+            changed = self._rename(state, firsts)
+            for k, own in clusters:
+                if changed[k]:
+                    describe_body(state, self._awake[own], present.clusters.offset[:, own])
+        # vectors from the centres of mass now, as those of grains of bodies that are not turned
+        bodies.offset[:, self._awake] = present.clusters.offset
+        bodies.orientation[:, self._awake] = np.array([[0.0], [0.0], [0.0], [1.0]])
+        bodies.inner_field[:, self._awake] = 0.0
+        mark_near_bodies.run(engine.table_of(state))
+        rested = False
+        for k, own in clusters:
+            first = int(self._awake[k])
+            if len(own) == 1:
+                if bodies.near[first] == CLEAR:
+                    rest_grain(state, first)
+                    rested = True
+                continue
+            if self._slipped[own].any():
+                bodies.event[first] = state.time
+            if self._vibrated[own].any():
+                bodies.vibration[first] = state.time
+            wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
+            quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
+            if quiet and bodies.near[first] == CLEAR and self._fits(engine, own):
+                self._rest(engine, self._awake[own], present.clusters.offset[:, own])
+                rested = True
+        if rested:
+            self.sort_members(state)
+
+    def _fits(self, engine: Engine, own: np.ndarray) -> bool:
+        """Whether a cluster extends over less than half of the box along each periodic axis.
+
+        Larger ones stay awake, with a warning: their grains may act on each other through the images of the box.
+        """
+        s = self.awake.state.clusters.offset[:, own]
+        extent = s.max(axis=1) - s.min(axis=1)
+        lengths = engine.regular_state.box.lengths
+        fits = all(side is None or size < 0.5 * side for size, side in zip(extent, lengths, strict=True))
+        if not fits and SPANS not in engine.warnings:
+            engine.warnings.append(SPANS)
+        return fits
+
+    def _rename(self, state: State, firsts: np.ndarray) -> np.ndarray:
+        """New first grains of the clusters of the awake grains, after contacts formed or broke.
+
+        Returns whether the cluster of each awake grain has other grains than before.
+        """
+        bodies, n = state.bodies, len(state.grains)
+        before = bodies.first[self._awake]
+        # a cluster is the same if all of its grains had its first grain, and no other grain had
+        other = np.bincount(firsts, before != firsts, n) + np.bincount(before, before != firsts, n)
+        changed = other[firsts] > 0
+        bodies.event[firsts[changed]] = bodies.vibration[firsts[changed]] = state.time
+        bodies.first[self._awake] = firsts
+        self.sort_members(state)
+        return changed
+
+    def _rest(self, engine: Engine, index: np.ndarray, offset: np.ndarray) -> None:
+        """Make a body of the grains of a cluster, at vectors `offset` from its centre of mass."""
+        state, measures, first = engine.regular_state, self._measures, int(index[0])
+        describe_body(state, index, offset)
+        state.lost[QUIETING] += rest_cluster(state, index)
+        at = np.searchsorted(self._awake, first)
+        rest_with_loads(state, first, float(measures.strain[at]))
+        state.bodies.strength[:, first] = measures.strength[:, at]
+        store_rest.run(engine.table_of(state), (), body_number(state, first))
+        if engine.parameters.gas.gas.on:
+            set_friction(state, engine.parameters.gas.gas, index)
+        state.count[RESTED] += 1
+
+
+def contacts_of(state: State, chosen: np.ndarray) -> np.ndarray:
+    """Columns of the contacts of some clusters; `chosen` says (N,) which grains are theirs."""
+    return np.flatnonzero(chosen[state.contacts.pair[0, : state.count[CONTACTS]]])
+
+
+def _vibration_at_rest(engine: Engine, size: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    """Vibrational energy [J] below which clusters of `size` grains may come to rest; `limit` is their ½ k q_c².
+
+    In a thermal gas this is at least 3 (n − 1) k_B T, the mean kinetic energy of the 6 n − 6 modes of a cluster in
+    equilibrium with the gas, but no more than ½ k q_c², with which one contact would slip. Dashpots without noise
+    keep the modes colder: measured in chains of two and eight 10 nm iron grains that were kept awake, ζ = 0.2, were
+    0.07 and 0.7 k_B T with a stopping time of 20 ns, 0.3 and 3.6 k_B T (at most 1.3 and 10) with 1 ns. So chains
+    come to rest as fast as without gas, and few would in a dense or hot gas with ε ½ k q_c² alone.
+    """
+    thermal = 3.0 * (size - 1) * engine.parameters.gas.gas.temperature_energy
+    return np.maximum(_limits(engine).vibration * limit, np.minimum(thermal, limit))
+
+
+def _limits(engine: Engine) -> RigidLimits:
+    limits: RigidLimits = engine.parameters.flight_limits
+    return limits
+
+
+def _moving_arrays(state: State) -> dict[str, np.ndarray]:
+    """Arrays that change in a step of bodies, but for forces and lists, before awake grains are copied back."""
+    found = {name: getattr(state.grains.arrays, name) for name in MOVING}
+    found |= {f"bodies/{name}": getattr(state.bodies, name) for name in MOVING_BODIES}
+    return found | {"clock": state.clock, "count": state.count, "lost": state.lost}

@@ -1,0 +1,1 @@
+"""Expected cost of a run: touches, numbers of steps, and wall time."""

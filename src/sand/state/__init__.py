@@ -1,1 +1,0 @@
-"""State of a simulation: time, grains, contacts and box as arrays."""
