@@ -5,6 +5,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from ..basics.box import nearest_image
 from ..basics.state import (
     BREAKING,
@@ -171,6 +173,15 @@ def count_new_contacts(grains, pair_list, count, span):
     return new_contacts
 
 
+class InitialContacts(NamedTuple):
+    """Contacts with given displacements."""
+
+    pair: np.ndarray  # (2, C) grain indices
+    slide: np.ndarray  # (3, C) ζ and ξ [m] in the laboratory frame; their components along n are ignored
+    roll: np.ndarray
+    twist: np.ndarray  # (C,) φ [rad]
+
+
 class FormingLoops(NamedTuple):
     """Loops that form contacts, for one contact law."""
 
@@ -232,7 +243,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             count[MADE] += 1
 
     @stage("the first contacts")
-    def add_initial_contacts(grains, contacts, count, span, settings, pair, slide, roll, twist):
+    def add_initial_contacts(grains, contacts, count, span, settings, initial):
         """Append contacts with given displacements, before the first step.
 
         Parameters
@@ -245,12 +256,8 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             The box.
         settings : ContactParameters
             Settings of the contact model.
-        pair : ndarray
-            (2, C) grain indices.
-        slide, roll : ndarray
-            (3, C) ζ and ξ [m] in the laboratory frame; their components along n are ignored.
-        twist : ndarray
-            (C,) φ [rad].
+        initial : InitialContacts
+            The contacts.
 
         Returns
         -------
@@ -258,19 +265,19 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             First contact that is stretched beyond breaking, or −1.
         """
         broken = -1
-        for k in range(twist.size):
-            i, j = pair[0, k], pair[1, k]
+        for k in range(initial.twist.size):
+            i, j = initial.pair[0, k], initial.pair[1, k]
             c = add_contact(grains, contacts, count, span, settings, i, j, 0.0)
             separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             distance = math.sqrt(dot(separation, separation))
             n = scale(1.0 / distance, separation)
             r1, r2 = grains.radius[i], grains.radius[j]
-            zeta, xi = load(slide, k), load(roll, k)
+            zeta, xi = load(initial.slide, k), load(initial.roll, k)
             zeta, xi = sub(zeta, scale(dot(zeta, n), n)), sub(xi, scale(dot(xi, n), n))
             n1, n2 = tangential.pointers_for(zeta, xi, n, r1, r2)
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
-            contacts.twist[c] = twist[k]
+            contacts.twist[c] = initial.twist[k]
             write_loads(grains, contacts, span, settings, c)
             if broken < 0 and r1 + r2 - distance < -constants_at(contacts, c).break_overlap:
                 broken = k

@@ -24,7 +24,7 @@ from ..contact.wall_loops import FULL as WALLS_FULL
 from ..contact.wall_loops import WALL_PARTS, add_wall_loads, wall_loops, wall_step_loop
 from ..forces.gas.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
-from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
+from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
 from .motion import UNBOUNDED, drift_for, gather_and_kick
@@ -102,16 +102,18 @@ def pair_list_stage(law: ContactLaw, celled: bool) -> Stage:
     """Rebuild the pair list of a contact law, with cells or without; returns a `Stop`."""
     build_pair_list = pair_list_loop(law, celled)
 
-    @stage("the list of contact candidates")
-    def pair_list_of_law(grains, contacts, pair_list, long_range, count, span, settings, search, criteria):
-        found = build_pair_list(
-            grains, contacts, pair_list, long_range, count, span, criteria.pair_gap, settings, search
-        )
+    @stage(
+        "the list of contact candidates",
+        parts=("grains", "contacts", "pair_list", "long_range", "count", "span", "settings", "search", "criteria"),
+    )
+    def pair_list_of_law(s):
+        how = PairSearch(s.span, s.criteria.pair_gap, s.settings, s.search)
+        found = build_pair_list(s.grains, s.contacts, s.pair_list, s.long_range, s.count, how)
         if found == FULL:
             return Stop.PAIRS_FULL.value
         if found == ROW_FULL:
             return Stop.LIST_FULL.value
-        update_safe_speed(pair_list, count)
+        update_safe_speed(s.pair_list, s.count)
         return Stop.NONE.value
 
     return pair_list_of_law
