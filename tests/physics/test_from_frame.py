@@ -236,7 +236,7 @@ def test_the_command(collision_run, tmp_path, monkeypatch, capsys):
         (["other.toml", "--from", "RUN"], ["box", "400 nm", "300 nm", "leave [box] out"]),
         (["bare.toml", "--from", "RUN"], ["contacts are given", "Contact"]),
         (["soft.toml", "--from", "RUN", "--frame", "STRETCHED"], ["soft.toml", "beyond its break"]),
-        (["both.toml"], ["number", "remove it"]),
+        (["both.toml"], ["number", "leave it out"]),
         (["fileless.toml"], ["file is missing"]),
         (["foreign.toml"], ["foreign.gsd", "not a trajectory"]),
     ],
