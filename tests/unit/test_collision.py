@@ -12,9 +12,10 @@ from sand.cli.main import main
 from sand.experiments.collision import approach, collide, collide_many
 from sand.experiments.collision_case import read_collision, run_seeds
 from sand.experiments.collision_outcome import collision_title
-from sand.io.read_grains import read_body
 from sand.setup import bpca, chain, grain
 from sand.theory import contact
+
+from ..bodies import read_body
 
 R = 1e-7
 
