@@ -29,6 +29,8 @@ from numba.core.event import Event, Listener, register
 # run, workers and children, must load them in the same way, or they compile everything twice.
 compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 
+from sand.compiler.ahead import share_compilation  # noqa: E402
+
 from .specs import FIXTURES, SPECS, WORKERS  # noqa: E402
 from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E402
 
@@ -56,6 +58,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if hasattr(config, "workerinput"):  # workers of pytest-xdist share the cores
+        share_compilation()
     # the same examples in every run: no test fails by chance
     settings.register_profile("fixed", max_examples=100 if config.getoption("--validate") else 30, derandomize=True)
     settings.load_profile("fixed")
@@ -112,6 +116,8 @@ def _mark(item: pytest.Item, tier: str | None) -> None:
         if item.get_closest_marker("compiled") is None:
             item.add_marker(pytest.mark.compiled(FIXTURES[name]))
     mark = item.get_closest_marker("compiled")
+    if tier is not None:  # only default tests expect all of their warnings
+        item.add_marker(pytest.mark.filterwarnings("default"), append=False)
     if mark is None and tier is None and "slow" not in item.keywords:
         item.add_marker(pytest.mark.quick)
     if mark is not None:

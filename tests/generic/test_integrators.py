@@ -76,6 +76,7 @@ def flyby(stepping, **end):
     return sim
 
 
+@pytest.mark.filterwarnings("ignore:without settling_time in")
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("name", STEPPINGS)
 def test_the_default_settings_conserve_energy_and_momentum(record_bound, name):

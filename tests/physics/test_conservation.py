@@ -85,6 +85,7 @@ def chain_error(steps_per_period, hits):
     return np.sqrt(np.mean(np.square(errors)))
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("hits", "halvings"), [(5, 3), pytest.param(9, 4, marks=pytest.mark.validate)])
 def test_energy_balance_of_a_struck_chain(record_bound, hits, halvings):

@@ -48,6 +48,7 @@ def sticking_speed(material, r1, r2):
     return math.sqrt(2 * 0.935503 * constants.normal.pull_off_force * constants.normal.pull_off_overlap / reduced_mass)
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(
     ("name", "r"),
@@ -67,6 +68,7 @@ def test_sticking_speed_of_equal_grains(name, r):
     assert head_on(m, r, r, 1.005 * speed) > 0.0
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("factor", [1.05, 1.5, 4.0, 20.0])
 @pytest.mark.parametrize("name", list(MATERIALS))

@@ -107,6 +107,7 @@ def magnetic_gas(**options):
     return sand.Simulation(grains, forces, box="0.25 um", seed=4, driven=driven, frame_every="2 ns", **options)
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
 @pytest.mark.compiled("dipoles")
 def test_a_gas_with_driven_grains_closes_its_ledger_and_is_resumed_bit_for_bit(tmp_path):
     """Positions of fixed grains stay the same bits, driven ones move as prescribed; the case file holds the drive."""
@@ -142,7 +143,7 @@ def test_changes_keep_the_prescribed_motion():
 
 
 WRONG = {
-    "sand.Driven([])": ["driven: grains is empty"],
+    "sand.Driven([])": ["driven: grains = [] is empty"],
     "sand.Driven([-1], velocity=[1, 2], spin=[0, 0, '1 m'])": ["grains = -1", "velocity = [1, 2]", "spin z = '1 m'"],
     "run(sand.Driven([0, 9]), sand.Driven([0]))": ["there is no grain 9", "grain 0 is given more than once"],
     "run(sand.Driven([0, 1, 2]))": ["all 3 grains are driven"],

@@ -151,6 +151,7 @@ def test_the_integrator_is_of_order_two(system, step):
     assert 1.8 < math.log2(errors[0] / errors[1]) < 2.2
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
 @pytest.mark.compiled("dipoles", "small")
 def test_loads_against_brute_force_with_images():
     """Periodic box with a cut-off: forces, torques, energy against a double loop in NumPy."""

@@ -42,6 +42,7 @@ def test_a_slow_bending_mode_decays_with_the_settling_time():
     assert abs(sim.ledger["total"][-1] - sim.ledger["total"][0]) < 0.01 * start
 
 
+@pytest.mark.filterwarnings("ignore:contact. settling_time = .* is below the period")
 @pytest.mark.compiled("contacts")
 def test_momenta_are_kept_and_the_balance_closes(record_bound):
     """An aggregate of unequal grains that turns and vibrates in a periodic box.
@@ -66,6 +67,7 @@ def test_momenta_are_kept_and_the_balance_closes(record_bound):
     assert sim.state.clock[SETTLED] > 0.95 * sim.time
 
 
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate")
 @pytest.mark.compiled("dipoles")
 def test_resume_is_bit_for_bit(tmp_path):
     """A growing gas with settling, in r-RESPA cycles: stopped between two applications and resumed, the same bits."""

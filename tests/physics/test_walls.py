@@ -189,6 +189,7 @@ def test_wall_with_a_mass():
     assert momentum == pytest.approx(given, abs=1e-9 * 2e-8 * sim.time)
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("speed", [0.01, 3.0, 300.0])
 def test_a_flying_grain_is_found_when_it_touches(speed):
@@ -262,6 +263,7 @@ def test_a_bath_gives_every_mode_of_grains_on_a_wall_its_share():
     assert sim.ledger.drift < step_error
 
 
+@pytest.mark.filterwarnings("ignore:.* broke while aggregates grew")
 @pytest.mark.compiled("contacts")
 def test_output_split_and_resume_change_no_bit(tmp_path):
     """One run, a run with many frames, and one that is stopped, read from its checkpoint and continued."""

@@ -117,6 +117,7 @@ def test_the_time_of_coagulation_is_that_of_the_kernels():
     assert found == pytest.approx(2.0 / (theory(mass, mass) * density), rel=1e-6, abs=0.0)
 
 
+@pytest.mark.filterwarnings("ignore:charges. the cut-off, .* ends an interaction")
 def test_charges_focus_bodies():
     """σ/σ₀ is the mean of 1 − U/kT over pairs, not below 0: U/kT = ±5 in a neutral mixture gives (6 + 0)/2 = 3."""
     side, kelvin = 1.5e-6, 100.0

@@ -16,6 +16,8 @@ from sand.forces.pair.ewald_fit import CHARGES, fitted, screened, smeared
 
 from .test_ewald import CUBE, SIDES, gas, relative
 
+pytestmark = pytest.mark.filterwarnings("ignore:the electric field at the surface of grains is too strong")
+
 Q = 1.6e-18
 
 

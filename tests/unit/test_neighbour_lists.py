@@ -270,6 +270,7 @@ def test_neighbour_arrays_grow():
     ).all()
 
 
+@pytest.mark.filterwarnings("ignore:.* broke while aggregates grew")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
 def test_neighbour_search_of_a_resumed_run(tmp_path, search):
@@ -372,6 +373,7 @@ def test_vibration_does_not_rebuild_lists():
     assert sim.state.count[LISTED] <= 3
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
 @pytest.mark.parametrize(
     ("count", "box", "how", "expected"),
     [

@@ -144,6 +144,7 @@ def test_a_pair_that_separates_and_meets_again_is_found():
     assert seen > 3
 
 
+@pytest.mark.filterwarnings("ignore:grains spin too fast for a solid")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(
     ("speed", "outcome", "culprit"), [(1e6, sand.Outcome.TOO_FAST, 2), (0.0, sand.Outcome.SPINS_TOO_FAST, 0)]

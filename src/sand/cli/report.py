@@ -264,7 +264,7 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
     if simulation.row_every is not None:
         frames += f", further rows of the ledger {read_cadence(simulation.row_every, 'row_every')}"
     if simulation.checkpoint_every is not None:
-        frames += f", checkpoints {read_cadence(simulation.checkpoint_every, 'checkpoint_every', wall=True)}"
+        frames += f", checkpoints {read_cadence(simulation.checkpoint_every, 'checkpoint_every', wall_time=True)}"
     ends = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
     ends += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
     ends += [condition] if condition else []

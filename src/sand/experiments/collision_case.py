@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,11 +12,11 @@ from pydantic import Field
 from ..basics.arguments import MOST_GRAINS
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
-from ..basics.settings import For, Number, Reading, Word
+from ..basics.settings import For, List, Number, Reading, Whole, Word
 from ..config.case import ForcesSection, MaterialSection, material_errors, with_absolute_files
 from ..config.commands import refuse_other_command
 from ..config.key_errors import validate
-from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, with_integrator
+from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
 from ..setup.aggregates import KINDS, build
@@ -28,7 +27,6 @@ from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, prepare, run_to_end
-from .executors import results_of
 
 BodyKind = Annotated[str, Word("file", among=KINDS)]
 """A builder, or "file"."""
@@ -44,9 +42,9 @@ class BodySection(Section):
     `kind = "file"`."""
     length: Annotated[str | None, For("kind", "file")] = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
-    grains: Count | None = None
+    grains: Annotated[int | None, Whole(1, MOST_GRAINS)] = None
     """Number of grains; required except for a grain, a lattice or a file."""
-    shape: list[Count] | None = None
+    shape: Annotated[list[int] | None, List(Whole(1, MOST_GRAINS))] = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
     radius: Annotated[Any, Reading(lambda value, name: radii_of(value))] = None
     """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
@@ -104,7 +102,7 @@ class ImpactSection(Section):
     """Direction of flight of the projectile."""
     turn: bool = True
     """Rotate both bodies at random, by the seed."""
-    seeds: list[Seed] = Field(default_factory=lambda: [1], min_length=1)
+    seeds: Seeds = Field(default_factory=lambda: [1])
     """One collision is run for each seed."""
     out: PathName | None = None
     """Folder of the results."""
@@ -171,38 +169,3 @@ def run_seed(content: dict[str, Any], seed: int, observers: Sequence[Any] = ()) 
     """Simulate one collision of a case and return the outcome as a dictionary; runs in worker processes."""
     case = with_integrator(CollisionCase, content).model_validate(content)
     return case.run(seed, observers=list(observers))[0].to_dict()
-
-
-def run_seeds(
-    case: dict[str, Any],
-    seeds: list[int],
-    executor: Any = None,
-    known: dict[int, dict[str, Any]] | None = None,
-    keep: Callable[[int, dict[str, Any]], None] | None = None,
-    observers: Sequence[Any] = (),
-) -> list[dict[str, Any]]:
-    """Outcomes for many seeds, in their order.
-
-    Parameters
-    ----------
-    case : dict
-        Content of a case file accepted by `read_collision`.
-    seeds : list of int
-        One collision each.
-    executor : Executor, optional
-        Any `concurrent.futures.Executor`; None computes in this process.
-    known : dict or None, optional
-        Outcomes by seed that need not be computed.
-    keep : callable, optional
-        Called with each seed and its outcome on completion, in any order.
-    observers : sequence, optional
-        Observers of the simulations, without an executor.
-    """
-    work = partial(run_seed, case, observers=() if executor is not None else observers)
-    found = dict(known or {})
-    left = [seed for seed in dict.fromkeys(seeds) if seed not in found]
-    for seed, outcome in results_of(executor, work, left):
-        found[seed] = outcome
-        if keep is not None:
-            keep(seed, outcome)
-    return [found[seed] for seed in seeds]

@@ -46,9 +46,9 @@ class RunTimeEstimate:
         self._done = True
         step = (time - self._first[0]) / taken
         left = min((self._end - time) / step if step > 0.0 else math.inf, self._last - steps)
-        wall = left * self._seconds / taken
-        if left > WARN_STEPS or wall > WARN_SECONDS:
-            years = f"about {wall / WARN_SECONDS:.2g} years" if wall > WARN_SECONDS else f"{wall / 86400.0:.2g} days"
+        rest = left * self._seconds / taken
+        if left > WARN_STEPS or rest > WARN_SECONDS:
+            years = f"about {rest / WARN_SECONDS:.2g} years" if rest > WARN_SECONDS else f"{rest / 86400.0:.2g} days"
             self._warn(
                 f"{LONG} {left:.1g} more steps, {years} at the present speed; stop it with Ctrl-C "
                 "and choose an earlier end or fewer steps",

@@ -58,9 +58,9 @@ def _refusal(name: str) -> str:
     return ""
 
 
-def read_setting(name: str, *, wall: bool = False) -> Callable[[Any], float | str | None]:
+def read_setting(name: str, *, wall_time: bool = False) -> Callable[[Any], float | str | None]:
     """Converter of a cadence of output to its setting in SI; None stays None."""
-    return lambda value: None if value is None else read_cadence(value, name, wall=wall).setting
+    return lambda value: None if value is None else read_cadence(value, name, wall_time=wall_time).setting
 
 
 def read_observers(value: Any) -> list[Observer]:
@@ -107,7 +107,7 @@ class Output:
         "updaters": read_updaters,
         "frame_every": read_setting("frame_every"),
         "row_every": read_setting("row_every"),
-        "checkpoint_every": read_setting("checkpoint_every", wall=True),
+        "checkpoint_every": read_setting("checkpoint_every", wall_time=True),
     }
 
     def __setattr__(self, name: str, value: Any) -> None:
