@@ -16,7 +16,7 @@ from sand.basics.own_units import si_unit, with_own_unit
 from sand.basics.schema import FIELDS
 from sand.cli.main import main
 from sand.io.frame import OF_CONTACTS, OF_GRAINS, Frame, FrameSequence
-from sand.io.read_grains import read_body, write_body
+from sand.io.read_grains import write_body
 from sand.plotting.plots import HISTORY
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import si_prefix
@@ -25,6 +25,7 @@ from sand.simulation.change import Change
 from sand.viewer.packets import frame_packet
 from sand.viewer.series import quantity_ranges
 
+from ..bodies import read_body
 from ..unit.pages import decode
 
 OWN = {

@@ -11,9 +11,11 @@ import sand
 from sand.cli.main import main
 from sand.errors import BadInput
 from sand.io.file_frames import open_frames
-from sand.io.read_grains import read_body, read_grains, write_body
+from sand.io.read_grains import read_grains, write_body
 from sand.setup.checks import pairs_in_contact
 from sand.setup.from_file import body_from_file, start_from_file
+
+from ..bodies import read_body
 
 R = 1e-7
 REST = sand.theory.contact("silica", R).rest_overlap

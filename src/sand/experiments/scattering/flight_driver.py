@@ -57,8 +57,8 @@ def step_size_factor(error):
 
 def allocate_workspace(size: int, rows: int = 0) -> Workspace:
     """Allocate work arrays for states of length `size` and a history of `rows` steps."""
-    one = [np.zeros(size) for _ in range(4)]
-    return Workspace(one[0], one[1], np.zeros((STAGES + 1, size)), one[2], one[3], np.zeros((rows, 1 + size)))
+    y, new, error, zeros = (np.zeros(size) for _ in range(4))
+    return Workspace(y, new, np.zeros((STAGES + 1, size)), error, zeros, np.zeros((rows, 1 + size)))
 
 
 class Flights(NamedTuple):
