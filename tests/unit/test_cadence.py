@@ -28,8 +28,8 @@ CASE = {"run": {"until": "1 us"}, "grains": {"number": 2, "radius": "10 nm"}, "b
 )
 def test_settings_are_read_back(given, setting):
     """The setting in SI, as in case.toml, gives the same cadence."""
-    cadence = read_cadence(given, "checkpoint_every", wall=True)
-    assert cadence.setting == setting and read_cadence(setting, "checkpoint_every", wall=True) == cadence
+    cadence = read_cadence(given, "checkpoint_every", wall_time=True)
+    assert cadence.setting == setting and read_cadence(setting, "checkpoint_every", wall_time=True) == cadence
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from sand.errors import warn
 from sand.experiments import executors
 from sand.experiments.executors import results_of
 from sand.experiments.growth_boxes import grow
+from sand.experiments.job import Job
 from sand.experiments.worker import done_apart
 from sand.io import lock as lock_files
 from sand.io.checkpoint import newest_checkpoint
@@ -31,6 +32,8 @@ from sand.io.table import GrowingOutcomes, GrowingTable
 
 from ..physics.setups import struck_chain
 from ..systems import stops_others
+
+pytestmark = pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 
 BOX = {
     "run": {"until": "4 ns", "frame_every": "0.5 ns"},
@@ -222,10 +225,11 @@ def failing_work(item):
     return 2 * item
 
 
+@pytest.mark.filterwarnings("default")
 def test_warnings_of_other_processes_are_issued_here():
     """`done_apart` returns the texts, each once; in the same process they are issued as ever."""
     assert done_apart(-1, lambda item: [failing_work(item) for _ in range(2)], 3) == ([6, 6], ["item 3"])
-    with pytest.warns(UserWarning, match="item 1") as seen, ThreadPoolExecutor(1) as executor:
+    with pytest.warns(UserWarning, match=r"item [12]") as seen, ThreadPoolExecutor(1) as executor:
         assert sorted(results_of(executor, failing_work, [1, 2])) == [(1, 2), (2, 4)]
     assert len(seen) == 2
     assert list(results_of(None, abs, [-1, 2])) == [(-1, 1), (2, 2)]
@@ -297,6 +301,74 @@ def test_a_run_stops_if_another_process_takes_its_folder(tmp_path, way):
     with pytest.raises(sand.BadInput, match="another process has begun to write to"):
         simulation.run(until="2 ns")
     assert {path.name: path.read_bytes() for path in folder.glob("[lc]*")} == after[0]
+
+
+# --- the base class of jobs ------------------------------------------------------------------------------------------
+
+
+class Squares(Job):
+    """A job of four tasks, two of them equal, that counts what it computes and stops before a task."""
+
+    COMMAND, RESULTS, KEPT, PARTS = "square", "squares.json", "squares.jsonl", "squares"
+    computed, stops_before = (), None
+
+    def tasks(self):
+        return [3, 1, 2, 3]
+
+    def work(self):
+        return self.square
+
+    def square(self, task, observers=()):
+        if task == self.stops_before:
+            raise KeyboardInterrupt
+        self.computed = (*self.computed, task)
+        return {"square": self.content["factor"] * task**2}
+
+    def results(self, outcomes):
+        return {"squares": [one["square"] for one in outcomes]}
+
+
+def test_a_job_keeps_what_is_finished(workdir):
+    """Stopped before its third task, a job computes that one alone when it goes on; results are as without a stop."""
+    path, folder = workdir / "squares.toml", workdir / "squares"
+    path.write_text("factor = 2\n")
+    job, seen = Squares(path), []
+    job.stops_before = 2
+    with pytest.raises(KeyboardInterrupt):
+        job.run(progress=lambda text, part: seen.append((text, part)))
+    assert seen == [(f"{n} of 3 squares", n / 3) for n in range(3)] and job.folder.resolve() == folder
+    assert {one.name for one in folder.iterdir()} == {"case.toml", "squares.jsonl", LOCK}
+    with pytest.raises(sand.BadInput, match="exists and is not empty"):
+        Squares(path).run()
+    again = Squares(folder / "case.toml", folder, resume=True)
+    assert again.run() == (found := {"squares": [18, 2, 8, 18]})
+    assert json.loads((folder / "squares.json").read_text()) == found
+    assert job.computed == (3, 1) and again.computed == (2,)
+    assert {one.name for one in folder.iterdir()} == {"case.toml", "squares.json", LOCK}
+    whole = Squares(path, workdir / "whole")
+    with ThreadPoolExecutor(2) as pool:
+        assert whole.run() == Squares(path, workdir / "there").run(pool) == found
+    assert whole.computed == (3, 1, 2)
+
+
+def test_a_job_refuses_a_folder_of_another_case(workdir):
+    """The case of the folder, and that of the outcomes kept in it: one line each; two processes exclude each other."""
+    path, folder = workdir / "squares.toml", workdir / "squares"
+    path.write_text("factor = 2\n")
+    job = Squares(path)
+    job.stops_before = 1
+    with pytest.raises(KeyboardInterrupt):
+        job.run()
+    path.write_text("factor = 3\n")
+    with pytest.raises(sand.BadInput, match="is another case than the one given"):
+        Squares(path, folder, resume=True).run()
+    (folder / "case.toml").write_text("factor = 3\n")
+    with pytest.raises(sand.BadInput, match="holds outcomes of another case"):
+        Squares(path, folder, resume=True).run()
+    held = FolderLock(folder)
+    with pytest.raises(sand.BadInput, match="another simulation of this process"):
+        Squares(path, folder, resume=True).run()
+    held.release()
 
 
 # --- growing tables --------------------------------------------------------------------------------------------------

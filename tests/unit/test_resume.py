@@ -13,7 +13,7 @@ import pytest
 import sand
 from sand.cli.job import InterruptObserver
 from sand.cli.main import main
-from sand.experiments import collision_case
+from sand.experiments import collision_job
 from sand.io.checkpoint import newest_checkpoint
 from sand.io.table import GrowingOutcomes
 
@@ -181,13 +181,13 @@ def test_interrupted_series_of_collisions(workdir, capsys, monkeypatch):
         file.write('{"seed": 2, "outc')  # an incomplete line, as after a kill
     assert main(["info", "cut"]) == 0
     assert "sand resume cut" in capsys.readouterr().out
-    done, run = [], collision_case.run_seed
+    done, run = [], collision_job.run_seed
 
     def counted(text, seed, **options):
         done.append(seed)
         return run(text, seed, **options)
 
-    monkeypatch.setattr(collision_case, "run_seed", counted)
+    monkeypatch.setattr(collision_job, "run_seed", counted)
     assert main(["resume", "cut"]) == 0
     assert done == [2, 3] and "outcomes" in capsys.readouterr().out
     ours, theirs = (json.loads((workdir / name / "collision.json").read_text()) for name in ("cut", "whole"))
@@ -198,7 +198,7 @@ def test_interrupted_series_of_collisions(workdir, capsys, monkeypatch):
 def test_resume_refuses_outcomes_of_another_case(workdir, capsys, monkeypatch):
     """A case changed while its job was interrupted: one line, and outcomes are not mixed."""
     monkeypatch.setattr(
-        collision_case, "run_seed", lambda text, seed, **options: (_ for _ in ()).throw(KeyboardInterrupt)
+        collision_job, "run_seed", lambda text, seed, **options: (_ for _ in ()).throw(KeyboardInterrupt)
     )
     assert main(["collide", "hit.toml", "--out", "cut"]) == 130
     path = workdir / "cut" / "case.toml"
@@ -312,6 +312,7 @@ def test_control_characters_do_not_reach_the_terminal(workdir, capsys):
     assert "\x7f" not in capsys.readouterr().out
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 def test_the_summary_of_an_interrupted_run_is_that_of_its_last_step(tmp_path):
     """Contacts and drift in summary.json are those of the final state, not of the last frame; no new ledger row."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import click
 
 from ..basics.threads import set_threads
 from . import options, parsing, report
+from .job import run_job
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""
@@ -43,38 +43,15 @@ def command(
     from ..experiments.collision_job import CollisionJob
     from .launch import refuse_folder
 
-    job = CollisionJob(case, None if out is None else Path(out), seeds, overwrite=overwrite)
+    job = CollisionJob(case, out, seeds, overwrite=overwrite)
     refuse_folder(job.folder, Path(case), overwrite=overwrite)
-    collide(job, f"collide {case}", threads=threads, **how)
+    collide(job, threads=threads, **how)
 
 
-def collide(job: Any, heading: str, *, workers: int, as_json: bool, quiet: bool, **execution: Any) -> None:
-    """Run a `CollisionJob` and print the results; `execution` as for `job.running_job`.
-
-    Raises
-    ------
-    BadInput
-        As the job; or if a worker process has died.
-    """
-    from .job import running_job
-    from .progress import Progress
-
-    several, hidden = len(job.case.impact.seeds) > 1, as_json or quiet
-    observers: list[Any] = [] if several or hidden else [Progress(math.inf, math.inf)]
-    with (
-        report.progress_bar(1.0, hidden or not several, bar_format=report.LAYOUT) as bar,
-        running_job(job.folder, workers if several else 1, quiet=hidden, **execution) as (executor, interrupts),
-    ):
-
-        def progress(done: int, total: int) -> None:
-            bar.set_description_str(f"{done} of {total} collisions", refresh=False)
-            bar.update(done / total - bar.n)
-
-        try:
-            content = job.run(executor, [interrupts, *observers], progress)
-        finally:
-            for each in observers:
-                each.finish()
+def collide(job: Any, *, as_json: bool, quiet: bool, **execution: Any) -> None:
+    """Run a `CollisionJob` and print the results; `execution` as for `job.run_job`. Raises BadInput as it does."""
+    content = run_job(job, as_json=as_json, quiet=quiet, **execution)
+    heading = f"resume {job.folder}" if job.resume else f"collide {job.path}"
     rows = [*collision_rows(content["collisions"]), ("files", f"{job.folder}/")]
     report.answer(content, heading, rows, as_json=as_json, quiet=quiet)
 

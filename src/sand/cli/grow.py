@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
-from pathlib import Path
 from typing import Any
 
 import click
@@ -12,8 +10,7 @@ import click
 from ..basics.threads import set_threads
 from ..errors import BadInput
 from . import options, parsing, report
-
-DEFAULT_SEEDS = list(range(1, 9))
+from .job import run_job
 
 
 @parsing.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
@@ -36,48 +33,16 @@ def command(case: str, seeds: list[int] | None, out: str | None, threads: int | 
     growth.
     """
     set_threads(threads)
-    from ..experiments.growth_case import read_growth
+    from ..experiments.growth_boxes import GrowthJob
 
-    content, own = read_growth(case)
-    folder = Path(out or Path(case).stem)
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"{folder} is a file; give another folder with --out")
-    boxes(content, seeds or own or DEFAULT_SEEDS, folder, threads=threads, **how)
+    job = GrowthJob(case, out, seeds)
+    if job.folder.exists() and not job.folder.is_dir():
+        raise BadInput(f"{job.folder} is a file; give another folder with --out")
+    grow(job, threads=threads, **how)
 
 
-def boxes(
-    content: dict[str, Any], seeds: list[int], folder: Path, *, quiet: bool, as_json: bool, **execution: Any
-) -> None:
-    """Run or continue the boxes of a case; `execution` as for `job.running_job`.
-
-    Raises
-    ------
-    BadInput
-        As `experiments.growth_boxes.grow`; or if a worker process has died.
-    """
-    from ..experiments.growth_boxes import grow
-    from .job import running_job
-
-    outcomes: dict[int, str] = {}
-    hidden = quiet or as_json
-    with (
-        # elsewhere the lines of the boxes show the progress
-        report.progress_bar(len(seeds), hidden or not sys.stderr.isatty(), bar_format=report.LAYOUT) as bar,
-        running_job(folder, quiet=quiet, **execution) as (executor, interrupts),
-    ):
-
-        def finished(seed: int, outcome: str) -> None:
-            outcomes[seed] = outcome
-            if not hidden:
-                report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
-            show()
-
-        def show() -> None:
-            bar.set_description_str(f"{len(outcomes)} of {len(seeds)} boxes", refresh=False)
-            bar.update(len(outcomes) - bar.n)
-
-        show()
-        grow(content, seeds, folder, executor, finished, [interrupts])
-    text = f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}"
-    found = {"folder": str(folder), "seeds": seeds, "outcomes": outcomes}
-    report.answer(found, text, [], as_json=as_json, quiet=quiet)
+def grow(job: Any, *, quiet: bool, as_json: bool, **execution: Any) -> None:
+    """Run or continue the boxes of a case; `execution` as for `job.run_job`. Raises BadInput as it does."""
+    content = run_job(job, quiet=quiet, as_json=as_json, lines=True, **execution)
+    text = f"all boxes are in {job.folder}; measure them with: sand analyse {shlex.quote(str(job.folder))}"
+    report.answer(content, text, [], as_json=as_json, quiet=quiet)

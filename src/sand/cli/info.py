@@ -276,8 +276,7 @@ def _of_each(costs: report.Rows, number: int, name: str) -> report.Rows:
 def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     from ..config.build import simulation_of
     from ..config.case import check_case
-    from ..experiments.growth_case import read_growth
-    from .grow import DEFAULT_SEEDS
+    from ..experiments.growth_case import DEFAULT_SEEDS, read_growth
 
     content, given = read_growth(path)
     seeds = given or DEFAULT_SEEDS

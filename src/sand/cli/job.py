@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import _thread
+import math
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -124,3 +126,44 @@ def running_job(
             raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
         text = f"{interrupts.why}; {report.how_to_continue(folder)}"
         raise (WallTimeUsed if interrupts.is_late else KeyboardInterrupt)(text) from None
+
+
+def run_job(
+    job: Any, *, workers: int, quiet: bool, as_json: bool, lines: bool = False, **execution: Any
+) -> dict[str, Any]:
+    """Run an `experiments.job.Job` with a line of progress; returns what its `run` does.
+
+    Parameters
+    ----------
+    lines : bool, optional
+        Whether lines that stay show the progress where there is no terminal.
+    **execution
+        As for `running_job`.
+
+    Raises
+    ------
+    BadInput
+        As the job; or if a worker process has died.
+    """
+    from .progress import Progress
+
+    hidden, single = quiet or as_json, job.is_single
+    observers = [Progress(math.inf, math.inf)] if single and not hidden else []
+    no_bar = hidden or single or (lines and not sys.stderr.isatty())
+    with (
+        report.progress_bar(1.0, no_bar, bar_format=report.LAYOUT) as bar,
+        running_job(job.folder, 1 if single else workers, quiet=quiet, **execution) as (executor, interrupts),
+    ):
+
+        def progress(text: str, part: float, line: str = "") -> None:
+            interrupts.see(None, {})
+            if line and not hidden:
+                report.write_line(line)
+            bar.set_description_str(text, refresh=False)
+            bar.update(part - bar.n)
+
+        try:
+            return job.run(executor, [interrupts, *observers], progress)
+        finally:
+            for each in observers:
+                each.finish()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,18 @@ import click
 
 from ..basics.threads import set_threads
 from ..errors import BadInput
-from ..io.run_folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, SUMMARY, read_json
+from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, read_json
 from . import options, parsing, report
 from .collide import collide
-from .grow import boxes
+from .grow import grow
 from .scatter import scatter
 
-RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
-"""Results file of a finished job, by command."""
+JOBS = {
+    "collide": (COLLISION, "collision_job", "CollisionJob", collide),
+    "scatter": (SCATTERING, "scattering.job", "ScatterJob", scatter),
+    "grow": (GROWTH, "growth_boxes", "GrowthJob", grow),
+}
+"""Results file, module and class of each job, and what runs it and prints its results."""
 
 
 @parsing.command("resume", short_help="Continue an interrupted run or job of any command.")
@@ -48,21 +53,22 @@ def command(
     """
     set_threads(threads)
     place = Path(folder)
-    kind = _kind(place)
+    kind, case = _kind(place)
     if kind != "run":
         if until is not None:
             raise BadInput(f"--until applies to runs; {folder} holds a job of `sand {kind}`")
         if scheduler is not None and kind == "collide":
             raise BadInput("--scheduler applies to jobs of `sand scatter` and `sand grow`; use --workers")
-        _job(kind, place, scheduler, {"workers": workers, "threads": threads, "wall_time": wall_time, **output})
+        how = {"workers": workers, "scheduler": scheduler, "threads": threads, "wall_time": wall_time}
+        _job(kind, place, case, {**how, **output})
         return None
     if workers > 1 or scheduler is not None:
         raise BadInput("--workers and --scheduler apply to jobs of many parts; for a run use --threads")
     return _run(place, until, wall_time, **output)
 
 
-def _kind(folder: Path) -> str:
-    """The command that created the content of a folder.  Raises BadInput if it is a file."""
+def _kind(folder: Path) -> tuple[str, Path]:
+    """The command that created the content of a folder, and its case file.  Raises BadInput if it is a file."""
     if folder.is_file():
         raise BadInput(f"{folder} is a file; give the folder of a run")
     kind, case, begun = report.job_in(folder)
@@ -71,32 +77,21 @@ def _kind(folder: Path) -> str:
             f"{folder} is not the folder of a run or job: {case.name} in it is a case file; "
             f"to start it: sand {kind} {shlex.quote(str(case))}"
         )
-    return kind or "run"
+    return kind or "run", case
 
 
-def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) -> None:
+def _job(kind: str, folder: Path, case: Path, how: dict[str, Any]) -> None:
     """Continue a job of `sand collide`, `sand scatter` or `sand grow`."""
-    if (folder / RESULTS[kind]).exists():
-        content = {**read_json(folder / RESULTS[kind]), "folder": str(folder)}
-        text = f"{folder} is finished; its results are in {folder / RESULTS[kind]}"
+    file, module, name, command = JOBS[kind]
+    if (folder / file).exists():
+        content = {**read_json(folder / file), "folder": str(folder)}
+        text = f"{folder} is finished; its results are in {folder / file}"
         report.answer(content, text, [], as_json=how["as_json"], quiet=how["quiet"])
-    elif kind == "grow":
-        from ..experiments.growth_case import read_growth
-
-        content, seeds = read_growth(folder / CASE)
-        boxes(content, seeds or [], folder, scheduler=scheduler, **how)
-    elif kind == "scatter":
-        from ..experiments.scattering.scatter_case import read_scattering
-
+        return
+    if kind == "scatter":
         del how["threads"]  # a flight uses one thread
-        read = read_scattering(folder / CASE)
-        scatter(folder / CASE, read, folder, resume=True, scheduler=scheduler, **how)
-    else:
-        from ..experiments.collision_job import CollisionJob
-
-        one = folder / ONE_COLLISION
-        job = CollisionJob(one if one.exists() else folder / CASE, folder, resume=True)
-        collide(job, f"resume {folder}", **how)
+    made = getattr(import_module(f"sand.experiments.{module}"), name)
+    command(made(case, folder, resume=True), **how)
 
 
 def _run(place: Path, until: float | None, wall_time: float | None, *, quiet: bool, as_json: bool) -> int | None:

@@ -11,6 +11,7 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import FLIGHTS
 from . import options, parsing, report
+from .job import run_job
 
 
 def _check(values: Mapping[str, Any]) -> Iterator[str]:
@@ -37,66 +38,23 @@ def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: An
     every flight. The numbers do not depend on the number of workers or on interruptions; continue an interrupted job
     with `sand resume`.
     """
-    from ..experiments.scattering.scatter_case import read_scattering
+    from ..experiments.scattering.job import ScatterJob
     from .launch import refuse_folder
 
-    read = read_scattering(case)
-    folder = Path(out or read[0].measure.out or Path(case).stem)
+    job = ScatterJob(case, out, resume=resume, overwrite=overwrite)
     if not resume:
-        refuse_folder(folder, Path(case), overwrite=overwrite)
-    elif not (folder / FLIGHTS).exists():
-        raise BadInput(f"there is nothing to resume in {folder}: no {FLIGHTS}")
-    scatter(Path(case), read, folder, resume=resume, overwrite=overwrite, **how)
+        refuse_folder(job.folder, Path(case), overwrite=overwrite)
+    elif not (job.folder / FLIGHTS).exists():
+        raise BadInput(f"there is nothing to resume in {job.folder}: no {FLIGHTS}")
+    scatter(job, **how)
 
 
-def scatter(
-    case: Path,
-    read: tuple[Any, Any],
-    folder: Path,
-    *,
-    resume: bool,
-    overwrite: bool = False,
-    quiet: bool,
-    as_json: bool,
-    **execution: Any,
-) -> None:
-    """Compute a scattering job and print the results; `execution` as for `job.running_job`.
-
-    Parameters
-    ----------
-    read : tuple[Any, Any]
-        The result of `read_scattering` for the case.
-    resume : bool
-        Whether to continue the flights in the folder.
-
-    Raises
-    ------
-    BadInput
-        If the folder belongs to another case, or a worker process has died.
-    """
-    from ..config.case import with_absolute_files
-    from ..experiments.scattering.job import Job
-    from ..io.lock import writing
-    from ..io.run_folder import make_folder, read_toml
-    from .job import running_job
-
-    hidden = quiet or as_json
-    with (
-        report.progress_bar(1.0, hidden, bar_format=report.LAYOUT) as bar,
-        running_job(folder, quiet=quiet, **execution) as (executor, interrupts),
-    ):
-
-        def progress(text: str, part: float) -> None:
-            interrupts.see(None, {})
-            bar.set_description_str(text, refresh=False)
-            bar.update(part - bar.n)
-
-        if not resume:
-            make_folder(folder, overwrite=overwrite)
-        with writing(folder):
-            content = Job(*read, with_absolute_files(read_toml(case), case), folder, resume).run(executor, progress)
-    rows = [*result_rows(content), ("files", report.listed(folder))]
-    report.answer({**content, "folder": str(folder)}, f"scatter {case}", rows, as_json=as_json, quiet=quiet)
+def scatter(job: Any, *, quiet: bool, as_json: bool, **execution: Any) -> None:
+    """Run a `ScatterJob` and print the results; `execution` as for `job.run_job`. Raises BadInput as it does."""
+    content = run_job(job, quiet=quiet, as_json=as_json, **execution)
+    rows = [*result_rows(content), ("files", report.listed(job.folder))]
+    content["folder"] = str(job.folder)
+    report.answer(content, f"scatter {job.path}", rows, as_json=as_json, quiet=quiet)
 
 
 def result_rows(content: dict[str, Any]) -> report.Rows:

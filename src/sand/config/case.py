@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,8 +14,7 @@ from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
 from ..basics.material import PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
-from ..engine.driven import Driven
-from ..engine.walls import Wall, read_walls, wall_columns
+from ..components.driven import Driven
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
@@ -42,6 +41,7 @@ from .sections import (
     with_integrator,
     with_keys,
 )
+from .wall_section import WallSection, wall_columns, wall_errors
 
 
 def _condition(value: Any, name: str) -> Any:
@@ -221,17 +221,8 @@ else:
     )
 
 
-@with_keys(Wall, "material")
-class WallSection(Section):
-    """[[walls]]: a plane to which grains stick; see `sand.Wall`."""
-
-    material: str
-    """Preset or name in [materials]."""
-
-    def build(self, materials: dict[str, Material]) -> Wall:
-        """Build the wall.  Raises BadInput."""
-        given = self.model_dump(exclude_none=True, exclude={"material"})
-        return Wall(material=materials.get(self.material, self.material), **given)
+COMPONENTS: dict[str, type] = {"walls": WallSection, "driven": Driven}
+"""The tables of components, and what reads them."""
 
 
 class Case(Section):
@@ -246,6 +237,10 @@ class Case(Section):
     stepping: Stepping = Verlet()
     neighbours: Neighbours = Neighbours()
     driven: list[Driven] = Field(default_factory=list)
+
+    def components(self) -> dict[str, list[Any]]:
+        """What the case has of each component, by its keyword of `sand.Simulation`."""
+        return {"walls": [wall.build(self.materials_by_name()) for wall in self.walls], "driven": self.driven}
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the materials of the case, by name."""
@@ -287,24 +282,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
             for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
                 if isinstance(name, str) and name not in known:
                     problems.append(f"{place}.material: unknown material '{name}'; {did_you_mean(name, known)}")
-    return problems + _wall_errors(content.get("walls"), known)
-
-
-def _wall_errors(walls: Any, known: Collection[str]) -> list[str]:
-    """Error messages for the numbers in [[walls]], and for materials that do not exist."""
-    problems: list[str] = []
-    for k, section in enumerate(walls if isinstance(walls, list) else []):
-        try:
-            wall = WallSection.model_validate(section)
-            if wall.material not in known:
-                hint = did_you_mean(wall.material, list(known))
-                problems.append(f"walls.{k}.material: unknown material '{wall.material}'; {hint}")
-            wall.model_copy(update={"material": "iron"}).build({})
-        except ValidationError:
-            continue  # reported by the validation of the whole file
-        except BadInput as error:
-            problems += error.at(f"walls.{k}").problems
-    return problems
+    return problems + wall_errors(content.get("walls"), known)
 
 
 def condition_errors(content: dict[str, Any]) -> list[str]:
@@ -320,19 +298,10 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     try:
         table = content.get("stepping")
         awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
-        condition.check([*Ledger(awake=awake).columns, *columns, *_wall_names(content.get("walls"))])
+        condition.check([*Ledger(awake=awake).columns, *columns, *wall_columns(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []
-
-
-def _wall_names(walls: Any) -> list[str]:
-    """Columns of the ledger with the [[walls]] of a case file; none if these have errors."""
-    try:
-        sections = [WallSection.model_validate(one) for one in walls or ()]
-        return wall_columns(read_walls([one.model_copy(update={"material": "iron"}).build({}) for one in sections]))
-    except (ValidationError, BadInput, TypeError):
-        return []
 
 
 def read_case(path: str | Path) -> Case:

@@ -115,7 +115,7 @@ Duration = Annotated[Any, Reading(duration)]
 """A time span [s]."""
 Cadence = Annotated[Any, Reading(lambda value, name: read_cadence(value, name).setting)]
 """A cadence of output: by time, by steps, or logarithmic in time."""
-SaveCadence = Annotated[Any, Reading(lambda value, name: read_cadence(value, name, wall=True).setting)]
+SaveCadence = Annotated[Any, Reading(lambda value, name: read_cadence(value, name, wall_time=True).setting)]
 """A cadence of checkpoints, also by wall time."""
 PathName = Annotated[str, AfterValidator(lambda value, info: checked_name(value, str(info.field_name)))]
 """Name of a file or folder."""

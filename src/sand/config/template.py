@@ -17,12 +17,11 @@ from pydantic import BaseModel
 from ..basics.descriptions import docstring, parameter_docs
 from ..basics.material import PRESETS
 from ..basics.settings import Whole
-from ..engine.driven import Driven
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
 from ..neighbours.search import Neighbours
 from ..setup.grain_classes import GrainClass
-from .case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection
+from .case import COMPONENTS, BoxSection, GrainsSection, MaterialSection, RunSection
 
 WIDTH = 110
 """Columns of comments."""
@@ -70,12 +69,17 @@ def run_tables() -> list[Table]:
         Table("[grains]", "", [key for key in keys_of(GrainsSection) if key.name != "classes"]),
         Table("[[grains.classes]]", summary(GrainClass), keys_of(GrainClass)),
         material_table(),
-        Table("[[walls]]", summary(WallSection).removeprefix("[[walls]]: ").capitalize(), keys_of(WallSection)),
         *force_tables(),
         *stepping_tables(),
         Table("[neighbours]", summary(Neighbours), keys_of(Neighbours)),
-        Table("[[driven]]", summary(Driven), keys_of(Driven)),
+        *(Table(f"[[{name}]]", _purpose(name, own), keys_of(own)) for name, own in COMPONENTS.items()),
     ]
+
+
+def _purpose(name: str, section: type) -> str:
+    """What the table of a component is for."""
+    text = summary(section).removeprefix(f"[[{name}]]: ")
+    return text[:1].upper() + text[1:]
 
 
 def force_tables() -> list[Table]:

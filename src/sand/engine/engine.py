@@ -53,7 +53,7 @@ from ..compiler.program import Program
 from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import THERMAL
-from ..contact.events import forming_loops
+from ..contact.events import InitialContacts, forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies, wall_energies_stage
@@ -62,14 +62,13 @@ from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.external_loops import external_energies_for
 from ..forces.pair.long_range_loops import LongRangeSums, long_range_energies_for
-from ..integrate.driven import HEAVY
 from ..integrate.driver import advance
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.integrator import Integrator
-from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
+from ..integrate.parts import HEAVY, PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.respa import clear_long_range_loads
 from ..integrate.stage_list import Components, build_program, variant_of
-from ..integrate.stages import NO_STEP, bath_wall_work, bath_work
+from ..integrate.stages import NO_STEP, StageNumber, bath_work
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
     SHARED,
@@ -613,11 +612,11 @@ class Engine:
         state = self.state
         if state.contacts.pair.shape[1] < len(pair):
             state.grow_contacts(len(pair))
-        given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
-        pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
+        vectors = (np.ascontiguousarray(array.T, dtype=np.float64) for array in (slide, roll, twist))
+        initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
         arrays, settings = (state.grains.arrays, state.contacts, state.count), self.parameters.settings
         with self._held():
-            return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
+            return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, initial)
 
     def losses(self) -> np.ndarray:
         """Losses [J] up to the time of `state`, in the order of `state.state.LOST`.
@@ -637,17 +636,16 @@ class Engine:
 
     def _record_bath_work(self, state: State) -> None:
         """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
-        walls = self.components.walls
         with self._held(state):
             bath_work.run(self.table_of(state), (), NO_STEP)
-            if walls is not None:
-                bath_wall_work.run(self.table_of(state), walls, NO_STEP)
+            if (further := self.components.further.get(StageNumber.BATH_WALL_WORK)) is not None:
+                stage, numbers = further
+                stage.run(self.table_of(state), numbers, NO_STEP)
 
     @contextlib.contextmanager
     def _held(self, state: State | None = None) -> Iterator[None]:
-        """While constants of contacts are computed, driven grains have a mass that counts as infinite."""
-        driven, arrays = self.components.driven, (state or self._state).grains.arrays
-        index: Any = [] if driven is None else driven.grain
+        """While constants of contacts are computed, some grains have a mass that counts as infinite."""
+        index, arrays = self.components.heavy, (state or self._state).grains.arrays
         for quantity in (arrays.mass, arrays.inertia):
             quantity[index] *= HEAVY
         try:

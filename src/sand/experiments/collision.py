@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
@@ -25,7 +24,7 @@ from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
-from ..simulation.serialise import case_of
+from ..simulation.serialise import changed_tables
 from ..simulation.simulation import Simulation
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
 from .parting import cannot_touch
@@ -128,8 +127,7 @@ def resume_collision(
         As `config.build.resume`; or if the folder contains a different collision.
     """
     simulation = resume(folder, **options)
-    requested, stored = (case_of(one, math.inf, math.inf) for one in (prepare(start, forces, stepping), simulation))
-    changed = [name for name in requested if name != "run" and requested[name] != stored[name]]
+    changed = changed_tables(prepare(start, forces, stepping), simulation)
     try:
         with closing(Frames(user_path(folder, "folder") / TRAJECTORY)) as frames:
             first = frames[0]

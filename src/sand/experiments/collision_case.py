@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,7 +27,6 @@ from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, prepare, run_to_end
-from .executors import results_of
 
 BodyKind = Annotated[str, Word("file", among=KINDS)]
 """A builder, or "file"."""
@@ -171,38 +169,3 @@ def run_seed(content: dict[str, Any], seed: int, observers: Sequence[Any] = ()) 
     """Simulate one collision of a case and return the outcome as a dictionary; runs in worker processes."""
     case = with_integrator(CollisionCase, content).model_validate(content)
     return case.run(seed, observers=list(observers))[0].to_dict()
-
-
-def run_seeds(
-    case: dict[str, Any],
-    seeds: list[int],
-    executor: Any = None,
-    known: dict[int, dict[str, Any]] | None = None,
-    keep: Callable[[int, dict[str, Any]], None] | None = None,
-    observers: Sequence[Any] = (),
-) -> list[dict[str, Any]]:
-    """Outcomes for many seeds, in their order.
-
-    Parameters
-    ----------
-    case : dict
-        Content of a case file accepted by `read_collision`.
-    seeds : list of int
-        One collision each.
-    executor : Executor, optional
-        Any `concurrent.futures.Executor`; None computes in this process.
-    known : dict or None, optional
-        Outcomes by seed that need not be computed.
-    keep : callable, optional
-        Called with each seed and its outcome on completion, in any order.
-    observers : sequence, optional
-        Observers of the simulations, without an executor.
-    """
-    work = partial(run_seed, case, observers=() if executor is not None else observers)
-    found = dict(known or {})
-    left = [seed for seed in dict.fromkeys(seeds) if seed not in found]
-    for seed, outcome in results_of(executor, work, left):
-        found[seed] = outcome
-        if keep is not None:
-            keep(seed, outcome)
-    return [found[seed] for seed in seeds]

@@ -16,11 +16,55 @@ from ..errors import BadInput, shown, warn
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
-from ..simulation.serialise import case_of
+from ..simulation.serialise import case_of, changed_tables
 from .executors import results_of
+from .growth_case import DEFAULT_SEEDS, read_growth
+from .job import Job, Progress, ignored
 
 PATIENCE = 10.0
 """Longest wall time [s] to wait for another process that writes to the folder for a moment."""
+
+
+class GrowthJob(Job):
+    """Boxes of one case, each in its own folder; what is kept are these folders, which other processes may share.
+
+    Parameters
+    ----------
+    seeds : list of int or None, optional
+        Replaces the seeds of the case.
+    path, folder, **how
+        As for `Job`.
+
+    Raises
+    ------
+    BadInput
+        All errors of the case.
+    """
+
+    COMMAND, RESULTS, PARTS = "grow", files.GROWTH, "boxes"
+
+    def __init__(self, path: str | Path, folder: str | Path | None = None, seeds: list[int] | None = None, **how: bool):
+        super().__init__(path, folder, **how)
+        self.content, own = read_growth(path)
+        self.seeds = seeds or own or DEFAULT_SEEDS
+
+    def run(
+        self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
+    ) -> dict[str, Any]:
+        """Run all boxes to their end, see `grow`; returns how they ended."""
+        outcomes: dict[int, str] = {}
+
+        def show(line: str = "") -> None:
+            done, total = len(outcomes), len(self.seeds)
+            progress(f"{done} of {total} {self.PARTS}", done / total, line and f"{line}  ({done} of {total})")
+
+        def finished(seed: int, outcome: str) -> None:
+            outcomes[seed] = outcome
+            show(f"  seed {seed}: {outcome}")
+
+        show()
+        grow(self.content, self.seeds, self.folder, executor, finished, observers)
+        return {"folder": str(self.folder), "seeds": self.seeds, "outcomes": outcomes}
 
 
 def grow(
@@ -108,9 +152,7 @@ def _run_all(
 ) -> None:
     """Run the boxes of `grow`. Raises BadInput for boxes that stopped for physical reasons."""
     folders = {seed: str(place.absolute()) for seed, place in places.items()}  # workers may be in another folder
-    run = partial(_run_one, content, folders)
-    if executor is None:
-        run = partial(run, observers=observers)
+    run = partial(_run_one, content, folders, observers=observers if executor is None else ())
     outcomes: dict[int, str] = {}
     for seed, outcome in results_of(executor, run, list(places)):
         outcomes[seed] = outcome
@@ -180,8 +222,7 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     until = case.run.until
     if checkpoint_files(place):
         simulation = resume(place, observers=own)
-        requested, stored = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
-        if changed := [name for name in requested if name != "run" and requested[name] != stored[name]]:
+        if changed := changed_tables(simulation_of(case, None), simulation):
             raise BadInput(
                 f"{place} contains a run with different [{changed[0]}]; give another folder, or the same case"
             )

@@ -12,6 +12,8 @@ from ..config.sections import Section, Seeds
 from ..errors import BadInput, ErrorCollector
 from ..io.run_folder import read_toml
 
+DEFAULT_SEEDS = list(range(1, 9))
+
 
 class GrowSection(Section):
     """Section [grow]: one box for each seed."""

@@ -114,6 +114,7 @@ class GrowingOutcomes:
 
     def add(self, seed: int, outcome: dict[str, Any]) -> None:
         """Append one outcome; its numbers are stored to full precision.  Raises FilesFailed."""
+        self.found[seed] = outcome
         append_text(self.path, json.dumps(sealed({"seed": seed, "outcome": outcome})) + "\n")
 
 

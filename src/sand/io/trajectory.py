@@ -6,10 +6,10 @@ import contextlib
 import ctypes
 import math
 import os
-import time as wall
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -84,7 +84,7 @@ class TrajectoryWriter:
         self._abandoned = False  # after an error
         self._waiting = self._pending = 0  # frames that wait for the next flush, and their approximate bytes
         self._entries = 0  # upper bound of the index entries
-        self._flushed = wall.monotonic()
+        self._flushed = monotonic()
         self._scale: float | None = None  # reference radius of the file [m]
         self._materials: list[str] = []  # names of the materials of its frames
         try:
@@ -141,7 +141,7 @@ class TrajectoryWriter:
         except OSError as error:
             raise self._abandon(error) from error
         self._last = time
-        if wall.monotonic() - self._flushed > FLUSH_EVERY or self._waiting >= MOST_WAITING:
+        if monotonic() - self._flushed > FLUSH_EVERY or self._waiting >= MOST_WAITING:
             self.flush()
 
     def _open(self, append: bool) -> None:
@@ -181,7 +181,7 @@ class TrajectoryWriter:
                     os.fsync(same.fileno())
         except OSError as error:
             raise self._abandon(error) from error
-        self._flushed, self._waiting, self._pending, self._whole_until = wall.monotonic(), 0, 0, self._last
+        self._flushed, self._waiting, self._pending, self._whole_until = monotonic(), 0, 0, self._last
 
     def _abandon(self, error: OSError) -> FilesFailed:
         """Give up writing after an error and repair the file; returns the exception to raise."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-import time as wall
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -330,7 +330,7 @@ def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator)
     sides = np.floor(lengths / (2.0 * radius.max() + gap)).astype(int).tolist()
     near: dict[tuple[int, ...], list[tuple[float, ...]]] = {}  # spheres in and around each cell
     placed, attempts = np.empty((len(radius), 3)), _attempts(rng, lengths, sides)
-    start, warned = wall.monotonic(), False
+    start, warned = monotonic(), False
     for n, i in enumerate(np.argsort(-radius, kind="stable").tolist()):
         own = float(radius[i])
         most = [0.5 * v - own - gap if opened else math.inf for v, opened in zip(lengths, is_open, strict=True)]
@@ -350,7 +350,7 @@ def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator)
                 f"no free position for grain {n + 1} of {len(radius)} in {TRIES} attempts (filling factor "
                 f"{filled:.1%}); use a larger box or fewer grains"
             )
-        if not warned and wall.monotonic() > start + PATIENCE:
+        if not warned and monotonic() > start + PATIENCE:
             warned = True
             warn(f"placing {len(radius)} grains is slow in a box this full: {n + 1} placed in {PATIENCE:g} s")
     return placed

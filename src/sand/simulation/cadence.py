@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from decimal import Decimal
+from time import monotonic
 from typing import Any, Literal, NamedTuple
 
 from ..basics.arguments import MOST_STEPS
@@ -66,13 +67,13 @@ class Cadence(NamedTuple):
         return texts[self.kind]
 
 
-def read_cadence(value: Any, name: str, *, wall: bool = False) -> Cadence:
+def read_cadence(value: Any, name: str, *, wall_time: bool = False) -> Cadence:
     """Read a cadence from the setting `name`.
 
     Parameters
     ----------
     value : float or str
-        A time (1e-9 or "1 ns"), "1000 steps", "log(10 per decade, from 1 ns)", or, with `wall`, "30 s wall".
+        A time (1e-9 or "1 ns"), "1000 steps", "log(10 per decade, from 1 ns)", or, with `wall_time`, "30 s wall".
 
     Raises
     ------
@@ -81,7 +82,7 @@ def read_cadence(value: Any, name: str, *, wall: bool = False) -> Cadence:
     """
     text = value.strip() if isinstance(value, str) and len(value) <= LONGEST_TEXT else ""
     if match := _WALL.fullmatch(text):
-        if not wall:
+        if not wall_time:
             raise BadInput(
                 f"{name} = {value!r}: wall time is for checkpoint_every only, as results must not depend on it; "
                 "give a simulated time, '1000 steps' or 'log(10 per decade, from 1 ns)'"
@@ -132,7 +133,7 @@ def chosen_cadence(time: float, end: float, before: Chosen | None = None) -> Cho
 
 
 class Schedule:
-    """The next output of a cadence: a time, met exactly, or a step.
+    """The next output of a cadence: a time, met exactly, a step, or after a wall time.
 
     Times are multiples of the interval, or first × 10^(k / per decade) with k = 0, 1, …; steps are multiples of the
     number of steps, or, with r-RESPA, the ends of the cycles in which these lie.
@@ -140,7 +141,7 @@ class Schedule:
     Parameters
     ----------
     cadence : Cadence or None
-        None, or one by wall time: nothing is due.
+        None: nothing is due.
     time, step : float, int
         Present time [s] and step; outputs are due after them.
     last : float, optional
@@ -152,6 +153,7 @@ class Schedule:
         self._timed = cadence is not None and cadence.kind in ("time", "log")
         self._number = 0 if cadence is None or cadence.kind == "log" else 1
         self._after = -math.inf
+        self._seconds = cadence.every if cadence is not None and cadence.kind == "wall" else math.inf  # wall time
         self.step_due: float = math.inf
         """Step of the next output; infinite for a cadence by time."""
         if last > -math.inf:
@@ -183,8 +185,8 @@ class Schedule:
         return self.due if self._timed and self.due < end - NEAR * self._spacing() else end
 
     def is_due(self, time: float, step: int) -> bool:
-        """Whether the next output is due at this time [s] and step."""
-        return self.due <= time or self.step_due <= step
+        """Whether the next output is due at this time [s] and step, or at the present wall time."""
+        return self.due <= time or self.step_due <= step or monotonic() - self._since > self._seconds
 
     def take(self, time: float, step: int) -> bool:
         """Whether the next output is due at this time [s] and step; if so, move to the one after it."""
@@ -198,6 +200,7 @@ class Schedule:
         self._advance(time, step, time + NEAR * self._spacing() if self._timed else time)
 
     def _advance(self, time: float, step: int, late: float) -> None:
+        self._since = monotonic()
         if self._cadence is None:
             return
         kind, every, per_decade = self._cadence

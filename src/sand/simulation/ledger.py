@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..analysis.body_motion import BodyMotion, temperatures_of
+from ..analysis.body_motion import temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
 from ..basics.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from ..contact.measure import ENERGIES
+from ..engine.component import Component
 from ..engine.engine import Engine
-from ..engine.walls import wall_row
 from ..errors import BadInput
 from ..io.ledger_table import TEMPERATURES
 
@@ -35,52 +35,10 @@ CORRECTION = "angular_momentum_corrected"
 OF_MOTION = (*MOMENTA, CORRECTION, INTERNAL, *TEMPERATURES)
 """Columns of the motion that are not part of the total energy."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
-LOST_WALLS = "lost_walls"
-"""Column of the energy that moving walls took from grains and contacts; only with walls."""
 COUNTED = {"step", "time", *NUMBERS, AWAKE}
-"""Columns that need no energies, see `count_row`."""
-WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
+"""Columns that need no energies, see `Ledger.counts_of`."""
+WHOLE = {"step", *NUMBERS, AWAKE} - {"mean_cluster_size"}
 """Columns of whole numbers."""
-
-
-def log_row(
-    state: State,
-    lost: Sequence[float],
-    clusters: Mapping[str, float],
-    bodies: BodyMotion,
-    of_contacts: Sequence[float],
-    forces: dict[str, float],
-    walls: Sequence[str] = (),
-) -> dict[str, float]:
-    """Compute one row of the ledger: energies, losses [J], momenta (SI), temperatures of bodies [K], counts.
-
-    Parameters
-    ----------
-    lost : Sequence[float]
-        Losses [J] up to this time, see `Engine.losses`.
-    clusters : Mapping[str, float]
-        Numbers of clusters, see `cluster_numbers`.
-    bodies : BodyMotion
-        Motion of the bodies.
-    of_contacts : Sequence[float]
-        Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
-    forces : dict[str, float]
-        Energy [J] of each long-range and per-grain force by column.
-    walls : Sequence[str], optional
-        Columns of the walls, see `walls.wall_columns`.
-    """
-    energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *of_contacts]
-    counts = count_row(state, clusters)
-    row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
-    row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
-    row |= dict(zip(LOSSES, lost, strict=True))
-    moved = {LOST_WALLS: -math.fsum(state.walls.work)} if walls else {}
-    row |= moved
-    row["total"] = math.fsum([*energies, *forces.values(), *lost, *moved.values()])
-    row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
-    row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
-    row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
-    return row | {name: counts[name] for name in (*NUMBERS, AWAKE) if name in counts} | wall_row(state, walls)
 
 
 def cluster_numbers(state: State) -> dict[str, float]:
@@ -88,21 +46,6 @@ def cluster_numbers(state: State) -> dict[str, float]:
     pairs = state.contacts.pair[:, : state.count[CONTACTS]].T.astype(np.int64)
     sizes = np.bincount(labels_of(len(state.grains), pairs))
     return {"clusters": len(sizes), "mean_cluster_size": mean_size(sizes), "largest_cluster": int(sizes.max())}
-
-
-def count_row(state: State, clusters: Mapping[str, float]) -> dict[str, float]:
-    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters, which are given."""
-    at_rest = state.at_rest
-    return {
-        "step": state.steps,
-        "time": state.time,
-        "contacts": int(state.count[CONTACTS]),
-        "made": int(state.count[MADE]),
-        "moved": int(state.count[SLIPPED]),
-        "broken": int(state.count[BROKEN]),
-        **clusters,
-        **({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))}),
-    }
 
 
 def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:
@@ -129,22 +72,25 @@ class Ledger(LedgerColumns):
     ----------
     forces : Sequence[str], optional
         Names of the energy columns of long-range and per-grain forces.
-    walls : Sequence[str], optional
-        Columns of the walls, see `walls.wall_columns`.
+    extra : Sequence[Component], optional
+        Components, such as walls, which may have columns of their own.
     awake : bool, optional
         Whether clusters may be at rest: with the column `awake`.
     """
 
-    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, awake: bool = False):
+    def __init__(self, forces: Sequence[str] = (), extra: Sequence[Component] = (), *, awake: bool = False):
         others = [name for name in forces if name != MAGNETIC]
-        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if awake else NUMBERS
+        self._extra, numbers = tuple(extra), (*NUMBERS, AWAKE) if awake else NUMBERS
+        self._further = [name for each in extra for name in each.losses()]
         own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
-        if taken := [name for name in walls if name in {*own, *forces, LOST_WALLS, MAGNETIC}]:
-            raise BadInput(f"walls: '{taken[0]}' is a column of the ledger; give this wall another name")
-        lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
-        of_state = (*lost, "total", *OF_MOTION, *numbers, *walls)
+        for each in extra:
+            if taken := [name for name in each.columns() if name in {*own, *forces, *self._further, MAGNETIC}]:
+                advice = f"give one of the {each.noun} another name"
+                raise BadInput(f"{each.name}: '{taken[0]}' is a column of the ledger; {advice}")
+        self._more = [name for each in extra for name in each.columns()]
+        of_state = (*LOSSES, *self._further, "total", *OF_MOTION, *numbers, *self._more)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
         self.frame_times: list[float] = []
         # engine, counts of contacts, and numbers of clusters for these
@@ -165,14 +111,26 @@ class Ledger(LedgerColumns):
         return True
 
     def row_of(self, engine: Engine) -> dict[str, float]:
-        """The row of the present state of an engine."""
-        found = engine.losses().tolist(), self._cluster_numbers(engine), engine.body_motion()
-        row = log_row(engine.state, *found, engine.contact_energies(), engine.force_energies(), self.walls)
-        return dict.fromkeys(self.columns, 0.0) | row  # 0 for forces that a change left out
+        """The row of the present state of an engine: energies, losses [J], momenta (SI), temperatures [K], counts."""
+        lost, bodies, state = engine.losses().tolist(), engine.body_motion(), engine.state
+        energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *engine.contact_energies()]
+        forces, own = engine.force_energies(), {name: v for each in self._extra for name, v in each.row(state).items()}
+        further = [own[name] for name in self._further]
+        row = dict.fromkeys(self.columns, 0.0)  # 0 for forces that a change left out
+        row |= self.counts_of(engine) | dict(zip((*KINETIC, *ENERGIES, *LOSSES), (*energies, *lost), strict=True))
+        row |= forces | {"total": math.fsum([*energies, *forces.values(), *lost, *further])}
+        row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
+        row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
+        row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
+        return row | own
 
     def counts_of(self, engine: Engine) -> dict[str, float]:
-        """The part of the row of the present state that needs no energies."""
-        return count_row(engine.state, self._cluster_numbers(engine))
+        """The part of the row of the present state that needs no energies: step, time [s], contacts and clusters."""
+        state, at_rest = engine.state, engine.state.at_rest
+        numbers = {"contacts": CONTACTS, "made": MADE, "moved": SLIPPED, "broken": BROKEN}
+        row: dict[str, float] = {"step": state.steps, "time": state.time}
+        row |= {name: int(state.count[k]) for name, k in numbers.items()} | self._cluster_numbers(engine)
+        return row | ({} if at_rest is None else {AWAKE: int(np.count_nonzero(~at_rest))})
 
     def _cluster_numbers(self, engine: Engine) -> dict[str, float]:
         """Numbers of clusters, found anew after contacts have formed or broken."""
@@ -208,7 +166,8 @@ class Ledger(LedgerColumns):
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
-        types = [int if name in WHOLE else float for name in columns]
+        whole = WHOLE.union(*(each.whole() for each in self._extra))
+        types = [int if name in whole else float for name in columns]
         self.columns = tuple(columns)
         self.rows = [
             {name: kind(v) for name, kind, v in zip(columns, types, row, strict=True)} for row in table.tolist()
@@ -222,8 +181,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *OF_MOTION, *NUMBERS, AWAKE}
-        others |= set(self.walls)
+        others = {"total", "step", "time", *LOSSES, *self._further, *OF_MOTION, *NUMBERS, AWAKE, *self._more}
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import time as wall
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,7 +84,7 @@ class RunLoop:
         self._simulation, self._signals, self._timer = simulation, signals, simulation._timer
         self._criteria = criteria
         self._end, self._last_step, self._condition = criteria
-        self._began = wall.monotonic()
+        self._began = monotonic()
         self._steps_per_call = 64
         self._stop, self._reached = Stop.NONE, simulation.time
         self._ends: Outcome | None = None  # why the run ends after the output at this step
@@ -102,7 +102,7 @@ class RunLoop:
         last = {"frame_every": max(ledger.frame_times[-1:], default=-math.inf), "row_every": ledger.last_time}
         self._frames, self._rows, self._saves = (
             Schedule(
-                by_default.get(name) if setting is None else read_cadence(setting, name, wall=True),
+                by_default.get(name) if setting is None else read_cadence(setting, name, wall_time=True),
                 *now,
                 last.get(name, -math.inf),
             )
@@ -140,7 +140,7 @@ class RunLoop:
 
     def _take_steps(self) -> None:
         """Let the engine take steps up to the next moment of a callback, `_reached`, or for `RETURN_EVERY`."""
-        simulation, began = self._simulation, wall.monotonic()
+        simulation, began = self._simulation, monotonic()
         due = [each.step_due for callback in self._callbacks for each in callback.schedules]
         step = min(self._last_step, self.updates.step_due, *due)
         most_steps = max(min(self._steps_per_call, step - simulation.steps), 0)
@@ -161,7 +161,7 @@ class RunLoop:
                     self._reached = simulation.time
             else:
                 self.updates.approach(goal)
-        self._stop, seconds = stop, wall.monotonic() - began
+        self._stop, seconds = stop, monotonic() - began
         self._estimate.update(simulation.time, simulation.steps, seconds)
         if most_steps == self._steps_per_call:
             growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)
@@ -237,7 +237,7 @@ class RunLoop:
         if self._signals.received:
             return Outcome.INTERRUPTED
         if isinstance(condition, Condition) and WALL in condition.names:
-            seconds = wall.monotonic() - self._began
+            seconds = monotonic() - self._began
             if self._holds(condition, seconds):
                 return Outcome.WALL_TIME
         if self._simulation.writer:

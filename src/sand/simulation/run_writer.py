@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 import platform
-import time as wall
 from importlib import metadata
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from ..basics.state import (
     SUBSTEPS,
     WOKEN,
 )
+from ..basics.version import __version__
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
@@ -40,8 +41,6 @@ from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
-from ..version import __version__
-from .cadence import read_cadence
 from .contact_table import measured_columns
 from .displays import DISPLAYS
 from .ledger import Ledger
@@ -89,7 +88,7 @@ class RunWriter:
         self.draws = True  # a figure at the end of each `run`
         self._trajectory: TrajectoryWriter | None = None
         self._ledger: LedgerFile | None = None
-        self._saved, self._took = wall.monotonic(), 0.0
+        self._saved, self._took = monotonic(), 0.0
         self._ends: tuple[float, float, str | None] = (math.inf, math.inf, None)
         self._case: dict[str, Any] = {}
         self._lock: FolderLock | None = None
@@ -209,13 +208,10 @@ class RunWriter:
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
         """Write a checkpoint if it is due by the cadence of the simulation, or if the last one is old enough."""
-        if simulation.checkpoint_every is not None:
-            cadence = read_cadence(simulation.checkpoint_every, "checkpoint_every", wall=True)
-            if due or (cadence.kind == "wall" and wall.monotonic() - self._saved > cadence.every):
-                self.save(simulation)
-            return
-        cheap = max(AT_OUTPUT_EVERY, self._took / COST)
-        if wall.monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY):
+        if simulation.checkpoint_every is None:
+            cheap = max(AT_OUTPUT_EVERY, self._took / COST)
+            due = monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY)
+        if due:
             self.save(simulation)
 
     def save(self, simulation: Simulation) -> None:
@@ -226,7 +222,7 @@ class RunWriter:
         self._stop_beside_others()
         regular = simulation.regular_state
         assert regular.count[STAGE] == 0
-        begun = wall.monotonic()
+        begun = monotonic()
         if self._trajectory is not None:
             self._trajectory.flush(sync=True)
         meta = {
@@ -260,7 +256,7 @@ class RunWriter:
             if len(ledger.frame_times) < len(ledger.rows):  # otherwise every row has a frame
                 arrays["frame_times"] = np.array(ledger.frame_times)
             self._own = _stamp(write_checkpoint(self.folder, arrays, meta))
-        self._saved = wall.monotonic()
+        self._saved = monotonic()
         self._took = self._saved - begun
 
     def flush(self) -> None:

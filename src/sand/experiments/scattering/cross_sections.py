@@ -7,12 +7,12 @@ touch) or when the bodies recede beyond the starting distance. Steps have a pres
 
 from __future__ import annotations
 
-import time as wall
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from time import monotonic, perf_counter
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...basics.units import si
 from ...errors import BadInput, warn
 from ..executors import results_of
 from .encounters import Flight
-from .flight_driver import BOUND, FAILED, HIT
+from .flight_driver import BOUND, FLIGHT_FAILED, HIT
 from .flights import COLUMNS, Trajectory, count_inaccurate, fly, inaccurate_text, replay, trajectory
 from .problem import flight
 from .sampling import CERTAIN, Strata, Task, cut
@@ -178,7 +178,7 @@ def measure(
     goal = si(relative_error, "1", "relative_error", above=0.0)
     if not 1e-4 <= goal <= 0.5:
         raise BadInput(f"relative_error = {relative_error!r} must lie in 1e-4 … 0.5")
-    start = wall.monotonic()
+    start = monotonic()
     strata = Strata(setup.scales.widest, setup.distance if setup.sphere else np.inf)
     before = rows_by_flight(known)
     # with a random target velocity σ is a rate over v∞; with a fixed one it is measured in the frame of the target
@@ -192,12 +192,12 @@ def measure(
             progress(sum(len(r) for r in rows), strata.estimate().value, strata.error())
     whole = np.concatenate(rows)
     _warn(strata, whole)
-    return _result(setup, strata, whole, seed, wall.monotonic() - start)
+    return _result(setup, strata, whole, seed, monotonic() - start)
 
 
 def _warn(strata: Strata, rows: np.ndarray) -> None:
     """Warn if σ is unreliable. Raises BadInput if more than 1 % of the flights failed."""
-    failed = int((rows[:, END] == FAILED).sum())
+    failed = int((rows[:, END] == FLIGHT_FAILED).sum())
     if failed > 0.01 * len(rows):
         raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin is extreme")
     if text := inaccurate_text(count_inaccurate(rows), len(rows), float(rows[:, DRIFT].max())):
@@ -277,9 +277,9 @@ def _pieces(
     size = TRIAL
     while tasks:
         bundle, tasks = cut(tasks, size)
-        start = wall.perf_counter()
+        start = perf_counter()
         rows = fly(setup, bundle, width, seed)
-        size = min(max(int(PIECE * len(rows) / max(wall.perf_counter() - start, 1e-9)), 1), MOST)
+        size = min(max(int(PIECE * len(rows) / max(perf_counter() - start, 1e-9)), 1), MOST)
         yield rows
         if executor is not None:
             break
@@ -306,7 +306,7 @@ def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds:
         flights=int(tries.sum()),
         hits=int(hits.sum()),
         bound=int((ends == BOUND).sum()),
-        failed=int((ends == FAILED).sum()),
+        failed=int((ends == FLIGHT_FAILED).sum()),
         speed=setup.speed,
         distance=setup.distance,
         seed=seed,

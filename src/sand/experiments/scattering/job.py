@@ -2,93 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import BadInput
-from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_toml, write_json, write_toml
+from ...io.run_folder import FIGURE, FLIGHTS, RESULTS_CSV, SCATTERING
 from ...io.table import GrowingTable, write_table
 from ...plotting.run_figure import save
 from ...simulation.run_writer import versions
+from ..job import Job, Progress
 from .cross_sections import measure, seed_of
 from .encounters import Flight
 from .flights import COLUMNS, LARGEST_DRIFT, Trajectory, trajectory
 from .maps import probability_map
-from .scatter_case import ScatterCase
+from .scatter_case import read_scattering
 
+Measured = tuple[list[dict[str, Any]], Any, dict[str, Any]]
+"""Rows of results.csv, the figure, and the content of scattering.json."""
 POINTS = 1001
 """Number of rows of a trajectory in results.csv, equally spaced in time."""
-Progress = Callable[[str, float], None]
-"""Called with a status line and the fraction that is done."""
 
 
-@dataclass
-class Job:
-    """One case of `sand scatter` in its folder.
+class ScatterJob(Job):
+    """One case of `sand scatter`; its flights are kept as rows of flights.csv, as which are next follows from them.
 
     Parameters
     ----------
-    case : ScatterCase
-        Case from `read_scattering`.
-    flights : list of Flight
-        Set-ups from `read_scattering`.
-    content : dict
-        Content of the case file, with absolute paths.
-    folder : Path
-        Existing folder.
-    resume : bool, optional
-        Use the flights saved in the folder.
+    path : str or Path
+        Case file.
+    folder : str or Path or None, optional
+        Output folder; by default that of the case, or the name of the case file.
+    **how
+        As for `Job`.
 
     Raises
     ------
     BadInput
-        If the folder contains another case.
+        All errors of the case.
     """
 
-    case: ScatterCase
-    flights: list[Flight]
-    content: dict[str, Any]
-    folder: Path
-    resume: bool = False
+    COMMAND, RESULTS = "scatter", SCATTERING
 
-    def __post_init__(self) -> None:
-        place = self.folder / CASE
-        if self.resume and place.exists():
-            if read_toml(place) != self.content:
-                raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
-        else:
-            write_toml(place, self.content, "settings of sand scatter, read by sand resume")
+    def __init__(self, path: str | Path, folder: str | Path | None = None, **how: bool):
+        self.case, self.flights = read_scattering(path)
+        super().__init__(path, folder or self.case.measure.out, **how)
         self.before: dict[int, list[list[float]]] = {}
-        self.table = None
-        if self.case.measure.job != "trajectories":
+        self.table: GrowingTable | None = None
+
+    def compute(self, executor: Executor | None, observers: Sequence[Any], progress: Progress) -> dict[str, Any]:
+        """Compute all flights, tables and the figure; returns the content of scattering.json."""
+        settings = self.case.measure
+        if settings.job != "trajectories":
             self.table = GrowingTable(self.folder / FLIGHTS, ("setup", *COLUMNS), resume=self.resume)
             for row in self.table.rows:
                 self.before.setdefault(int(row[0]), []).append(row[1:])
-
-    def run(self, executor: Executor | None = None, progress: Progress | None = None) -> dict[str, Any]:
-        """Compute everything; returns the content of scattering.json."""
-        results = {
-            "cross-section": self._cross_sections,
-            "map": self._map,
-            "trajectories": self._trajectories,
-        }[self.case.measure.job](executor, progress or (lambda text, part: None))
+        measure_all = {"cross-section": self._cross_sections, "map": self._map, "trajectories": self._trajectories}
+        rows, figure, results = measure_all[settings.job](executor, progress)
+        write_table(self.folder / RESULTS_CSV, rows)
+        save(figure, self.folder / FIGURE)
         if self.table is not None:
             self.table.sort()
-        content = {"job": self.case.measure.job, "seed": self.case.measure.seed, "versions": versions(), **results}
-        write_json(self.folder / SCATTERING, content)
-        return content
+        return {"job": settings.job, "seed": settings.seed, "versions": versions(), **results}
 
     def _keep(self, setup: int, rows: np.ndarray) -> None:
         assert self.table is not None
         self.table.add([setup, *row] for row in rows.tolist())
 
-    def _cross_sections(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
+    def _cross_sections(self, executor: Executor | None, progress: Progress) -> Measured:
         from ...plotting.scattering import sigma_figure
 
         def show(setup: int, flights: int, sigma: float, error: float) -> None:
@@ -110,11 +94,9 @@ class Job:
         ]
         rows = [one.to_dict() for one in found]
         flat = [{k: v for k, v in row.items() if k not in ("profile", "interval", "seconds")} for row in rows]
-        write_table(self.folder / RESULTS, flat)
-        save(sigma_figure(found, _title(self.flights)), self.folder / FIGURE)
-        return {"cross_sections": rows}
+        return flat, sigma_figure(found, _title(self.flights)), {"cross_sections": rows}
 
-    def _map(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
+    def _map(self, executor: Executor | None, progress: Progress) -> Measured:
         from ...plotting.scattering import map_figure
 
         settings = self.case.measure
@@ -129,16 +111,10 @@ class Job:
             progress=lambda n, total: progress(f"{n} of {total} flights", n / total),
         )
         rows = found.to_rows()
-        write_table(self.folder / RESULTS, rows)
-        save(map_figure(found, _title(self.flights)), self.folder / FIGURE)
-        return {
-            "cells": rows,
-            "r1_plus_r2": found.geometric,
-            "drift": found.drift,
-            "inaccurate": found.inaccurate,
-        }
+        content = {"r1_plus_r2": found.geometric, "drift": found.drift, "inaccurate": found.inaccurate}
+        return rows, map_figure(found, _title(self.flights)), {"cells": rows, **content}
 
-    def _trajectories(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
+    def _trajectories(self, executor: Executor | None, progress: Progress) -> Measured:
         from ...plotting.scattering import trajectories_figure
 
         groups: list[list[Trajectory]] = []
@@ -147,9 +123,9 @@ class Job:
             for n, b in enumerate(self.case.impact_parameters(one)):
                 groups[-1].append(trajectory(one, b, seed=self.case.measure.seed, stratum=k, number=n))
                 progress(f"flight {n + 1} of set-up {k + 1}", k / len(self.flights))
-        write_table(self.folder / RESULTS, [row for k, group in enumerate(groups) for row in _path_rows(k, group)])
+        rows = [row for k, group in enumerate(groups) for row in _path_rows(k, group)]
         names = [str(spin) for spin in self.case.measure.spins or [self.case.flight.spin]]
-        save(trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights)), self.folder / FIGURE)
+        figure = trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights))
         kept = ("end", "impact_parameter", "speed", "closest", "exchanged", "drift")
         results = [
             {"setup": k, **{name: getattr(one, name) for name in kept}}
@@ -157,12 +133,8 @@ class Job:
             for one in group
         ]
         drifts = [one["drift"] for one in results]
-        return {
-            "trajectories": results,
-            "b_max": self.flights[0].scales.capture,
-            "drift": max(drifts),
-            "inaccurate": sum(drift > LARGEST_DRIFT for drift in drifts),
-        }
+        inaccurate, unit = sum(drift > LARGEST_DRIFT for drift in drifts), self.flights[0].scales.capture
+        return rows, figure, {"trajectories": results, "b_max": unit, "drift": max(drifts), "inaccurate": inaccurate}
 
 
 def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
