@@ -349,20 +349,6 @@ def test_cut_off_of_screened_charges():
     assert sand.ScreenedCharges("1 um").check(grains, open_box) == []
 
 
-@pytest.mark.parametrize(
-    ("make", "line"),
-    [
-        (lambda: sand.ScreenedCharges(), "ScreenedCharges: screening_length is missing"),
-        (lambda: sand.ScreenedCharges("-1 nm"), "screened_charges: screening_length = '-1 nm' must be above 0 m"),
-        (lambda: sand.ScreenedCharges("1 nm", cut="sharpe"), "screened_charges: cut = 'sharpe'; did you mean 'sharp'"),
-    ],
-)
-def test_mistakes_with_screened_charges(make, line):
-    """One clear line each."""
-    with pytest.raises(BadInput, match=f"^{line}"):
-        make()
-
-
 def test_the_taylor_scheme_needs_rates():
     """Forces without a rate of change are refused with far = "taylor", by name."""
     grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], 1e-9, sand.SILICA, charge=1e-19)

@@ -164,33 +164,3 @@ def test_contact_time_without_adhesion_is_that_of_hertz():
     modulus = sand.SILICA.young_modulus / (2 * (1 - sand.SILICA.poisson_ratio**2))
     expected = 2.868 * ((grains.mass[0] / 2) ** 2 / (R / 2 * modulus**2 * speed)) ** 0.2
     assert contact_frames[-1] - contact_frames[0] == pytest.approx(expected, abs=2.5 * max(steps[1:]))
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"stiffness": "frozn"}, "did you mean 'frozen'"),
-        ({"damping": "viscous"}, "damping = 'viscous'; did you mean 'viscoelastic'"),
-        ({"mixing": "mean"}, "mixing = 'mean'; allowed: geometric"),
-        ({"roll_factor": -1}, "roll_factor = -1 must be at least 0"),
-        ({"rolling_limit": "1 kg"}, "rolling_limit = '1 kg' is not a quantity in m"),
-        ({"damping": "constant"}, "damping_constant is missing: damping = 'constant' needs"),
-        ({"damping": "viscoelastic"}, "viscous_time is missing: damping = 'viscoelastic' needs"),
-        ({"damping": "critical", "damping_ratio": -0.1}, "damping_ratio = -0.1 must be above 0"),
-        ({"damping": "critical", "damping_ratio": 5.1}, "damping_ratio = 5.1 must be above 0 and at most 5"),
-        ({"damping_ratio": 0.2}, "damping_ratio = 0.2 is not used by damping = 'none'"),
-        ({"damping": "critical", "viscous_time": "1 ps"}, "viscous_time = '1 ps' is not used by damping = 'critical'"),
-        ({"bath_temperature": "100 K"}, "bath_temperature needs damping"),
-        ({"damping": "critical", "bath_temperature": "0 K"}, "bath_temperature = '0 K' must be above 0 K"),
-        ({"settling_time": 0.0}, "settling_time = 0.0 must be above 0 s"),
-        ({"settling_time": "5 nm"}, "settling_time = '5 nm' is not a quantity in s"),
-        ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not used by damping = 'none'"),
-    ],
-)
-def test_bad_settings(settings, message):
-    """One line per error, all errors at once."""
-    with pytest.raises(sand.BadInput, match=message):
-        sand.Contact(**settings)
-    with pytest.raises(sand.BadInput) as caught:
-        sand.Contact(**({"damping_constant": -1.0} | settings | {"viscous_time": "1 m"}))
-    assert len(caught.value.problems) >= 2

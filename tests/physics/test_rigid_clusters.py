@@ -811,22 +811,6 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     )
 
 
-@pytest.mark.parametrize(
-    ("given", "match"),
-    [
-        ({"vibration": 0.2}, "stepping: vibration = 0.2 must be above 0 and at most 0.1"),
-        ({"vibration": 0.0}, "stepping: vibration"),
-        ({"step_fraction": 1.0}, "stepping: step_fraction = 1.0 must be above 0 and at most 0.2"),
-        ({"longest_step": "1 m"}, "stepping: longest_step"),
-        ({"contact_stepping": sand.Verlet(far="taylor")}, "far = 'taylor' is not possible with rigid clusters"),
-    ],
-)
-def test_settings_out_of_range_are_refused(given, match):
-    """One line with the key and what is allowed."""
-    with pytest.raises(sand.BadInput, match=match):
-        sand.RigidClusters(**given)
-
-
 @pytest.mark.compiled("dipoles")
 def test_a_case_file_and_the_summary(tmp_path, capsys):
     """`clusters = "rigid"` is `sand.RigidClusters`; summary.json says how long clusters were awake; it is resumed."""

@@ -355,30 +355,6 @@ GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
 @pytest.mark.parametrize(
     ("make", "line"),
     [
-        (lambda: sand.Dipoles(periodic="evald"), "dipoles: periodic = 'evald'; did you mean 'ewald'"),
-        (
-            lambda: sand.Dipoles(periodic="ewald", boundary="air"),
-            "dipoles: boundary = 'air'; allowed: tin-foil, vacuum",
-        ),
-        (
-            lambda: sand.Dipoles(periodic="ewald", accuracy=1e-9),
-            "dipoles: accuracy = 1e-09 must be at least 1e-08 and at most 0.1",
-        ),
-        (
-            lambda: sand.Dipoles(periodic="ewald", accuracy=0.2),
-            "dipoles: accuracy = 0.2 must be at least 1e-08 and at most 0.1",
-        ),
-        (
-            lambda: sand.Dipoles(periodic="ewald", cutoff="0.1 um"),
-            "dipoles: cutoff = 1e-07 cannot be given with periodic = 'ewald'",
-        ),
-        (lambda: sand.Dipoles(periodic="ewald", cutoff=None), "dipoles: cutoff = None cannot be given with periodic"),
-        (lambda: sand.Dipoles(periodic="ewald", cut="sharp"), "dipoles: cut = 'sharp' cannot be given with periodic"),
-        (lambda: sand.Dipoles(accuracy=1e-4), "dipoles: accuracy is used only with periodic = 'ewald'"),
-        (
-            lambda: sand.Dipoles(periodic="ewald", open="pairs"),
-            "dipoles: open = 'pairs' is for open boxes and periodic = 'ewald' for periodic ones",
-        ),
         (
             lambda: sand.Simulation(GRAINS, [sand.Dipoles(periodic="ewald")]),
             "dipoles: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is open",
@@ -407,20 +383,3 @@ def test_mistakes_with_the_ewald_sum(make, line):
     with pytest.raises(BadInput) as error:
         make()
     assert str(error.value).startswith(line) and len(error.value.problems) == 1
-
-
-def test_all_mistakes_are_reported_at_once():
-    """One line each, of misspelt words, of numbers, and of settings that exclude each other."""
-    with pytest.raises(BadInput) as error:
-        sand.Dipoles("1 um", "sharp", periodic="ewald", open="tree", accuracy=0.2, boundary="foil", reciprocal="meshes")
-    lines = (
-        "accuracy = 0.2 must be at least 1e-08 and at most 0.1",
-        "boundary = 'foil'; did you mean",
-        "reciprocal = 'meshes'; did you mean 'mesh'?",
-        "cutoff = 1e-06 cannot be given with periodic = 'ewald'",
-        "cut = 'sharp' cannot be given with periodic = 'ewald'",
-        "open = 'tree' is for open boxes and periodic = 'ewald' for periodic ones; leave one of them out",
-    )
-    assert len(error.value.problems) == len(lines)
-    for problem, line in zip(error.value.problems, lines, strict=True):
-        assert problem.startswith(f"dipoles: {line}")

@@ -337,25 +337,6 @@ def test_the_choice_and_a_net_charge_are_stated():
 @pytest.mark.parametrize(
     ("make", "lines"),
     [
-        (lambda: sand.Charges(periodic="evald"), ["charges: periodic = 'evald'; did you mean 'ewald'"]),
-        (
-            lambda: sand.Charges(periodic="ewald", cut="sharp", cutoff="0.1 um", accuracy=2, boundary="vacuum"),
-            [
-                "charges: accuracy = 2 must be at least 1e-08 and at most 0.1",
-                "charges: cutoff = 1e-07 cannot be given with periodic = 'ewald'",
-                "charges: cut = 'sharp' cannot be given with periodic = 'ewald'",
-                "charges: boundary = 'vacuum' is for dipoles only",
-            ],
-        ),
-        (
-            lambda: sand.Charges(periodic="nearest image", accuracy=1e-4),
-            ["charges: accuracy is used only with periodic = 'ewald'"],
-        ),
-        (
-            lambda: sand.Charges(cut="sharp", accuracy=1e-4),
-            ["charges: accuracy is used only by an Ewald sum, which has no cut; leave it out"],
-        ),
-        (lambda: sand.Charges(boundary="vacuum"), ["charges: boundary = 'vacuum' is for dipoles only"]),
         (
             lambda: simulation([[0, 0, 0]], Q, (1e-6, 1e-6, None), periodic="auto", accuracy=1e-4),
             ["charges: accuracy is used only by an Ewald sum, and there is none: the box is periodic 1 um x 1 um x"],
@@ -363,14 +344,6 @@ def test_the_choice_and_a_net_charge_are_stated():
         (
             lambda: simulation([[0, 0, 0]], Q, (1e-6, 1e-6, None)),
             ["charges: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is periodic 1 um"],
-        ),
-        (
-            lambda: sand.Attraction(periodic="ewald"),
-            ["Attraction: there is no argument 'periodic'; allowed: cutoff, cut"],
-        ),
-        (
-            lambda: sand.ScreenedCharges(1e-7, periodic="ewald"),
-            ["ScreenedCharges: there is no argument 'periodic'; allowed: screening_length, cutoff, cut"],
         ),
     ],
 )

@@ -448,33 +448,6 @@ def test_shortest_relaxation_time(accommodation):
     assert shortest_stopping_time(grains.arrays, rules._replace(on=False)) == math.inf
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"temperature": -1}, r"gas: temperature = -1 must be above 0 K"),
-        ({"temperature": math.nan}, r"gas: temperature = nan is not finite; give a number in K"),
-        ({"temperature": "20 m"}, r"gas: temperature = '20 m' is not a quantity in K"),
-        ({"density": 1.0}, r"either the density in kg/m\^3 or the pressure in Pa; both"),
-        ({"pressure": None}, r"either the density in kg/m\^3 or the pressure in Pa; neither"),
-        ({"pressure": 0}, r"gas: pressure = 0 must be above 0 Pa"),
-        ({"pressure": None, "density": -2.0}, r"gas: density = -2.0 must be above 0 kg/m\^3"),
-        ({"molecule_mass": "0 kg"}, r"gas: molecule_mass = '0 kg' must be above 0 kg"),
-        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 must be at least 0 and at most 1"),
-        ({"accommodation": -0.1}, r"gas: accommodation = -0.1 must be at least 0"),
-        ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a number"),
-        ({"brownian": "no"}, r"gas: brownian = 'no' must be true or false"),
-        ({"wind": 3.0}, r"gas: wind = 3.0 must be three components, in m/s"),
-        ({"wind": [1, math.inf, 0]}, r"gas: wind y = inf is not finite; give a number in m/s"),
-        ({"cross_section": "1 nm"}, r"gas: cross_section = '1 nm' is not a quantity in m\^2"),
-    ],
-)
-def test_bad_input(changes, message):
-    """One line: what, where, unit, what is allowed."""
-    with pytest.raises(sand.BadInput, match=message) as caught:
-        still_gas(**changes)
-    assert len(caught.value.problems) == 1
-
-
 def test_all_errors_are_reported_together():
     """Each error has its line: temperature, density, pressure, both of them, and so on."""
     with pytest.raises(sand.BadInput) as caught:

@@ -160,22 +160,6 @@ def test_bad_input(arguments, message):
         magnetic_limits(*arguments)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "message"),
-    [
-        ("anisotropy", 0.0, "iron: anisotropy = 0 must not be 0 J/m^3 if it is cubic"),
-        ("anisotropy_kind", "cubical", "iron: anisotropy_kind = 'cubical'; did you mean 'cubic'"),
-        ("anisotropy", "1 J", "is not a quantity in J/m^3; give a number in SI or text such as '48 kJ/m^3'"),
-        ("exchange_stiffness", np.nan, "iron: exchange_stiffness = nan is not finite"),
-    ],
-)
-def test_bad_constants_of_a_material(key, value, message):
-    """One line that names material, key and unit."""
-    with pytest.raises(sand.BadInput) as caught:
-        sand.IRON.but(**{key: value})
-    assert message in str(caught.value) and len(caught.value.problems) == 1
-
-
 def test_a_negative_constant_needs_a_cubic_crystal():
     """One line that says what to do; a cubic crystal takes it."""
     with pytest.raises(sand.BadInput) as caught:

@@ -396,34 +396,6 @@ def test_choice_and_wrong_input():
     )
     assert force.sums(box, False, many) is tree_loops.TREE
     assert dataclasses.replace(force, cutoff=None).uses_tree(many, box)  # as resolved for a resumed run
-    for options, lines in (
-        ({"open": "octree"}, ["open = 'octree'; did you mean 'tree'"]),
-        ({"open": "pairs", "accuracy": 1e-2}, ["accuracy is used only with periodic = 'ewald' or open = 'tree'"]),
-        ({"open": "tree", "accuracy": 0.2}, ["accuracy = 0.2 must be at least 1e-08 and at most 0.1"]),
-        (
-            {"open": "tree", "periodic": "ewald", "cutoff": "1 um"},
-            ["cutoff = 1e-06 cannot be given with periodic", "open = 'tree' is for open boxes and periodic = 'ewald'"],
-        ),
-        (
-            {"open": "tree", "accuracy": 1e-7, "cutoff": "1 um", "cut": "sharp", "boundary": "vacuum"},
-            [
-                "accuracy = 1e-07 must be at least 1e-06 with open = 'tree'",
-                "boundary is used only with periodic = 'ewald'; add that, or leave it out",
-                "cutoff = 1e-06 cannot be given with open = 'tree', which sums all pairs",
-                "cut = 'sharp' cannot be given with open = 'tree'",
-            ],
-        ),
-        ({"open": "pairs", "cutoff": "1 um"}, ["cutoff = 1e-06 cannot be given with open = 'pairs', which sums all"]),
-        (
-            {"open": "tree", "accuracy": 1e-3, "reciprocal": "mesh"},
-            ["reciprocal is used only with periodic = 'ewald'"],
-        ),
-    ):
-        with pytest.raises(BadInput) as error:
-            sand.Dipoles(**options)
-        assert len(error.value.problems) == len(lines)
-        for problem, line in zip(error.value.problems, lines, strict=True):
-            assert problem.startswith(f"dipoles: {line}")
     grains = sand.Grains([[0, 0, 0], [1, 0, 0]], RADIUS, sand.IRON, moment=[0, 0, MOMENT])
     with pytest.raises(
         BadInput, match="far = 'taylor' needs the rate of change of every pair force, which dipoles lacks"

@@ -14,18 +14,6 @@ ONE = sand.Grains([[0, 0, 1e-6]], 5e-7, "silica")
 FLOOR = sand.Wall([0, 0, 0], [0, 0, 1], "silica", name="floor")
 
 
-def test_each_mistake_of_a_wall_is_one_line():
-    """All mistakes of one wall at once."""
-    with pytest.raises(sand.BadInput) as error:
-        sand.Wall([0, 0, "1 s"], [0, 0, 0], "silka", mass=-1, name="a-b")
-    lines = error.value.problems
-    assert len(lines) == 5
-    for line, part in zip(lines, ("point", "no direction", "silka", "mass", "letters"), strict=True):
-        assert part in line
-    with pytest.raises(sand.BadInput, match="force is given without a mass"):
-        sand.Wall([0, 0, 0], [0, 0, 1], "silica", force="1 nN")
-
-
 @pytest.mark.parametrize(
     ("wall", "options", "message"),
     [

@@ -71,7 +71,8 @@ class Whole(Setting):
     @property
     def range(self) -> str:
         """What is allowed, in words."""
-        return f"a whole number{f' of at least {self.least}' if self.most is None else f', {self.least} … {self.most}'}"
+        bounds = f" of at least {self.least}" if self.most is None else f", {self.least:g} … {self.most:g}"
+        return f"a whole number{bounds}"
 
     def read(self, value: Any, name: str) -> Any:
         """The number, as given."""

@@ -138,9 +138,7 @@ def whole_number(value: Any, name: str, least: int = 1, most: int | None = None)
     """Check a whole number from `least` to `most`. Raises BadInput."""
     is_whole = _is_whole(value)
     if not is_whole or value < least or (most is not None and value > most):
-        bounds = (
-            f"of at least {least}" if most is None or (is_whole and value < least) else f"from {least} to {most:.3g}"
-        )
+        bounds = f"of at least {least}" if most is None or (is_whole and value < least) else f"from {least} to {most:g}"
         raise BadInput(f"{name} = {shown(value)} must be a whole number {bounds}")
     return int(value)
 
