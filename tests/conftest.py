@@ -29,8 +29,10 @@ from numba.core.event import Event, Listener, register
 # run, workers and children, must load them in the same way, or they compile everything twice.
 compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 
+from sand.compiler.ahead import share_compilation  # noqa: E402
+
 from .specs import FIXTURES, SPECS, WORKERS  # noqa: E402
-from .validation import Recorder, parse_part, part_of  # noqa: E402
+from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E402
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -50,17 +52,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=parse_part,
         help="run only the long checks of part K (0 … N-1) of N, and no other tests",
     )
-    parser.addoption("--record", action="store_true", help="write tests/validated.md if every test passes")
+    parser.addoption(
+        "--record", metavar="FILE", type=Path, help="write numbers beside their bounds to a table (tests/validation.py)"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if hasattr(config, "workerinput"):  # workers of pytest-xdist share the cores
+        share_compilation()
     # the same examples in every run: no test fails by chance
     settings.register_profile("fixed", max_examples=100 if config.getoption("--validate") else 30, derandomize=True)
     settings.load_profile("fixed")
-    if config.getoption("--record") and not config.getoption("--validate"):
-        raise pytest.UsageError("--record is for the whole of --validate; give that, too")
     if config.getoption("--record") and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Recorder())
+        config.pluginmanager.register(Recorder(config.getoption("--record")))
 
 
 def _tier(item: pytest.Item) -> str | None:
@@ -112,6 +116,8 @@ def _mark(item: pytest.Item, tier: str | None) -> None:
         if item.get_closest_marker("compiled") is None:
             item.add_marker(pytest.mark.compiled(FIXTURES[name]))
     mark = item.get_closest_marker("compiled")
+    if tier is not None:  # only default tests expect all of their warnings
+        item.add_marker(pytest.mark.filterwarnings("default"), append=False)
     if mark is None and tier is None and "slow" not in item.keywords:
         item.add_marker(pytest.mark.quick)
     if mark is not None:
@@ -169,6 +175,12 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     lines += [HOW_TO_RUN[name] for name in HOW_TO_RUN if name not in _chosen(config)]
     if reporter is not None and not hasattr(config, "workerinput"):
         reporter.write_line("not run: " + "; ".join(lines))
+
+
+@pytest.fixture
+def record_bound(request: pytest.FixtureRequest) -> BoundRecorder:
+    """Checks a number against its bounds, and records it: `record_bound("energy error", error, most=1e-6)`."""
+    return BoundRecorder(request.node.user_properties)
 
 
 @pytest.fixture(autouse=True)

@@ -23,24 +23,23 @@ A step ends at the first contact of two grains; during contacts SAND takes steps
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 import sand
 from sand.basics.arguments import checked
 from sand.basics.box import nearest_image
+from sand.basics.settings import Number, Table
 from sand.basics.state import FLIGHT, LONG_RANGE_SUMS, NEEDED, REJECTED, STEPS, TIME
-from sand.basics.units import is_word, si
 from sand.compiler.jit import caller, formula, loop, rare
 from sand.compiler.program import call_stage, has_stage
 from sand.compiler.stage import stage
-from sand.errors import FORBID_EXTRA, BadInput
 from sand.forces.external.formulas import stiffness_of_field
 from sand.integrate.flight import finish_flight_step, refresh_verlet_list, sum_free_loads
 from sand.integrate.force_calls import sum_external
 from sand.integrate.force_stages import ENERGY, POWER
-from sand.integrate.integrator import register
+from sand.integrate.integrator import IntegratorSettings, register
 from sand.integrate.motion import kick
 from sand.integrate.parts import DRIVER_PARTS, Stop
 from sand.integrate.stages import StageNumber
@@ -424,7 +423,7 @@ def symplectic_flight(s):
 @register
 @checked
 @dataclass(frozen=True)
-class ForestRuth:
+class ForestRuth(IntegratorSettings):
     """Symplectic scheme of fourth order while there are no contacts, velocity Verlet otherwise.
 
     Four sums of the forces per step; momentum and angular momentum are conserved to rounding, the energy error is
@@ -449,33 +448,12 @@ class ForestRuth:
         If a parameter is out of range.
     """
 
-    accuracy: Any = 1e-8
-    step: Any = "auto"
-    contact_stepping: sand.Verlet = field(default_factory=sand.Verlet)
+    accuracy: Annotated[Any, Number(above=0.0, below=1.0)] = 1e-8
+    step: Annotated[Any, Number("s", above=0.0, auto=True)] = "auto"
+    contact_stepping: Annotated[sand.Verlet, Table(sand.Verlet)] = field(default_factory=sand.Verlet)
 
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "forest-ruth"
     flight: ClassVar[Any] = symplectic_flight
-
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        for key, unit, below in (("accuracy", "1", 1.0), ("step", "s", math.inf)):
-            if key == "step" and is_word(self.step, "auto"):
-                continue
-            try:
-                value = si(getattr(self, key), unit, f"stepping: {key}", above=0.0, below=below)
-                object.__setattr__(self, key, value)
-            except BadInput as error:
-                problems += error.problems
-        if not isinstance(self.contact_stepping, sand.Verlet):
-            problems.append(f"stepping: contact_stepping = {self.contact_stepping!r}; give sand.Verlet(…)")
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        verlet = {key: value for key, value in self.contact_stepping.parameters().items() if key != "method"}
-        return {"method": self.name, "accuracy": self.accuracy, "step": self.step, "contact_stepping": verlet}
 
     def resolved(self, grains: sand.Grains, criteria: Any) -> "ForestRuth":
         """These settings: the stage chooses the automatic step."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import importlib
 
+from .basics.version import __version__
 from .entry_points import register
 from .forces import BUILT_IN as FORCES
 from .integrate import BUILT_IN as INTEGRATORS
-from .version import __version__
 
 register()
 
@@ -38,10 +38,10 @@ _MODULES = {
     **INTEGRATORS,
     "Neighbours": "neighbours.search",
     "Simulation": "simulation.simulation",
-    "Wall": "engine.walls",
+    "Wall": "components.walls",
     "resume": "config.build",
     "open": "results",
-    "Driven": "engine.driven",
+    "Driven": "components.driven",
     "Observer": "simulation.observers",
     "Updater": "simulation.updater",
     "set_threads": "basics.threads",
@@ -71,10 +71,10 @@ if TYPE_CHECKING:
     from .basics.material import Material as Material
     from .basics.ramps import Ramp as Ramp
     from .basics.threads import set_threads as set_threads
+    from .components.driven import Driven as Driven
+    from .components.walls import Wall as Wall
     from .config.build import resume as resume
     from .contact.model import Contact as Contact
-    from .engine.driven import Driven as Driven
-    from .engine.walls import Wall as Wall
     from .errors import BadInput as BadInput
     from .errors import FilesFailed as FilesFailed
     from .errors import Interrupted as Interrupted

@@ -48,6 +48,7 @@ def test_shorter_runs():
     assert form("5e-06 s after 9885 steps, drift 0.0004") == "# s after # steps, drift #"
 
 
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate", "ignore:wrote .* but no browser could be opened")
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("page, k", SCRIPTS, ids=lambda x: getattr(x, "stem", x))
 def test_scripts(page, k, as_docs, capsys):
@@ -58,6 +59,7 @@ def test_scripts(page, k, as_docs, capsys):
         assert form(printed) == form(quoted.quotable()["script"]["printed"])
 
 
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate")
 @pytest.mark.compiled("dipoles")
 def test_first_page(as_docs, capfd):
     """The cells of the first page run one after the other, shortened; commands print what they did."""

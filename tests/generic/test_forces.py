@@ -168,6 +168,11 @@ def by_hand(force, grains, box):
     return *loads, energies
 
 
+@pytest.mark.filterwarnings(
+    "ignore:attraction. the cut-off, .* ends an interaction",
+    "ignore:charges. the cut-off, .* ends an interaction",
+    "ignore:dipoles. the cut-off, .* ends an interaction",
+)
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:screened_charges")
 @pytest.mark.parametrize("name", PAIR_FORCES)

@@ -76,9 +76,10 @@ def flyby(stepping, **end):
     return sim
 
 
+@pytest.mark.filterwarnings("ignore:without settling_time in")
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("name", STEPPINGS)
-def test_the_default_settings_conserve_energy_and_momentum(name):
+def test_the_default_settings_conserve_energy_and_momentum(record_bound, name):
     """Fly-by of two magnetic grains: energy to 1e-6 of the kinetic energy, momentum to rounding (1e-13).
 
     The default errors are 1e-8 |U_min| per step (Verlet, oscillating) and 1e-8 of the interaction energy (Forest–Ruth).
@@ -86,7 +87,7 @@ def test_the_default_settings_conserve_energy_and_momentum(name):
     """
     sim = flyby(STEPPINGS[name](**({"step_fraction": 0.005} if name == "rigid-clusters" else {})))
     first, last = sim.ledger["total"][0], sim.ledger["total"][-1]
-    assert last == pytest.approx(first, abs=1e-6 * sim.ledger["translation"][0])
+    record_bound("energy error over the kinetic energy", abs(last - first) / sim.ledger["translation"][0], most=1e-6)
     momentum = sim.grains.mass @ sim.grains.velocity
     assert np.abs(momentum).max() < 1e-13 * sim.grains.mass[0] * 0.5
     assert len(sim.contacts["pair"]) == 0 and sim.time >= 8e-7
@@ -138,7 +139,7 @@ FIXED_STEPS = {"verlet": (2, 800, 1), "forest-ruth": (4, 400, 4)}
 
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("name", FIXED_STEPS)
-def test_order_of_convergence(name):
+def test_order_of_convergence(record_bound, name):
     """Halving the step divides the error in x, v, μ and ω of two spinning dipoles by 2^p: ± 15 %.
 
     The reference is SciPy's DOP853 (order 8, accurate to 1e-13), with moments as vectors; the smallest error is 2e-11.
@@ -153,7 +154,8 @@ def test_order_of_convergence(name):
         assert sim.state.count[LONG_RANGE_SUMS] == sums * steps
         errors.append(np.abs(state_of(sim.grains) - reference_solution(sim.start, sim.time)).max())
     assert errors[0] < 1e-3
-    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0**order, rtol=0.15)
+    for ratio in np.divide(errors[:-1], errors[1:]):
+        record_bound(f"error over that of half the step, over 2^{order}", ratio / 2.0**order, least=0.85, most=1.15)
 
 
 def test_every_integrator_with_a_fixed_step_has_an_order():

@@ -9,6 +9,10 @@ import sand
 from sand.basics.state import CONTACTS
 from sand.errors import BadInput
 
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:charges. the cut-off, .* ends an interaction", "ignore:dipoles. the cut-off, .* ends an interaction"
+)
+
 
 def warm_gas(damped=True, **options):
     """Magnetic grains in a field, damped with thermal noise or undamped; contacts form within some nanoseconds."""

@@ -19,7 +19,7 @@ from .setups import PrescribedMotion, random_aggregate, rest_distance, struck_ch
     ("far", "bound"), [pytest.param("every step", 1e-12, marks=pytest.mark.validate), ("impulse", 1e-11)]
 )
 @pytest.mark.parametrize(("seed", "radii"), [(1, (1e-8, 1e-8)), (2, (4e-9, 1.2e-8)), (3, (2e-9, 2e-8))])
-def test_momentum_and_angular_momentum_are_conserved(seed, radii, far, bound):
+def test_momentum_and_angular_momentum_are_conserved(record_bound, seed, radii, far, bound):
     """P and L = Σ x×mv + Iω of a random aggregate with dipoles in open space, 1e5 steps, change by rounding only.
 
     Verlet conserves both exactly, with long-range forces summed in every step or in r-RESPA cycles.  Rounding gives
@@ -41,13 +41,14 @@ def test_momentum_and_angular_momentum_are_conserved(seed, radii, far, bound):
     linear = (g.mass[:, None] * np.abs(g.velocity)).sum()
     arms = np.linalg.norm(np.cross(g.position, g.mass[:, None] * g.velocity), axis=1).sum()
     angular = arms + np.linalg.norm(g.inertia[:, None] * g.spin, axis=1).sum()
-    assert np.abs(momenta[1] - momenta[0]).max() < bound * linear
-    assert np.abs(momenta[3] - momenta[2]).max() < bound * angular
+    record_bound("change of the momentum over Σ|mv|", np.abs(momenta[1] - momenta[0]).max() / linear, most=bound)
+    turned = np.abs(momenta[3] - momenta[2]).max() / angular
+    record_bound("change of the angular momentum over Σ|x×mv| + |Iω|", turned, most=bound)
     assert sim.ledger.rows[-1]["moved"] > 100  # contacts did slide and roll
 
 
 @pytest.mark.compiled("dipoles")
-def test_energy_of_a_magnetic_gas_before_its_first_contact():
+def test_energy_of_a_magnetic_gas_before_its_first_contact(record_bound):
     """Total energy of a periodic gas until the first contact: error ≤ 1e-6 of |U_min| = 2kμ²/d³.
 
     Without contacts only errors of the magnetic forces remain; many pairs cross the cut-off.
@@ -66,7 +67,9 @@ def test_energy_of_a_magnetic_gas_before_its_first_contact():
     magnetic = np.array([row["magnetic"] for row in before])
     assert len(before) > 20
     assert np.ptp(magnetic) > 0.1 * u_min  # energy was exchanged
-    assert np.abs(totals - totals[0]).max() < 1e-6 * u_min
+    record_bound(
+        "energy error over |U_min| before the first contact", np.abs(totals - totals[0]).max() / u_min, most=1e-6
+    )
 
 
 def chain_error(steps_per_period, hits):
@@ -82,16 +85,17 @@ def chain_error(steps_per_period, hits):
     return np.sqrt(np.mean(np.square(errors)))
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("hits", "halvings"), [(5, 3), pytest.param(9, 4, marks=pytest.mark.validate)])
-def test_energy_balance_of_a_struck_chain(hits, halvings):
+def test_energy_balance_of_a_struck_chain(record_bound, hits, halvings):
     """Chain of 7 iron grains (20 nm) hit at 100 m/s: rms error of the hits ≤ 3e-3 of the impact energy at T/20.
 
     Contacts form, break, slide and roll.  Verlet is of order two and transitions are exact, so the error falls by about
     4, at least 3, per halving of the step, down to 1e-5; four halvings reach 1.5e-5, three 4 times as much.
     """
     errors = [chain_error(20.0 * 2**k, hits) for k in range(halvings + 1)]
-    assert errors[0] < 3e-3
+    record_bound("rms energy error over the impact energy at 20 steps per period", errors[0], most=3e-3)
     for coarse, fine in itertools.pairwise(errors):
         assert fine < coarse / 3 or fine < 1e-5
     assert errors[-1] < 1.5e-5 * 4.0 ** (4 - halvings)
@@ -99,7 +103,7 @@ def test_energy_balance_of_a_struck_chain(hits, halvings):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("slip", ["clamp", "reset"])
-def test_energy_balance_of_two_materials_and_unequal_radii(slip):
+def test_energy_balance_of_two_materials_and_unequal_radii(record_bound, slip):
     """Two aggregates of unequal silica and ice grains collide at 20 m/s; energy error ≤ 1e-3 of the impact energy."""
     left = random_aggregate(12, 5, radii=(2e-8, 8e-8))
     right = random_aggregate(12, 6, radii=(2e-8, 8e-8))
@@ -115,7 +119,7 @@ def test_energy_balance_of_two_materials_and_unequal_radii(slip):
     last = sim.ledger.rows[-1]
     assert last["made"] > 0
     assert last["moved"] > 0
-    assert sim.ledger.drift < 1e-3
+    record_bound("drift of the ledger", sim.ledger.drift, most=1e-3)
 
 
 @pytest.mark.compiled("contacts")
@@ -217,7 +221,7 @@ def modified_energy_term(sim):
 
 
 @pytest.mark.compiled("contacts")
-def test_mean_energy_of_the_ringing_after_a_contact_forms():
+def test_mean_energy_of_the_ringing_after_a_contact_forms(record_bound):
     """The mean total energy over twelve periods is below the energy before contact by at most (ω_n dt)²/12 E.
 
     A harmonic oscillator in Verlet conserves H + dt² (k w²/12 − F²/(24 m̄)), whose mean exceeds that of H by
@@ -239,11 +243,12 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms():
         ledger = sim.ledger
         ringing = ledger["contacts"] > 0
         offset = (ledger["total"][ringing] - ledger["total"][0]).mean() / ledger["translation"][ringing].max()
-        assert abs(offset) < (2 * math.pi / period * sim.state.clock[CONTACT_STEP]) ** 2 / 12.0
+        largest = (2 * math.pi / period * sim.state.clock[CONTACT_STEP]) ** 2 / 12.0
+    record_bound("energy offset of the ringing over (ω_n dt)²/12", abs(offset) / largest, most=1.0)
 
 
 @pytest.mark.compiled("contacts")
-def test_rebound_of_two_grains():
+def test_rebound_of_two_grains(record_bound):
     """Head-on above the sticking speed: rebound √(v² − v_s²), and the recorded loss is E_cycle = 0.935503 F_c δ_c.
 
     v_s = 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).  Tolerance 1 % for the speed (step), 1e-6 for the two recorded losses.
@@ -260,8 +265,13 @@ def test_rebound_of_two_grains():
         last = sim.ledger.rows[-1]
         assert (last["made"], last["broken"], last["contacts"]) == (1, 1, 0)
         rebound = sim.grains.velocity[1, 0] - sim.grains.velocity[0, 0]
-        assert rebound == pytest.approx(np.sqrt(v**2 - sticking**2), rel=1e-2, abs=0.0)
-        assert sim.ledger.dissipated / unit == pytest.approx(0.935503, rel=1e-5, abs=0.0)
+        record_bound("speed of rebound over √(v² − v_s²)", rebound / np.sqrt(v**2 - sticking**2), least=0.99, most=1.01)
+        record_bound(
+            "loss of a cycle over 0.935503 F_c δ_c",
+            sim.ledger.dissipated / unit / 0.935503,
+            least=1 - 1e-5,
+            most=1 + 1e-5,
+        )
     slow = 0.98 * sticking
     grains = sand.Grains([[0, 0, 0], [2.05 * r, 0, 0]], r, m, velocity=[[slow / 2, 0, 0], [-slow / 2, 0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(steps_per_period=50))
@@ -294,25 +304,25 @@ def test_twist_is_integrated_to_second_order():
     ("kind", "speed"),
     [
         ("lattice", 20.0),
-        ("pca", 20.0),
-        *(pytest.param(k, v, marks=pytest.mark.validate) for k in ("lattice", "pca") for v in (1.0, 5.0)),
+        ("bpca", 20.0),
+        *(pytest.param(k, v, marks=pytest.mark.validate) for k in ("lattice", "bpca") for v in (1.0, 5.0)),
     ],
 )
-def test_energy_balance_of_aggregate_collisions(kind, speed):
+def test_energy_balance_of_aggregate_collisions(record_bound, kind, speed):
     """Two 5×5×5 lattices and two 64-grain PCA clusters, silica 0.6 µm: error ≤ 1e-3 of the impact energy.
 
     At the default step Verlet's error is (ω dt)²/8 of the ringing energy; impacts are resolved to δ_c per step.
     """
     from sand.experiments.collision import collide
-    from sand.setup import lattice, pca
+    from sand.setup import bpca, lattice
 
     def body(seed):
         if kind == "lattice":
             return lattice(5, radius=3e-7, material=sand.SILICA)
-        return pca(64, radius=3e-7, material=sand.SILICA, seed=seed)
+        return bpca(64, radius=3e-7, material=sand.SILICA, seed=seed)
 
     result, sim = collide(body(1), body(2), speed=speed, seed=3)
     assert result.made > 0
     total = sim.ledger["total"]
     assert abs(total[-1] - total[0]) < 1e-3 * result.impact_energy
-    assert result.drift < 1e-3
+    record_bound("drift of the ledger", result.drift, most=1e-3)

@@ -48,6 +48,7 @@ def sticking_speed(material, r1, r2):
     return math.sqrt(2 * 0.935503 * constants.normal.pull_off_force * constants.normal.pull_off_overlap / reduced_mass)
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(
     ("name", "r"),
@@ -67,16 +68,18 @@ def test_sticking_speed_of_equal_grains(name, r):
     assert head_on(m, r, r, 1.005 * speed) > 0.0
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("factor", [1.05, 1.5, 4.0, 20.0])
 @pytest.mark.parametrize("name", list(MATERIALS))
 @pytest.mark.parametrize(("r1", "r2"), [(1e-8, 1e-8), (1e-6, 1e-6), (1e-7, 4e-7)])
-def test_rebound_speed(name, factor, r1, r2):
+def test_rebound_speed(record_bound, name, factor, r1, r2):
     """Rebound √(v² − v_s²) to 1 %, with v_s of unequal radii from the same energy balance."""
     m = MATERIALS[name]
     stick = sticking_speed(m, r1, r2)
     speed = factor * stick
-    assert head_on(m, r1, r2, speed) == pytest.approx(math.sqrt(speed**2 - stick**2), rel=0.01, abs=0.0)
+    expected = math.sqrt(speed**2 - stick**2)
+    record_bound("speed of rebound over √(v² − v_s²)", head_on(m, r1, r2, speed) / expected, least=0.99, most=1.01)
 
 
 def pair_at_rest(r=1e-7, **options):
@@ -119,7 +122,7 @@ MODES = {
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("mode", list(MODES))
-def test_periods_of_the_four_contact_modes(mode):
+def test_periods_of_the_four_contact_modes(record_bound, mode):
     """ω² = 2k_n/m, 7k_s/m, 2R²k_r/I, 2k_t/I to 1e-3 at T/100 of the fastest (Verlet's error: 1.6e-4).
 
     Sliding: with the distance D = 2r − δ0 the exact value is k_s (2/m + D²/(2I)), which is 7k_s/m up to O(δ0/r).
@@ -129,7 +132,7 @@ def test_periods_of_the_four_contact_modes(mode):
     found, _ = measured_period(
         pair_at_rest(**start), [LAW], coordinate, expected, periods=4.2, stepping=sand.Verlet(steps_per_period=100)
     )
-    assert found == pytest.approx(expected, rel=1e-3, abs=0.0)
+    record_bound("frequency of a contact mode over the closed form", found / expected, least=0.999, most=1.001)
 
 
 def test_critical_force_and_torques():
@@ -147,7 +150,7 @@ def test_critical_force_and_torques():
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("slip", "share", "steps"), [("clamp", 1.0, 10_000), ("reset", 0.5, 20_000)])
-def test_dissipation_of_rolling_by_90_degrees(slip, share, steps):
+def test_dissipation_of_rolling_by_90_degrees(record_bound, slip, share, steps):
     """Rolling dissipates k_r ξ_c (πr/2 − ξ_c) with slip="clamp" (→ 12π²γRξ_c for ξ_c ≪ r), half of it with "reset".
 
     Grain 2 orbits grain 1, which is at rest, and spins twice as fast as the axis, so that it rolls without sliding.
@@ -163,13 +166,13 @@ def test_dissipation_of_rolling_by_90_degrees(slip, share, steps):
         roller.step([np.zeros(3), chord], [[0, 0, 0], [0, 0, 2 * angle]])
     k_r, limit = CONSTANTS.roll_stiffness, CONSTANTS.roll_limit
     expected = share * k_r * limit * (math.pi * r / 2 - limit)
-    assert roller.sim.state.lost[3] == pytest.approx(expected, rel=0.01, abs=0.0)
+    record_bound("loss by rolling over the closed form", roller.sim.state.lost[3] / expected, least=0.99, most=1.01)
     rough = 12 * math.pi**2 * sand.SILICA.surface_energy * (r / 2) * limit * share
     assert expected == pytest.approx(rough, rel=0.01, abs=0.0)
 
 
 @pytest.mark.compiled("contacts")
-def test_dissipation_of_twisting_by_a_full_turn():
+def test_dissipation_of_twisting_by_a_full_turn(record_bound):
     """Twisting dissipates k_t φ_c (2π − φ_c) with slip="clamp", 2π k_t φ_c for small φ_c; in both directions."""
     for sign in (1.0, -1.0):
         twister = PrescribedMotion(pair_at_rest())
@@ -177,7 +180,9 @@ def test_dissipation_of_twisting_by_a_full_turn():
         for _ in range(steps):
             twister.step(np.zeros((2, 3)), [[sign * 2 * math.pi / steps, 0, 0], [0, 0, 0]])
         expected = CONSTANTS.twist_stiffness * tangential.TWIST_LIMIT * (2 * math.pi - tangential.TWIST_LIMIT)
-        assert twister.sim.state.lost[4] == pytest.approx(expected, rel=1e-3, abs=0.0)
+        record_bound(
+            "loss by twisting over the closed form", twister.sim.state.lost[4] / expected, least=0.999, most=1.001
+        )
         assert expected == pytest.approx(
             CONSTANTS.twist_stiffness * tangential.TWIST_LIMIT * 2 * math.pi, rel=0.01, abs=0.0
         )

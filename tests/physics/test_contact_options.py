@@ -27,7 +27,7 @@ def pair_constants(contact, material=sand.SILICA, r=R):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
-def test_damped_ringing_decays_exponentially(kind):
+def test_damped_ringing_decays_exponentially(record_bound, kind):
     """m̄ x¨ = −k_n x − c ẋ: energy falls as exp(−c t/m̄), c constant or (2 T_vis E*/ν²) a0; small amplitude, 2 %."""
     key = {"constant": {"damping_constant": "2e-9 kg/s"}, "viscoelastic": {"viscous_time": "2e-14 s"}}[kind]
     contact = sand.Contact(damping=kind, **key)
@@ -39,7 +39,8 @@ def test_damped_ringing_decays_exponentially(kind):
     lost = sim.ledger["lost_damping_normal"][-1]
     start = sim.ledger.rows[0]["translation"]
     assert 0.3 < lost / start < 0.7
-    assert lost / start == pytest.approx(1 - math.exp(-c * sim.time / (mass / 2)), rel=0.02, abs=0.0)
+    expected = 1 - math.exp(-c * sim.time / (mass / 2))
+    record_bound("loss of a damped contact over the closed form", lost / start / expected, least=0.98, most=1.02)
     assert sim.ledger.drift < 1e-4
 
 

@@ -35,6 +35,11 @@ def unwrapped_of(grains):
     return grains.position + grains.image * np.array([L, L, 0.0])
 
 
+@pytest.mark.filterwarnings(
+    "ignore:contact. settling_time = .* is below the period",
+    "ignore:grains overlap too deeply",
+    "ignore:impacts are too fast for elastic grains",
+)
 @pytest.mark.compiled("contacts", "fields", "flights")
 @pytest.mark.parametrize("name", STEPPINGS)
 def test_the_centre_of_mass_moves_on(name):
@@ -58,6 +63,7 @@ def test_the_centre_of_mass_moves_on(name):
     assert image[:6].max() >= 2 and image[6:].max() >= 1 and not image[:, 2].any()
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts", "fields", "flights")
 def test_crossings_are_kept(tmp_path):
     """A checkpoint, a snapshot, the removal of a grain and a scaled box keep them; a start from a frame begins at 0."""

@@ -20,7 +20,7 @@ STIFFNESS = 100.0
 def collision_run(tmp_path_factory):
     """A fast grain hits a compact cluster in a corner of a periodic box; folder and frames of the run."""
     folder = tmp_path_factory.mktemp("frames") / "crash"
-    cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=1)
+    cluster = sand.setup.bpca(40, radius=RADIUS, material="silica", seed=1)
     corner = np.array([1.4e-7, 0.9e-7, 1.4e-7])
     positions = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
     positions = sand.Box.periodic("0.3 um").wrap(positions + corner)

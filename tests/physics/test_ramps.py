@@ -150,6 +150,7 @@ def warm_gas(**options):
     return sand.Simulation(grains, forces, box="0.25 um", seed=4, **options)
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
 @pytest.mark.compiled("dipoles")
 def test_the_same_bits_with_interruptions_other_output_and_copies(tmp_path):
     """Copied, resumed from files, or with other times of output, in the middle of ramps: all end with the same bits."""

@@ -42,6 +42,7 @@ def test_the_frame_interval_changes_no_bit():
     assert ends[0] == ends[1] == ends[2]
 
 
+@pytest.mark.filterwarnings("ignore:without settling_time in")
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("stepping", [each() for each in STEPPINGS.values()], ids=lambda each: each.name)
 def test_a_deep_copy_goes_on_with_the_same_bits(stepping):
@@ -78,6 +79,7 @@ def test_split_runs_and_observers_change_no_bit():
     assert state(whole) == state(pieces)
 
 
+@pytest.mark.filterwarnings("ignore:gas. temperature = .* no material is solid")
 @pytest.mark.compiled("listed")
 def test_restart_with_an_old_pair_list_is_bit_for_bit():
     """A restart between two list builds gives the same bits: lists are rebuilt from saved anchor positions.
@@ -114,6 +116,7 @@ def test_restart_with_an_old_pair_list_is_bit_for_bit():
     assert state(whole) == state(small_arrays)
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 def test_array_sizes_change_no_bit():
     """Initial room for 16 or 4096 contacts and pairs, constants shared or per contact: the same bits."""
@@ -148,6 +151,7 @@ def test_times_are_met_to_the_last_bit():
     assert sorted({k * 1e-9 for k in range(10)} | {*ends, 10e-9}) == [row["time"] for row in sim.ledger.rows]
 
 
+@pytest.mark.filterwarnings("ignore:without settling_time in")
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("integrator", STEPPINGS)
 def test_a_continued_run_has_the_bits_of_a_direct_one(integrator):
@@ -176,6 +180,7 @@ def test_the_state_at_a_time_of_output():
         assert np.allclose(sim.grains.position, grains.position + grains.velocity * time, rtol=1e-13, atol=0)
 
 
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate", "ignore:grains overlap too deeply")
 @pytest.mark.compiled("dipoles")
 def test_resume_is_bit_for_bit(tmp_path):
     """A run stopped after 7,000 steps and resumed equals the uninterrupted run: state, ledger, trajectory."""

@@ -94,6 +94,7 @@ def test_cycles_converge_with_order_two():
     assert 2.5 < far / near < 6.0
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(("longer", "sums"), [(1.0, 1 / 12), (3.0, 1 / 4), (0.5, 1 / 12)])
 def test_cycle_length_with_a_fixed_step(longer, sums):

@@ -578,6 +578,7 @@ def test_a_condition_is_checked_in_every_step_of_bodies():
     assert before.regular_state.count[MADE] == 0
 
 
+@pytest.mark.filterwarnings("ignore:a cluster spans half of the box")
 @pytest.mark.compiled("contacts")
 def test_a_run_that_is_awake_most_of_the_time_says_so(monkeypatch):
     """A chain that spans half of the box is awake all the time: after many contact steps there is a warning."""
@@ -614,6 +615,7 @@ def test_a_fast_awake_cluster_does_not_pass_through_a_grain(speed):
         assert sim.ledger.drift < 3e-3  # grain by grain: 7e-4
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. from .* half the box")
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("dipoles", [sand.Dipoles(), sand.Dipoles(periodic="ewald")], ids=["cut-off", "ewald"])
 def test_restart_in_a_wide_box_changes_no_bit(tmp_path, dipoles):
@@ -633,6 +635,7 @@ def test_restart_in_a_wide_box_changes_no_bit(tmp_path, dipoles):
     assert different(runs[0], parts) == [] and parts.regular_state.count[MADE] > 2
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 def test_a_stop_within_contact_steps_leaves_the_state_before_the_step():
     """A head-on impact so fast that the contact is compressed beyond reason, and a grain that flies elsewhere.

@@ -25,7 +25,9 @@ MASS = float(sand.Grains(np.zeros((1, 3)), 1e-8, "iron").mass[0])
 UNITS = np.array([1.0, 1.0, 1.0, 1e-8, 1e-8, 1e-8])
 """Of momentum and angular momentum: SI with lengths in 10 nm, so that numbers of one matrix are of one size."""
 
-pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron", "ignore:dipoles. from")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:gas. the mean free path is", "ignore:contacts of iron", "ignore:dipoles. from"
+)
 
 
 def contact(**options):
@@ -377,6 +379,7 @@ def test_drag_of_awake_grains_acts_over_all_of_the_time():
         assert mean == pytest.approx(math.exp(-sim.time / 5e-9), rel=1e-9, abs=0.0)
 
 
+@pytest.mark.filterwarnings("ignore:a cluster spans half of the box")
 @pytest.mark.compiled("contacts")
 def test_noise_of_awake_grains_differs_from_step_to_step():
     """36 chains of four that span half of the box, and stay awake: 3/2 k_B T of translation each.

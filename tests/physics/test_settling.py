@@ -42,8 +42,9 @@ def test_a_slow_bending_mode_decays_with_the_settling_time():
     assert abs(sim.ledger["total"][-1] - sim.ledger["total"][0]) < 0.01 * start
 
 
+@pytest.mark.filterwarnings("ignore:contact. settling_time = .* is below the period")
 @pytest.mark.compiled("contacts")
-def test_momenta_are_kept_and_the_balance_closes():
+def test_momenta_are_kept_and_the_balance_closes(record_bound):
     """An aggregate of unequal grains that turns and vibrates in a periodic box.
 
     P to 1e-12 of Σ m|v|, L in an open box to 1e-11 of Σ |x×mv|: rounding of some 1e-16 in each of 1e4 steps. The
@@ -53,7 +54,7 @@ def test_momenta_are_kept_and_the_balance_closes():
     sim = sand.Simulation(grains, [sand.Contact(settling_time="4 ns")], box=sand.Box.periodic("2 um"))
     sim.run(until="20 ns")
     assert sim.ledger["lost_settling"][-1] > 0.1 * sim.ledger["internal"][0]
-    assert sim.ledger.drift < 1e-4
+    record_bound("drift of the ledger", sim.ledger.drift, most=1e-4)
     for axis in "xyz":
         p = sim.ledger[f"momentum_{axis}"]
         assert abs(p[-1] - p[0]) < 1e-12 * (grains.mass * np.linalg.norm(grains.velocity, axis=1)).sum()
@@ -66,6 +67,7 @@ def test_momenta_are_kept_and_the_balance_closes():
     assert sim.state.clock[SETTLED] > 0.95 * sim.time
 
 
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate")
 @pytest.mark.compiled("dipoles")
 def test_resume_is_bit_for_bit(tmp_path):
     """A growing gas with settling, in r-RESPA cycles: stopped between two applications and resumed, the same bits."""

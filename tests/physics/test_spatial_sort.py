@@ -13,6 +13,12 @@ from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
 from ..plugins import ForestRuth
 from .test_reproducibility import state
 
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:charges. the cut-off, .* ends an interaction",
+    "ignore:dipoles. the cut-off, .* ends an interaction",
+    "ignore:grains overlap too deeply",
+)
+
 LIST_ARRAYS = ("order", "packed_position", "packed_moment", "squared_distance", "packed_grain", "block_sums", "cell_of")
 """Long-range arrays that belong to the pair list or are filled by each sum."""
 SORT_EVERY = 700

@@ -26,6 +26,8 @@ from sand.integrate.parts import Stop
 
 from .setups import different, momenta, rest_distance
 
+pytestmark = pytest.mark.filterwarnings("ignore:dipoles. cut-off now")
+
 SIDE = "12 um"
 COMPILED = pytest.mark.compiled("dipoles")
 

@@ -9,6 +9,8 @@ from sand.errors import BadInput
 
 from .test_change import warm_gas
 
+pytestmark = pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
+
 
 class RemoveLeaving(sand.Updater):
     """Removes grains beyond 0.118 µm along any axis, and pushes the others along x."""

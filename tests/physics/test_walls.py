@@ -94,7 +94,7 @@ def test_a_bounce_as_from_a_huge_sphere(damping):
     [FLOOR, sand.Wall([0, 0, 0], [0, 0, 1], "silica", velocity=[0.003, 0.002, 0.02])],
     ids=["fixed", "moving"],
 )
-def test_ledger_closes_and_momentum_balances(law, damping, wall):
+def test_ledger_closes_and_momentum_balances(record_bound, law, damping, wall):
     """Total energy constant to second order, momentum of the grain plus impulse of the wall constant to rounding.
 
     Velocity Verlet: the error is at most a few (ω dt)²/24 of the energies of the impact, 1e-3 of all dissipation with
@@ -108,7 +108,7 @@ def test_ledger_closes_and_momentum_balances(law, damping, wall):
     # without damping a DMT contact dissipates no energy of the normal motion, and the grain bounces
     bounces = (law, damping) == ("dmt", "none")
     assert found.contacts == (0 if bounces else 1) and (sim.ledger["lost_rolling"][-1] > 0.0) != bounces
-    assert sim.ledger.drift < 1e-3
+    record_bound("drift of the ledger", sim.ledger.drift, most=1e-3)
     change = (sim.grains.mass[:, None] * sim.grains.velocity - before).sum(axis=0)
     np.testing.assert_allclose(change, -found.impulse, rtol=1e-9, atol=1e-11 * np.abs(found.impulse).max())
     assert sim.ledger["lost_walls"][-1] == pytest.approx(found.impulse @ wall.velocity, rel=1e-9, abs=1e-40)
@@ -141,7 +141,7 @@ def test_a_moving_frame():
 
 
 @pytest.mark.compiled("contacts")
-def test_pull_off_force_of_a_wall():
+def test_pull_off_force_of_a_wall(record_bound):
     """A grain between two walls breaks from that of the smaller γ, at F = 3π √(γ1 γ2) r1 (JKR, R = r1).
 
     The wall moves slowly (v √(k m) is 0.1 % of F) and the row nearest the maximum is within 0.1 % of it.
@@ -158,7 +158,7 @@ def test_pull_off_force_of_a_wall():
     sim.run(until="10 us", stop="wall_contacts == 1")
     force = 3.0 * math.pi * math.sqrt(0.025 * 0.0125) * R
     assert [wall.contacts for wall in sim.walls] == [1, 0]
-    assert sim.ledger["held_force_z"].max() == pytest.approx(force, rel=3e-3, abs=0.0)
+    record_bound("pull-off force over 3πγR", sim.ledger["held_force_z"].max() / force, least=0.997, most=1.003)
     assert -sim.ledger["pulled_force_z"].min() == pytest.approx(force, rel=3e-3, abs=0.0)
 
 
@@ -189,6 +189,7 @@ def test_wall_with_a_mass():
     assert momentum == pytest.approx(given, abs=1e-9 * 2e-8 * sim.time)
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("speed", [0.01, 3.0, 300.0])
 def test_a_flying_grain_is_found_when_it_touches(speed):
@@ -262,6 +263,7 @@ def test_a_bath_gives_every_mode_of_grains_on_a_wall_its_share():
     assert sim.ledger.drift < step_error
 
 
+@pytest.mark.filterwarnings("ignore:.* broke while aggregates grew")
 @pytest.mark.compiled("contacts")
 def test_output_split_and_resume_change_no_bit(tmp_path):
     """One run, a run with many frames, and one that is stopped, read from its checkpoint and continued."""

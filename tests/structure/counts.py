@@ -114,12 +114,16 @@ def code_lines() -> int:
     return total
 
 
+PUBLIC = {"_replace", "_asdict", "_fields", "_repr_png_"}
+"""Names with an underscore that are documented: of NamedTuples, and of displays in notebooks."""
+
+
 def private_accesses_of_tests() -> int:
     """Attributes with a leading underscore that unit tests read of objects that are not their own."""
     number = 0
     for path in sorted((TOP / "tests" / "unit").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.Attribute) and re.match(r"_[a-z]", node.attr):
+            if isinstance(node, ast.Attribute) and re.match(r"_[a-z]", node.attr) and node.attr not in PUBLIC:
                 number += not (isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"))
     return number
 
@@ -137,12 +141,12 @@ COUNTS = (
     Count("functions with more than 8 positional parameters", lambda: len(parameters()), 34, 8),
     Count("most positional parameters", lambda: max(parameters().values(), default=0), 12, 10),
     Count("attributes that Simulation sets", attributes_of_simulation, 14, 15),
-    Count("pairs of folders of which one imports the other", pairs_of_folders, 247, 200),
+    Count("pairs of folders of which one imports the other", pairs_of_folders, 243, 200),
     Count("files that name rigid clusters outside their own", lambda: len(files_that_name(RIGID, "rigid")), 3, 3),
     Count("files that name walls outside their own", lambda: len(files_that_name(WALL)), 26, 3),
-    Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN)), 12, 3),
-    Count("code lines", code_lines, 35900, 32850),
-    Count("private accesses of unit tests", private_accesses_of_tests, 104, 30),
+    Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN)), 4, 3),
+    Count("code lines", code_lines, 35600, 32850),
+    Count("private accesses of unit tests", private_accesses_of_tests, 24, 30),
 )
 
 

@@ -15,7 +15,7 @@ PLAN = TOP / "ARCHITECTURE.md"
 MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 
 LAYERS = (
-    ("errors", "version"),
+    ("errors",),
     ("compiler",),
     ("numerics",),
     ("basics",),
@@ -25,6 +25,7 @@ LAYERS = (
     ("analysis",),
     ("setup", "limits"),
     ("engine",),
+    ("components",),
     ("simulation",),
     ("config",),
     ("plotting",),

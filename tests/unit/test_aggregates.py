@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.setup import chain, encounter, grain, lattice, pca, turned_at_random
+from sand.setup import bpca, chain, encounter, grain, lattice, turned_at_random
 from sand.setup.aggregates import rest_distance
 
 R, M = 3e-7, sand.SILICA
@@ -35,13 +35,13 @@ def test_a_lattice():
 @pytest.mark.compiled("small")
 def test_ballistic_particle_cluster_aggregates():
     """N − 1 contacts in equilibrium (each new grain has one), no overlap, one cluster, seeded, moderately compact."""
-    body = pca(200, radius=R, material=M, seed=4)
+    body = bpca(200, radius=R, material=M, seed=4)
     d = distances(body)
     rest = rest_distance(M, R)
     assert d.min() >= rest * (1 - 1e-12)
     assert np.isclose(d, rest, rtol=1e-9, atol=0.0).sum() == 199
-    assert (pca(200, radius=R, material=M, seed=4).position == body.position).all()
-    assert (pca(200, radius=R, material=M, seed=5).position != body.position).any()
+    assert (bpca(200, radius=R, material=M, seed=4).position == body.position).all()
+    assert (bpca(200, radius=R, material=M, seed=5).position != body.position).any()
     gyration = np.sqrt((body.position**2).sum(axis=1).mean())
     assert 4 * R < gyration < 14 * R
 
@@ -49,7 +49,7 @@ def test_ballistic_particle_cluster_aggregates():
 @pytest.mark.compiled("contacts", "small")
 def test_built_aggregates_are_at_rest():
     """A lattice and an aggregate in a simulation: the expected contacts, forces by rounding only."""
-    for body, contacts in ((lattice(3, radius=R, material=M), 54), (pca(50, radius=R, material=M, seed=1), 49)):
+    for body, contacts in ((lattice(3, radius=R, material=M), 54), (bpca(50, radius=R, material=M, seed=1), 49)):
         sim = sand.Simulation(body, [sand.Contact()])
         assert len(sim.contacts["pair"]) == contacts
         assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
@@ -59,7 +59,7 @@ def test_built_aggregates_are_at_rest():
 @pytest.mark.parametrize("b", ["0 b", "0.5 b", "0.9 b"])
 def test_an_encounter(b):
     """Centre of mass at rest, requested relative speed and offset, no contact at the start; then they collide."""
-    target, projectile = pca(20, radius=R, material=M, seed=1), pca(10, radius=R, material=M, seed=2)
+    target, projectile = bpca(20, radius=R, material=M, seed=1), bpca(10, radius=R, material=M, seed=2)
     collided = encounter(target, projectile, speed="5 m/s", impact_parameter=b)
     g, n = collided.grains, collided.target
     assert n == 20
@@ -91,7 +91,7 @@ def test_rotation_preserves_the_body():
         (lambda: chain(0, radius=R, material=M), "grains of a chain = 0 must be .* at least 1"),
         (lambda: chain(3, radius=-1.0, material=M), "radius = -1.0 must be above 0"),
         (lambda: lattice(2, 0, radius=R, material=M), "side of a lattice = 0"),
-        (lambda: pca(2.5, radius=R, material=M), "grains = 2.5 must be a whole number"),
+        (lambda: bpca(2.5, radius=R, material=M), "grains = 2.5 must be a whole number"),
         (lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=0.0), "speed = 0.0"),
         (
             lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=1.0, along="w"),

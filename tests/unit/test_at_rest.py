@@ -8,6 +8,7 @@ from sand.analysis.ledger_columns import LedgerColumns
 from sand.analysis.quantities import measured
 from sand.basics.box import Box
 from sand.cli.main import main
+from sand.components.walls import Walls
 from sand.engine.changed_state import subset
 from sand.io.gsd_index import read_index
 from sand.io.trajectory import Frames, TrajectoryWriter
@@ -136,7 +137,8 @@ def test_the_page_plots_awake_grains():
 
 def test_the_column_belongs_to_runs_with_rigid_clusters():
     """The last of the numbers, before those of walls; a ledger from a checkpoint without it goes on without it."""
-    assert Ledger(walls=["wall_force"], awake=True).columns[-2:] == ("awake", "wall_force")
+    walls = Walls([sand.Wall([0, 0, 0], [0, 0, 1], "silica", name="floor")])
+    assert Ledger(extra=[walls], awake=True).columns[-6:] == ("awake", *walls.columns())
     plain, rigid = Ledger(), Ledger(awake=True)
     assert rigid.columns == (*plain.columns, "awake")
     table = np.arange(2.0 * len(plain.columns)).reshape(2, -1)

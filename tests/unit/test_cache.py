@@ -162,4 +162,4 @@ def test_a_process_has_one_folder():
     from sand.compiler import jit
 
     assert jit.cache_folder() is jit.cache_folder()
-    assert jit.cache_folder().name == jit._digest() and len(jit._digest()) == 16
+    assert len(jit.cache_folder().name) == 16

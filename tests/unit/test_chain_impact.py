@@ -41,6 +41,7 @@ def test_a_broken_chain():
     assert chain_impact.shape(position, links([0, 1], [1, 2], [3, 4]), 4).name == "broken"
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("place", [-0.65, -0.6, -0.55])
 def test_the_papers_figure_4(place):

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from sand.basics.version import __version__
 from sand.cli.main import main
 from sand.cli.references import ARTICLES, bibtex, cff
-from sand.version import __version__
 
 ROOT = Path(__file__).parents[2]
 

@@ -517,7 +517,6 @@ def test_progress_shows_time_and_numbers(workdir, monkeypatch, by):
         simulation.run(**{by: end})
         time.sleep(0.25)  # the bar is drawn at most ten times a second
         bar.tick(simulation)
-    bar._bar.refresh()
     bar.finish()
     drawn = terminal.getvalue()
     for part in ("%|", " ns ", " clusters, S = ", "drift ", "s/s" if by == "until" else "steps/s"):

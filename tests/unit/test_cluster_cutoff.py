@@ -9,8 +9,9 @@ import pytest
 import sand
 from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.basics.state import CONTACTS, CUT_RADIUS
+from sand.basics.temperature import kinetic_temperature
 from sand.engine.cluster_cutoff import follow_clusters
-from sand.forces.pair.dipoles import capturing_pair, kinetic_temperature
+from sand.forces.pair.dipoles import capturing_pair
 
 BOX = sand.Box.periodic("20 um")
 NO_PAIRS = np.zeros((0, 2), np.int64)

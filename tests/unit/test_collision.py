@@ -14,7 +14,7 @@ from sand.experiments.collision_case import read_collision
 from sand.experiments.collision_job import CollisionJob
 from sand.experiments.collision_outcome import collision_title
 from sand.io.read_grains import read_body
-from sand.setup import chain, grain, pca
+from sand.setup import bpca, chain, grain
 from sand.theory import contact
 
 R = 1e-7
@@ -64,7 +64,7 @@ def test_a_miss():
 
 def aggregates(seed):
     """Two small aggregates for a seed."""
-    return (pca(8, radius=R, material="silica", seed=2 * seed), pca(8, radius=R, material="silica", seed=2 * seed + 1))
+    return tuple(bpca(8, radius=R, material="silica", seed=2 * seed + k) for k in range(2))
 
 
 @pytest.mark.compiled("contacts", "small")
@@ -79,7 +79,7 @@ def test_any_executor_gives_the_same_numbers():
 
 CASE = """
 [target]
-kind = "pca"
+kind = "bpca"
 grains = 8
 radius = "0.1 um"
 [projectile]
@@ -132,10 +132,10 @@ def test_the_command(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('kind = "pca"\ngrains = 8', 'kind = "chain"\ngrains = 0', "target.grains = 0"),
-        ('kind = "pca"\ngrains = 8', 'kind = "chain"', "target: grains is missing: how many does the chain have?"),
-        ('kind = "pca"', 'kind = "blob"', "target.kind: kind = 'blob'; allowed: grain, chain"),
-        ('"2 m/s"', '"2 m"', "impact.speed: speed = '2 m' is not a quantity in m/s|impact.speed: "),
+        ('kind = "bpca"\ngrains = 8', 'kind = "chain"\ngrains = 0', "target.grains = 0"),
+        ('kind = "bpca"\ngrains = 8', 'kind = "chain"', "target: grains is missing: how many does the chain have?"),
+        ('kind = "bpca"', 'kind = "blob"', "target.kind = 'blob'; allowed: grain, chain"),
+        ('"2 m/s"', '"2 m"', "impact.speed = '2 m' is not a quantity in m/s"),
         ('"2 m/s"', '"0 m/s"', "above 0"),
         ("seeds = [1, 2]", "sedes = [1, 2]", "impact.sedes: there is no such key; did you mean 'seeds'?"),
         ("[forces.contact]", '[forces.contact]\nslip = "clmp"', "did you mean 'clamp'"),
@@ -169,7 +169,7 @@ def test_bad_seeds(tmp_path, capsys, seeds):
 @pytest.mark.compiled("contacts", "small")
 def test_bodies_from_files(tmp_path):
     """Text columns in nanometres and the last frame of a trajectory collide like built bodies."""
-    built = pca(8, radius=R, material="silica", seed=3)
+    built = bpca(8, radius=R, material="silica", seed=3)
     lines = "\n".join(" ".join(f"{1e9 * x:.17g}" for x in row) for row in built.position)
     (tmp_path / "body.txt").write_text(f"# x y z in nm\n\n{lines}\n")
     body = read_body(tmp_path / "body.txt", sand.SILICA, R, "1 nm")
@@ -180,7 +180,7 @@ def test_bodies_from_files(tmp_path):
     assert again.position == pytest.approx(built.position, abs=1e-6 * R)
     assert again.radius == pytest.approx(built.radius, rel=1e-6, abs=0.0)
     path = tmp_path / "hit.toml"
-    old = 'kind = "pca"\ngrains = 8\nradius = "0.1 um"'
+    old = 'kind = "bpca"\ngrains = 8\nradius = "0.1 um"'
     path.write_text(
         CASE.replace(old, f'kind = "file"\nfile = "{tmp_path}/body.txt"\nlength = "1 nm"\nradius = "0.1 um"')
     )

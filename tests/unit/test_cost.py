@@ -14,10 +14,11 @@ from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.basics.state import CONTACTS
 from sand.cli.main import main
 from sand.compiler.cache import write_record
+from sand.engine.assemble import build_engine
 from sand.experiments.templates import TEMPLATES
 from sand.simulation.cadence import number_in, read_cadence
-from sand.simulation.cost.cost import coagulation, cost
-from sand.simulation.cost.cost import expected_steps as steps
+from sand.simulation.cost import coagulation, cost
+from sand.simulation.cost import expected_steps as steps
 from sand.theory.contact import contact
 from sand.theory.kinetics import brownian, capture
 
@@ -53,6 +54,11 @@ def table(tmp_path, monkeypatch):
 def simulation(count=20, **changes):
     case = {"box": "1 um", "seed": 1} | changes
     return sand.Simulation(GASES[count], [sand.Contact()], **case)
+
+
+def engine_like(sim):
+    """An engine of its own for the same grains, forces and settings."""
+    return build_engine(sim.start, sim.forces, sim.box, sim.stepping, sim.neighbours, fresh=False)
 
 
 def rows(capsys, *words):
@@ -111,6 +117,7 @@ def test_the_time_of_coagulation_is_that_of_the_kernels():
     assert found == pytest.approx(2.0 / (theory(mass, mass) * density), rel=1e-6, abs=0.0)
 
 
+@pytest.mark.filterwarnings("ignore:charges. the cut-off, .* ends an interaction")
 def test_charges_focus_bodies():
     """σ/σ₀ is the mean of 1 − U/kT over pairs, not below 0: U/kT = ±5 in a neutral mixture gives (6 + 0)/2 = 3."""
     side, kelvin = 1.5e-6, 100.0
@@ -160,7 +167,7 @@ def test_contact_steps_of_rigid_clusters_follow_the_touches():
     sim = sand.Simulation(thermal(100, side, 100.0), forces, box=side, stepping=sand.RigidClusters())
     tau, awake = (
         coagulation.coagulation_time(sim, coagulation.bodies_of(sim)),
-        sim._engine.parameters.flight_limits.longest_awake,
+        engine_like(sim).parameters.flight_limits.longest_awake,
     )
     found = steps.expected_steps(sim, tau, math.inf)
     assert found.awake == pytest.approx(50.0 * 3.0 * awake / steps.contact_step(sim), rel=1e-9, abs=0.0)
@@ -228,7 +235,7 @@ def test_the_step_of_bodies_follows_the_fastest_rotor():
     assert found == pytest.approx(1.0 / (mean * 1e8), rel=1e-4, abs=0.0)
     # without any rate the longest step of all
     still = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, "iron"), forces, stepping=sand.RigidClusters())
-    longest = still._engine.parameters.criteria.longest
+    longest = engine_like(still).parameters.criteria.longest
     assert steps.body_step(still, coagulation.bodies_of(still), 1e-6) == pytest.approx(longest, rel=1e-12, abs=0.0)
 
 
@@ -332,7 +339,7 @@ def timed(sim, pieces, outputs=(), writer=True):
         with timer.output():
             now[0] += seconds
     timer.record()
-    return cost._read().get(cost.kind_of(sim), {})
+    return cost.read_speeds().get(cost.kind_of(sim), {})
 
 
 def test_only_enough_steps_of_one_kind_are_recorded(table):
@@ -372,7 +379,7 @@ def test_substeps_are_no_contact_steps(monkeypatch):
     with timer.steps():
         pass
     timer.record()
-    (known,) = cost._read().values()
+    (known,) = cost.read_speeds().values()
     assert known == {"awake": pytest.approx({"ratio": 1.25, "seconds": 0.5}, rel=1e-9, abs=0.0)}
 
 
@@ -393,7 +400,7 @@ def test_many_short_runs_are_recorded_together(monkeypatch, table):
     for _ in range(5):
         sim.run(steps=300)
     assert sim._timer is timer, "the same measurement goes on"
-    (known,) = cost._read().values()
+    (known,) = cost.read_speeds().values()
     assert known["free"]["ratio"] == pytest.approx(1e-4 / cost.step_seconds(sim, "free", 0, 0.0), rel=1e-9, abs=0.0)
     monkeypatch.setattr(cost, "kind_of", lambda _: "after a change of forces")
     assert sim._timer is not timer

@@ -23,6 +23,8 @@ from .test_ewald import CUBE, MOMENT, SIDES, clusters, gas, loads
 from .test_ewald_charges import CORNERS, Q, ions, simulation
 from .test_ewald_charges import loads as charge_loads
 
+pytestmark = pytest.mark.filterwarnings("ignore:the electric field at the surface of grains is too strong")
+
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_splines_and_their_derivatives(order):

@@ -5,6 +5,7 @@ import os
 import shutil
 import stat
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -113,7 +114,7 @@ def test_a_full_disk_without_posix_fallocate(tmp_path, monkeypatch):
     size = (tmp_path / "trajectory.gsd").stat().st_size
     monkeypatch.delattr(os, "posix_fallocate", raising=False)
     reserve_space(tmp_path / "trajectory.gsd", 40, 1000)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(100, 90, 10))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(total=100, used=90, free=10))
     with pytest.raises(OSError, match="No space left") as error:
         reserve_space(tmp_path / "trajectory.gsd", 40, 1000)
     assert error.value.errno == errno.ENOSPC

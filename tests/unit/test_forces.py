@@ -9,6 +9,7 @@ import pytest
 import sand
 from sand.compiler.jit import formula
 from sand.compiler.user_code import code_digest
+from sand.engine.assemble import build_engine
 from sand.forces.external.external_loops import external_energies_for
 from sand.forces.external.formulas import GrainState, uniform_field
 from sand.integrate.force_calls import add_external_loads, sum_external
@@ -157,7 +158,7 @@ def test_external_forces_add_up():
         ([Gravity()], 1.0, 0.0),
         ([], 0.0, 0.0),
     ):
-        engine = sand.Simulation(grains, forces)._engine
+        engine = build_engine(grains, forces, sand.Box(), sand.Verlet(), sand.Neighbours())
         parameters = engine.parameters._replace(external_work=ExternalWork(True, False))
         table, own = engine.table_of(engine.state), engine.state.grains.arrays
         program = build_program(engine.components, parameters, table)

@@ -10,7 +10,7 @@ import sand
 from sand.basics.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
 from sand.basics.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 from sand.compiler.jit import kernel
-from sand.contact.gather import BLOCK, DENSE_FROM, LARGEST_CLASS, gather, resort_contacts_by_grain
+from sand.contact.gather import DENSE_FROM, GRAINS_AT_ONCE, LARGEST_CLASS, gather, resort_contacts_by_grain
 from sand.integrate.motion import drift_for, gather_and_kick, kick
 from sand.integrate.task_queue import GRAINS_PER_BLOCK
 
@@ -88,8 +88,8 @@ def test_grains_of_a_block_are_sorted_by_number_of_contacts():
     kind = many[0] * (LARGEST_CLASS + 1) + many[1]
     turn = contacts.gather_order[:GRAINS]
     assert len(set(kind.tolist())) > 10
-    for first in range(0, GRAINS, BLOCK):
-        block = np.arange(first, min(first + BLOCK, GRAINS))
+    for first in range(0, GRAINS, GRAINS_AT_ONCE):
+        block = np.arange(first, min(first + GRAINS_AT_ONCE, GRAINS))
         assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
     _, crowded, _ = random_contacts(DENSE_FROM + 0.5)
     assert crowded.gather_order[:GRAINS].tolist() == list(range(GRAINS))

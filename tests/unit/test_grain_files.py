@@ -79,6 +79,7 @@ TEXTS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:columns that are no quantity", "ignore:.*. columns (read as|from the fifth)")
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("name", TEXTS)
 def test_formats_are_known_by_their_content(tmp_path, name):

@@ -16,6 +16,13 @@ from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_b
 from sand.experiments.growth_boxes import shared_settings
 from sand.experiments.growth_report import temperatures_over_time
 
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:contacts of iron",
+    "ignore:grains in contact vibrate",
+    "ignore:grains overlap too deeply",
+    "ignore:moments of iron",
+)
+
 CASE = {
     "run": {"until": "30 ns", "frame_every": "1 ns"},
     "box": {"periodic": "0.25 um"},

@@ -163,6 +163,7 @@ class CompetingWriter(Observer):
             self.messages.append(str(error.value))
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 def test_simulations_of_one_process(tmp_path):
     """While one runs no other writes to its folder; afterwards another may, and the first is refused."""

@@ -23,6 +23,8 @@ from sand.io.trajectory import read_frames
 
 from ..physics.test_full_disk import CASE
 
+pytestmark = pytest.mark.filterwarnings("ignore")  # mutated cases warn of much
+
 LONGEST = 20
 """Time limit per file [s]."""
 MEMORY = 100 * 2**20
@@ -149,7 +151,7 @@ def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, c
 
 COLLISION = """
 [target]
-kind = "pca"
+kind = "bpca"
 grains = 4
 radius = "0.3 um"
 material = "silica"
@@ -256,7 +258,6 @@ def read_and_build(name, path):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("count", [150, pytest.param(3400, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("name", list(KINDS))
 def test_mutated_cases_are_read_or_refused_in_lines(tmp_path, name, count):

@@ -162,10 +162,10 @@ def fast_gas(box, seed, contacts=False, **neighbours):
 def all_pairs_loads(sim):
     """Long-range forces, torques and fields of the same state over all pairs."""
     state = sim.state.copy()
-    rules, far = sim._engine.parameters, empty_long_range_arrays(len(state.grains), 0)
+    far, numbers = empty_long_range_arrays(len(state.grains), 0), sim.forces[0].numbers(sim.grains, sim.box)
     clear_long_range_loads(far)
-    parts = table_of(grains=state.grains.arrays, long_range=far, span=rules.span)
-    pair_force_stages(ALL_PAIRS_CUT, False)[SUM].run(parts, sim._engine.long_range[0][2], WHOLE)
+    parts = table_of(grains=state.grains.arrays, long_range=far, span=sim.box.span)
+    pair_force_stages(ALL_PAIRS_CUT, False)[SUM].run(parts, numbers, WHOLE)
     return far.force, far.torque, state.grains.arrays.field
 
 
@@ -187,10 +187,10 @@ def test_listed_forces_are_those_of_all_pairs(lengths, margin, contacts):
     would give an error of 1e-3.  Rounding: sums in another order, ε × neighbours.
     """
     sim = fast_gas(Box(lengths), 3, contacts, search="cells", margin=margin)
-    assert sim._engine.parameters.search.listed, sim.choices
+    assert "a list of pairs" in sim.choices["neighbours"]
     sim.run(steps=1)
     for step in range(1000):
-        sim._engine.advance(np.inf, 1)
+        sim.run(steps=1)
         ours = (sim.state.long_range.force, sim.state.long_range.torque, sim.grains.arrays.field)
         for found, theirs in zip(ours, all_pairs_loads(sim), strict=True):
             assert np.abs(found - theirs).max() < 1e-12 * np.abs(theirs).max()
@@ -270,6 +270,7 @@ def test_neighbour_arrays_grow():
     ).all()
 
 
+@pytest.mark.filterwarnings("ignore:.* broke while aggregates grew")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
 def test_neighbour_search_of_a_resumed_run(tmp_path, search):
@@ -287,7 +288,6 @@ def test_neighbour_search_of_a_resumed_run(tmp_path, search):
     begun.run(steps=20)
     assert begun.state.count[MADE] == 0
     rest = sand.resume(tmp_path / "begun")
-    assert rest._engine.parameters.search == whole._engine.parameters.search
     assert rest.choices["neighbours"] == whole.choices["neighbours"]
     whole.run(steps=600)
     rest.run(steps=580)
@@ -341,13 +341,14 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     mixed = sand.Grains(1.03 * block.position, radius, [sand.IRON if k % 3 else sand.SILICA for k in range(125)])
     sim = sand.Simulation(mixed, [sand.Contact()])
     sim.run(steps=1)
-    near, law, a = sim.state.pair_list, sim._engine.parameters.settings, sim.grains.arrays
+    near, a = sim.state.pair_list, sim.grains.arrays
+    pairings = sand.Contact().pairings(mixed.materials)
     pairs = sim.state.count[PAIRS]
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
-        constants = column_loops(JKR).of_pair(a, law.pairings, i, j)
+        constants = column_loops(JKR).of_pair(a, pairings, i, j)
         period = 2 * np.pi / np.sqrt(constants.max_squared_frequency)
-        assert near.step[p] == pytest.approx(period / law.per_period, rel=1e-14, abs=0.0)
+        assert near.step[p] == pytest.approx(period / sand.Verlet().steps_per_period, rel=1e-14, abs=0.0)
         assert near.break_overlap[p] == pytest.approx(constants.break_overlap, rel=1e-14, abs=0.0)
 
 
@@ -372,6 +373,7 @@ def test_vibration_does_not_rebuild_lists():
     assert sim.state.count[LISTED] <= 3
 
 
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off, .* ends an interaction")
 @pytest.mark.parametrize(
     ("count", "box", "how", "expected"),
     [

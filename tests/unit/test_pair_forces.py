@@ -78,9 +78,9 @@ def test_taylor_rate_of_the_torque():
 
     sim = sand.Simulation(grains, [sand.Dipoles()], stepping=sand.Verlet(step="1e-15 s"))
     before = sim.loads()
-    w, rules = sim.state, sim._engine.parameters
+    w, force = sim.state, sand.Dipoles()
     far = empty_long_range_arrays(len(grains), 0)  # a run without r-RESPA cycles has no arrays for rates
-    kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, rules.span, sim._engine.long_range[0][2])
+    kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, sim.box.span, force.numbers(grains, sim.box))
     force_rate, torque_rate = far.force_rate.T.copy(), far.torque_rate.T.copy()
     sim.run(steps=10)
     after = sim.loads()
@@ -166,8 +166,8 @@ def test_coulomb_forces_over_list_and_all_pairs():
     for how in ("cells", "all pairs"):
         forces = [sand.Charges(cutoff="0.2 um"), sand.Attraction(cutoff="0.15 um")]
         sim = sand.Simulation(grains, forces, box="1 um", neighbours=sand.Neighbours(how))
-        assert sim._engine.parameters.search.listed == (how == "cells")
-        found.append((sim.loads()["force"], *sim._engine.energies_at_grains().values()))
+        assert ("a list of pairs" in sim.choices["neighbours"]) == (how == "cells")
+        found.append((sim.loads()["force"], *(sim.at_grains()[name] for name in ("coulomb", "gravitation"))))
     for listed, whole in zip(*found, strict=True):
         assert np.abs(listed - whole).max() < 1e-12 * np.abs(whole).max()
 

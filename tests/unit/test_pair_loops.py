@@ -46,20 +46,21 @@ def test_blocked_sums_of_several_forces(order, monkeypatch):
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
-    (_, of_dipoles), (_, of_charges) = sim._engine.components.pair_forces
+    of_dipoles, of_charges = (force.numbers(grains, sim.box) for force in forces)
+    search = sand.Neighbours("cells").choose(grains, sim.box, grains.radius.min(), [1e-7]).search
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
     sums = {
         "listed dipoles": dipoles.LISTED_PAIRS,
         "listed charges": forces[1].sums(sim.box, True),
         "dipoles": dipoles.ALL_PAIRS_CUT,
     }
-    span = sim._engine.parameters.span
+    span = sim.box.span
 
     def loads(names, shared):
         arrays, far = sim.state.copy().grains.arrays, empty_long_range_arrays(40, 4000, loops.ALL_PAIRS_BLOCKS)
         count, queue = sim.state.count.copy(), new_task_queue(40, 0)
         queue.words[SHARED] = shared
-        build_verlet_list(arrays, far, count, span, sim._engine.parameters.search)
+        build_verlet_list(arrays, far, count, span, search)
         numbers_of = ForceNumbers(len(names), 0)
         parts = {
             "grains": arrays,

@@ -9,7 +9,7 @@ import sand
 from sand.basics.constants import MAGNETIC
 from sand.experiments.collision import collide
 from sand.experiments.parting import cannot_touch
-from sand.setup import grain, pca
+from sand.setup import bpca, grain
 
 R = 1e-7
 
@@ -65,7 +65,7 @@ def test_other_forces_and_boxes_tell_nothing():
 @pytest.mark.compiled("contacts")
 def test_a_miss_ends_and_says_why():
     """Aggregates that pass each other: the run ends at the first look, and nothing touches if it goes on."""
-    bodies = [pca(8, radius=R, material="silica", seed=seed) for seed in (1, 2)]
+    bodies = [bpca(8, radius=R, material="silica", seed=seed) for seed in (1, 2)]
     result, sim = collide(*bodies, speed=1.0, impact_parameter="1.05 b")
     assert (result.outcome, result.end) == ("miss", "the paths of the bodies are straight and do not meet")
     assert result.quiet and len(sim.ledger) < 20

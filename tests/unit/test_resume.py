@@ -312,6 +312,7 @@ def test_control_characters_do_not_reach_the_terminal(workdir, capsys):
     assert "\x7f" not in capsys.readouterr().out
 
 
+@pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 def test_the_summary_of_an_interrupted_run_is_that_of_its_last_step(tmp_path):
     """Contacts and drift in summary.json are those of the final state, not of the last frame; no new ledger row."""

@@ -15,6 +15,8 @@ from sand.simulation.cadence import Cadence, Schedule
 
 from ..physics.setups import rest_distance, struck_chain
 
+pytestmark = pytest.mark.filterwarnings("ignore:grains overlap too deeply")
+
 
 def pair(distance=3e-8, **options):
     return sand.Grains([[0, 0, 0], [distance, 0, 0]], 1e-8, options.pop("material", sand.IRON), **options)
@@ -153,6 +155,7 @@ def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
     assert "grains 1" in str(result)
 
 
+@pytest.mark.filterwarnings("ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 def test_overcompressed_grains_end_the_run():
     """An impact so fast that a centre enters the other grain, outside the range of JKR."""

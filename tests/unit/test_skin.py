@@ -16,7 +16,6 @@ from sand.basics.state import (
 )
 from sand.engine import engine
 from sand.integrate import task_queue
-from sand.integrate.parts import Stop
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.skin import largest_displacement, largest_squared_speeds
 
@@ -51,7 +50,7 @@ def test_rebuilds_do_not_depend_on_driver_calls(way):
     once.run(steps=600)
     often.run(steps=1)
     while often.state.steps < once.state.steps:
-        often._engine.advance(np.inf, 1)
+        often.run(steps=1)
     assert once.state.count[MADE] > 0
     assert once.state.count[REBUILT] > 3
     a, b = once.state.to_arrays(), often.state.to_arrays()
@@ -68,16 +67,15 @@ def test_displacements_stay_within_the_skin(monkeypatch, blocks):
     for module in (task_queue, engine):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: blocks)
     sim = dense_gas(margin="5 nm")
-    control, search = sim._engine.parameters.criteria, sim._engine.parameters.search
     limits = {
-        LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
-        PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.pair_gap),
+        LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * 5e-9),
+        PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * sim.grains.radius.min()),
     }
     sim.run(steps=1)
     spared = 0
     for steps in (1, 2, 3, 5, 8, 13, 21, 34, 55):
-        sim._engine.advance(np.inf, steps)
-        system, span = sim.state, sim._engine.parameters.span
+        sim.run(steps=steps)
+        system, span = sim.state, sim.box.span
         for index, (group, name, limit) in limits.items():
             displacement = largest_displacement(system.grains.arrays, getattr(getattr(system, group), name), span)
             assert system.pair_list.skin[index] <= limit - displacement + 1e-12 * limit
@@ -97,16 +95,16 @@ def test_inner_list_is_rebuilt_in_time():
     A contact that forms or breaks consumes the skin: 2000 steps are 2000 calls of one step, which rebuild in each.
     """
     sim, twin = dense_gas(), dense_gas()
-    limit, span = INNER_SKIN_FRACTION * sim._engine.parameters.criteria.pair_gap, sim._engine.parameters.span
+    limit, span = INNER_SKIN_FRACTION * sim.grains.radius.min(), sim.box.span
     for each in (sim, twin):
         each.run(steps=1)
     finished_run = 0
     for steps in (2, 3, 4, 5, 6) * 5:
-        twin._engine.advance(np.inf, 1)
+        twin.run(steps=1)
         built = twin.state.grains.arrays.position.copy()
-        twin._engine.advance(np.inf, steps - 1)
+        twin.run(steps=steps - 1)
         events = sim.state.count[[MADE, BROKEN, REBUILT]]
-        sim._engine.advance(np.inf, steps)
+        sim.run(steps=steps)
         if np.array_equal(
             sim.state.count[[MADE, BROKEN, REBUILT]], events
         ):  # otherwise the inner list is rebuilt again
@@ -117,7 +115,7 @@ def test_inner_list_is_rebuilt_in_time():
     assert finished_run > 10
     sim.run(steps=2000)
     while twin.state.steps < sim.state.steps:
-        twin._engine.advance(np.inf, 1)
+        twin.run(steps=1)
     assert sim.state.count[MADE] > 10 and sim.state.count[BROKEN] > 3
     a, b = sim.state.to_arrays(), twin.state.to_arrays()
     assert all(np.array_equal(a[name], b[name]) for name in a)
@@ -139,25 +137,27 @@ def test_a_pair_that_separates_and_meets_again_is_found():
             sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], stepping=every_step)
             sim.run(steps=1)
             while sim.state.steps < 400:
-                sim._engine.advance(np.inf, 399 if calls == "one" else 1)
+                sim.run(steps=399 if calls == "one" else 1)
             ends.append(sim.state.to_arrays())
         seen += bool(sim.state.count[BROKEN] > 0 and sim.state.count[MADE] > 0)
         assert all(np.array_equal(ends[0][name], ends[1][name]) for name in ends[0])
     assert seen > 3
 
 
+@pytest.mark.filterwarnings("ignore:grains spin too fast for a solid")
 @pytest.mark.compiled("contacts")
-@pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.TOO_FAST, 2), (0.0, Stop.SPINS_TOO_FAST, 0)])
-def test_an_outcome_names_the_limiting_grain(speed, stop, culprit):
+@pytest.mark.parametrize(
+    ("speed", "outcome", "culprit"), [(1e6, sand.Outcome.TOO_FAST, 2), (0.0, sand.Outcome.SPINS_TOO_FAST, 0)]
+)
+def test_an_outcome_names_the_limiting_grain(speed, outcome, culprit):
     """Grain 0 spins too fast for the user's step; grain 2 flies too fast or rests."""
     position, at_rest = np.diag([0.0, 1e-7, 2e-7]), np.zeros((3, 3))
     velocity, spin = at_rest.copy(), at_rest.copy()
     velocity[2, 0], spin[0, 0] = speed, 1e13
     grains = sand.Grains(position, 1e-8, sand.SILICA, velocity=velocity, spin=spin)
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="0.1 ps"))
-    sim._engine.begin()
-    assert sim._engine.advance(np.inf, 1) is stop
-    assert sim._engine.limiting_grains() == (culprit,)
+    result = sim.run(steps=1)
+    assert result.outcome is outcome and result.grains == (culprit,)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

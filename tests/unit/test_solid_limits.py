@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import sand
 from sand.basics.state import BROKEN, CLOCK, IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP, LEAST_CLOCK
 from sand.contact.dmt import LAW as DMT
-from sand.contact.impact import impact_overlap, impact_pressure, impact_share
+from sand.contact.impact import impact_share
 from sand.contact.jkr import LAW as JKR
 from sand.contact.law import contact_periods, largest_pull
 from sand.engine.input_checks import check_system
@@ -48,6 +48,16 @@ def run_texts(make, **until):
 
 
 # --- impacts and overlaps ----------------------------------------------------------------------------------------
+
+
+def impact_overlap(share):
+    """Largest overlap δ/R = (10π s²)^(2/5) of an impact of s = `share` between spheres without adhesion."""
+    return (10.0 * math.pi * share * share) ** 0.4
+
+
+def impact_pressure(share):
+    """Largest pressure p₀/E* = (2/π) (10π s²)^(1/5) of such an impact."""
+    return 2.0 / math.pi * (10.0 * math.pi * share * share) ** 0.2
 
 
 def hertz(speed, r1, r2, material):
@@ -196,11 +206,11 @@ def test_a_grain_pressed_between_walls_is_warned_of():
 def test_a_clock_of_an_earlier_version_goes_on_from_zero():
     """A checkpoint without the extremes, as in tests/reference, is read; they begin at 0."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], "1 um", "silica"), [sand.Contact()])
-    saved = {name: array.copy() for name, array in sim._engine._state.to_arrays().items()}
+    state = sim.regular_state
+    saved = {name: array.copy() for name, array in state.to_arrays().items()}
     saved["clock"] = np.arange(1.0, LEAST_CLOCK + 1.0)
-    sim._engine._state.from_arrays(saved)
-    clock = sim._engine._state.clock
-    assert clock.tolist() == [*saved["clock"], *[0.0] * (len(CLOCK) - LEAST_CLOCK)]
+    state.from_arrays(saved)
+    assert state.clock.tolist() == [*saved["clock"], *[0.0] * (len(CLOCK) - LEAST_CLOCK)]
 
 
 # --- spins ---------------------------------------------------------------------------------------------------------

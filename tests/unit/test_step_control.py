@@ -9,6 +9,7 @@ import sand
 from sand.basics.state import INNER_COUNT, INNER_SKIN, PAIRS
 from sand.compiler.jit import kernel
 from sand.contact.events import inner_list_overflowed
+from sand.engine.assemble import build_engine
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
 from sand.neighbours.pair_list import build_inner_list
@@ -39,8 +40,9 @@ def test_float_bits_are_ordered_as_numbers():
 def test_vectorised_minima_equal_plain_minima():
     """The vectorised loops give the minimum over grains and pairs evaluated one by one in Python, to rounding."""
     sim = dense_gas()
-    w, rules = sim.state, sim._engine.parameters
-    arrays, span, control = w.grains.arrays, rules.span, rules.criteria
+    w, span = sim.state, sim.box.span
+    engine = build_engine(sim.grains, sim.forces, sim.box, sim.stepping, sim.neighbours, fresh=False)
+    arrays, control = w.grains.arrays, engine.parameters.criteria
 
     def minima(grains, far, start, near, count, span, control):
         step, cycle = steps_of_free_grains(grains, far, start, control)
@@ -65,12 +67,12 @@ def test_inner_list_holds_the_close_pairs():
     Without room for all of them (an array has one entry more than pairs), all near pairs are searched.
     """
     sim = dense_gas()
-    w, reach = sim.state, sim._engine.parameters.criteria.pair_gap
+    w, reach = sim.state, sim.grains.radius.min()
     gap = 2.0 * INNER_SKIN_FRACTION * reach
 
     def inner_list(room):
         near = w.pair_list._replace(inner=np.zeros(room, np.uint32), skin=w.pair_list.skin.copy())
-        build_inner_list(w.grains.arrays, near, w.count, sim._engine.parameters.span, gap)
+        build_inner_list(w.grains.arrays, near, w.count, sim.box.span, gap)
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
         if inner_list_overflowed(near, w.count):
             return {tuple(sorted(pair)) for pair in near.pair[:, : w.count[PAIRS]].T.tolist()}

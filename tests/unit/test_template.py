@@ -7,6 +7,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
+from sand.components.driven import Driven
 from sand.config.build import simulation_of
 from sand.config.case import (
     BoxSection,
@@ -20,7 +21,6 @@ from sand.config.case import (
 )
 from sand.config.key_errors import _keys_at
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
-from sand.engine.driven import Driven
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
 from sand.experiments.scattering.scatter_case import ScatterCase
@@ -66,10 +66,10 @@ def test_every_key_is_there_with_its_meaning():
     """All keys of all sections, forces and integrators; each has a description above it."""
     text = template("a.toml")
     tables = tables_of(text)
-    expected = [{key.name for key in keys_of(kind)} for kind in (*MODELS[:5], WallSection, *FORCES.values())]
+    expected = [{key.name for key in keys_of(kind)} for kind in (*MODELS[:5], *FORCES.values())]
     expected[2] -= {"classes"}
     expected += [{"method"} | {key.name for key in keys_of(kind)} for kind in INTEGRATORS.values()]
-    expected += [{key.name for key in keys_of(kind)} for kind in (Neighbours, Driven)]
+    expected += [{key.name for key in keys_of(kind)} for kind in (Neighbours, WallSection, Driven)]
     assert [{line.lstrip("#").split(" =")[0] for line in lines} for _, lines in tables] == expected
     assert [f"[forces.{name}]" for name in FORCES] == [name for name, _ in tables if name.startswith("[forces.")]
     before = ""

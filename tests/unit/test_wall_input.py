@@ -3,8 +3,10 @@
 import pytest
 
 import sand
+from sand.components.walls import Walls
 from sand.config.case import check_case
-from sand.engine.walls import check_walls
+from sand.engine.component import Setup, check
+from sand.engine.kinds import ForcesByType
 
 from ..plugins import ForestRuth
 
@@ -39,7 +41,8 @@ def test_walls_must_fit_the_simulation(wall, options, message):
     """One line that says what to do."""
     given = {"contact": sand.Contact(), "box": sand.Box(), "stepping": sand.Verlet()} | options
     with pytest.raises(sand.BadInput, match=message):
-        check_walls([wall], ONE, given["contact"], given["box"], given["stepping"], fresh=True)
+        forces = ForcesByType(given["contact"], [], [], [])
+        check([Walls([wall])], Setup(ONE, forces, given["box"], given["stepping"], sand.Neighbours(), True))
 
 
 def test_names_and_types_of_walls():

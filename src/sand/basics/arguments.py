@@ -227,10 +227,6 @@ def _length(value: Any) -> int:
         return -1
 
 
-def _is_array_of_numbers(value: Any) -> bool:
-    return hasattr(value, "dtype") and getattr(value, "ndim", 0) > 0 and value.dtype.kind in "biufc"
-
-
 def _is_iterable(value: Any) -> bool:
     try:
         iter(value)

@@ -29,7 +29,7 @@ class ContactArrays(NamedTuple):
     pointer2: np.ndarray  # (3, C) contact pointer of grain 2
     twist: np.ndarray  # (C,) φ [rad]
     formed: np.ndarray  # (C,) time of formation [s]; the start time for initial contacts
-    constants: np.ndarray  # (K, C) constants of the contact law; (K, BLOCK) identical columns if they are uniform
+    constants: np.ndarray  # (K, C) constants of the law; (K, CONTACTS_PER_BLOCK) identical columns if uniform
     lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 losses of state.RECORDED
     damping: np.ndarray  # (12, C) motion and loads of the dashpots, rows of contact.damping; (12, 0) without damping
     force: np.ndarray  # (3, C) force on grain 1 [N]
@@ -183,7 +183,7 @@ GATHER_CLASSES = 64
 """Classes of grains by contact count; as many entries of `gather_order`, behind those of the grains, are counters."""
 GATHER_ORDER_FROM = 4000
 """Fewest grains for which contact.gather sorts grains by contact count; branch predictors learn the counts of fewer."""
-BLOCK = 128
+CONTACTS_PER_BLOCK = 128
 """Contacts per block of the pass over contacts, a multiple of the SIMD width."""
 OVER_ALLOCATION, GROWTH = 1.1, 1.25
 """Initial over-allocation (×1.1), and growth factor on overflow (×1.25)."""
@@ -251,7 +251,7 @@ def empty_contact_arrays(
     numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damping": np.zeros((DAMPING_ROWS, c if damped else 0))}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
-        constants=np.zeros((constant_count, BLOCK if uniform_contacts else c)),
+        constants=np.zeros((constant_count, CONTACTS_PER_BLOCK if uniform_contacts else c)),
         flag=np.zeros(c, np.uint8),
         every_step=np.zeros(c, np.uint8),
         lost=np.zeros((channels, c)),

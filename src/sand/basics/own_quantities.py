@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import BadInput, shown
 from .own_units import with_own_unit
-from .schema import BY_NAME, Field, public, stored
+from .schema import BY_NAME, GrainField, public, stored
 from .units import in_unit
 
 LONGEST_NAME = 60
@@ -232,7 +232,7 @@ def own_values(name: str, unit: str, given: Any, count: int) -> np.ndarray:
     BadInput
         If the unit is another one, there are not 1 or N values, or one is not finite.
     """
-    field = Field(name, 1, unit, "own", "own quantity", "")
+    field = GrainField(name, 1, unit, "own", "own quantity", "")
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str):
         numbers, own = with_own_unit(given) or (None, unit)
         given = numbers if _is_same(own, unit) else None

@@ -8,12 +8,12 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterator, Sequence, Set
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from .arguments import checked
-from .units import si, whole_number
+from .settings import List, Number, Setting, Settings, Whole, declared
 
 STEPS = 1000
 """Default number of changes between two points of a ramp."""
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 @checked
 @dataclasses.dataclass(frozen=True)
-class Ramp:
+class Ramp(Settings):
     """A parameter of a force that changes linearly in time between given points, in equal steps.
 
     Between two points the parameter has n values, each that of the ramp in the middle of one of n equal intervals. It
@@ -48,31 +48,22 @@ class Ramp:
         If there are fewer than two points, values and times differ in number, or times decrease; one line each.
     """
 
-    values: Sequence[Any]
-    times: Sequence[Any]
-    steps: int = STEPS
+    values: Annotated[Sequence[Any], List(Setting())]
+    times: Annotated[Sequence[Any], List(Number("s"))]
+    steps: Annotated[int, Whole(1, MOST_CHANGES)] = STEPS
 
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
-        values, times = (
-            list(self.values),
-            [errors.take(si, time, "s", f"ramp: times[{k}]", instead=math.nan) for k, time in enumerate(self.times)],
-        )
-        errors.take(whole_number, self.steps, "ramp: steps", 1, MOST_CHANGES)
-        if len(values) != len(times):
-            errors.problems.append(
-                f"ramp: there are {len(values)} values and {len(times)} times; give one time in s for each value"
-            )
-        elif len(values) < 2:
-            errors.problems.append("ramp: a ramp has at least two points; give two values and two times in s")
-        errors.problems += [
-            f"ramp: times[{k + 1}] = {later:g} s is before times[{k}] = {earlier:g} s; times must not decrease"
-            for k, (earlier, later) in enumerate(itertools.pairwise(times))
-            if later < earlier
-        ]
-        errors.done()
-        object.__setattr__(self, "values", tuple(values))
-        object.__setattr__(self, "times", tuple(times))
+    place: ClassVar[str] = "ramp"
+
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """Values and times that differ in number, and times that decrease."""
+        values, times = ([] if name in wrong else getattr(self, name) for name in ("values", "times"))
+        if not wrong and len(values) != len(times):
+            yield f"there are {len(values)} values and {len(times)} times; give one time in s for each value"
+        elif not wrong and len(values) < 2:
+            yield "a ramp has at least two points; give two values and two times in s"
+        for k, (earlier, later) in enumerate(itertools.pairwise(times)):
+            if later < earlier:
+                yield f"times[{k + 1}] = {later:g} s is before times[{k}] = {earlier:g} s; times must not decrease"
 
     def interval(self, time: float) -> tuple[int, int]:
         """The last point that is not after a time [s], −1 if there is none, and the interval behind it, from 0."""
@@ -110,62 +101,54 @@ class Ramp:
             return tuple(x + part * (y - x) for x, y in zip(a, b, strict=True))
         return a + part * (b - a)
 
-    def settings(self) -> dict[str, Any]:
-        """Values and times in SI units, as in a case file."""
-        values = [list(v) if isinstance(v, tuple) else v for v in self.values]
-        return {"values": values, "times": list(self.times), "steps": self.steps}
 
-
-def rampable(*names: str) -> Callable[[type[T]], type[T]]:
-    """Decorator of a force, a frozen dataclass: the parameters `names` also take a `Ramp`, or the table of one.
+def rampable(force: type[T]) -> type[T]:
+    """Decorator of a force, a frozen dataclass: fields annotated with `RAMP` also take a `Ramp`, or the table of one.
 
     The fields of a force with ramps have the values of the first points, in SI; `ramps_of` gives the ramps.  They are
     part of its equality and of its settings.
     """
+    read, parameters, equals = force.__post_init__, force.parameters, force.__eq__  # type: ignore[attr-defined]
+    label = str(force.name)  # type: ignore[attr-defined]
 
-    def decorate(force: type[T]) -> type[T]:
-        read, parameters, equals = force.__post_init__, force.parameters, force.__eq__  # type: ignore[attr-defined]
-        label = str(force.name)  # type: ignore[attr-defined]
+    def read_with_ramps(self: Any) -> None:
+        errors, ramps = ErrorCollector(), {}
+        names = [key for key, field in declared(force).items() if field.ramp]
+        fields = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
+        for key, value in fields.items():
+            if isinstance(value, (Ramp, dict)):
+                ramps[key] = errors.take(_as_ramp, value, f"{label}: {key}")
+                if key not in names:
+                    errors.problems.append(_not_rampable(label, key, names))
+        if not ramps:
+            read(self)
+            return
+        errors.done()
+        first = {key: ramp.values[0] for key, ramp in ramps.items()}
+        points = {
+            key: [errors.take(force, **fields | first | {key: value}) for value in ramp.values]
+            for key, ramp in ramps.items()
+        }
+        errors.problems = list(dict.fromkeys(errors.problems))  # those of other parameters are found at each point
+        errors.done()
+        for key, value in vars(next(iter(points.values()))[0]).items():
+            object.__setattr__(self, key, value)
+        read_values = {key: [getattr(one, key) for one in found] for key, found in points.items()}
+        found = {key: dataclasses.replace(ramp, values=read_values[key]) for key, ramp in ramps.items()}
+        object.__setattr__(self, "ramps", found)
 
-        def read_with_ramps(self: Any) -> None:
-            errors, ramps = ErrorCollector(), {}
-            fields = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
-            for key, value in fields.items():
-                if isinstance(value, (Ramp, dict)):
-                    ramps[key] = errors.take(_as_ramp, value, f"{label}: {key}")
-                    if key not in names:
-                        errors.problems.append(_not_rampable(label, key, names))
-            if not ramps:
-                read(self)
-                return
-            errors.done()
-            first = {key: ramp.values[0] for key, ramp in ramps.items()}
-            points = {
-                key: [errors.take(force, **fields | first | {key: value}) for value in ramp.values]
-                for key, ramp in ramps.items()
-            }
-            errors.problems = list(dict.fromkeys(errors.problems))  # those of other parameters are found at each point
-            errors.done()
-            for key, value in vars(next(iter(points.values()))[0]).items():
-                object.__setattr__(self, key, value)
-            read_values = {key: [getattr(one, key) for one in found] for key, found in points.items()}
-            found = {key: dataclasses.replace(ramp, values=read_values[key]) for key, ramp in ramps.items()}
-            object.__setattr__(self, "ramps", found)
+    def parameters_with_ramps(self: Any) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
+        return parameters(self) | {key: ramp.parameters() for key, ramp in ramps_of(self).items()}
 
-        def parameters_with_ramps(self: Any) -> dict[str, Any]:
-            """Settings in SI units, as in a case file."""
-            return parameters(self) | {key: ramp.settings() for key, ramp in ramps_of(self).items()}
+    def equal(self: Any, other: Any) -> Any:
+        same = equals(self, other)
+        return same if same is NotImplemented else same and ramps_of(self) == ramps_of(other)
 
-        def equal(self: Any, other: Any) -> Any:
-            same = equals(self, other)
-            return same if same is NotImplemented else same and ramps_of(self) == ramps_of(other)
-
-        changed = {"__post_init__": read_with_ramps, "parameters": parameters_with_ramps, "__eq__": equal}
-        for name, method in changed.items():
-            setattr(force, name, method)
-        return force
-
-    return decorate
+    changed = {"__post_init__": read_with_ramps, "parameters": parameters_with_ramps, "__eq__": equal}
+    for name, method in changed.items():
+        setattr(force, name, method)
+    return force
 
 
 def _as_ramp(value: Any, where: str) -> Ramp:

@@ -10,7 +10,7 @@ from ..errors import BadInput
 from .units import in_unit, not_a_quantity, too_large
 
 
-class Field(NamedTuple):
+class GrainField(NamedTuple):
     """Description of one per-grain quantity."""
 
     name: str
@@ -23,19 +23,19 @@ class Field(NamedTuple):
 
 
 FIELDS = (
-    Field("radius", 1, "m", "fixed", "radius of the sphere", "r"),
-    Field("mass", 1, "kg", "fixed", "mass", "m"),
-    Field("inertia", 1, "kg m^2", "fixed", "moment of inertia, (2/5) m r²", "I"),
-    Field("charge", 1, "C", "fixed", "electric charge", "q"),
-    Field("body_moment", 3, "A m^2", "fixed", "magnetic moment in the frame of the grain", "μ_body"),
-    Field("position", 3, "m", "moving", "centre, laboratory frame", "r"),
-    Field("velocity", 3, "m/s", "moving", "velocity of the centre, laboratory frame", "v"),
-    Field("orientation", 4, "1", "moving", "rotation parameters, vector 1..3 then scalar 4", "ϱ"),
-    Field("spin", 3, "rad/s", "moving", "angular velocity, laboratory frame", "ω"),
-    Field("moment", 3, "A m^2", "load", "magnetic moment, laboratory frame", "μ"),
-    Field("force", 3, "N", "load", "sum of all forces, laboratory frame", "F"),
-    Field("torque", 3, "N m", "load", "sum of all torques, laboratory frame", "M"),
-    Field("field", 3, "T", "load", "flux density at the centre from the other grains", "B"),
+    GrainField("radius", 1, "m", "fixed", "radius of the sphere", "r"),
+    GrainField("mass", 1, "kg", "fixed", "mass", "m"),
+    GrainField("inertia", 1, "kg m^2", "fixed", "moment of inertia, (2/5) m r²", "I"),
+    GrainField("charge", 1, "C", "fixed", "electric charge", "q"),
+    GrainField("body_moment", 3, "A m^2", "fixed", "magnetic moment in the frame of the grain", "μ_body"),
+    GrainField("position", 3, "m", "moving", "centre, laboratory frame", "r"),
+    GrainField("velocity", 3, "m/s", "moving", "velocity of the centre, laboratory frame", "v"),
+    GrainField("orientation", 4, "1", "moving", "rotation parameters, vector 1..3 then scalar 4", "ϱ"),
+    GrainField("spin", 3, "rad/s", "moving", "angular velocity, laboratory frame", "ω"),
+    GrainField("moment", 3, "A m^2", "load", "magnetic moment, laboratory frame", "μ"),
+    GrainField("force", 3, "N", "load", "sum of all forces, laboratory frame", "F"),
+    GrainField("torque", 3, "N m", "load", "sum of all torques, laboratory frame", "M"),
+    GrainField("field", 3, "T", "load", "flux density at the centre from the other grains", "B"),
 )
 
 BY_NAME = {field.name: field for field in FIELDS}
@@ -50,12 +50,12 @@ def public(array: np.ndarray) -> np.ndarray:
     return view
 
 
-def stored(field: Field, values: Any, count: int, *, positive: bool = False, called: str = "") -> np.ndarray:
+def stored(field: GrainField, values: Any, count: int, *, positive: bool = False, called: str = "") -> np.ndarray:
     """Convert values of a quantity to an array of stored shape, (N,) or (width, N).
 
     Parameters
     ----------
-    field : Field
+    field : GrainField
         Quantity to convert to.
     values : array_like or str or quantity
         SI numbers, text with a unit, or a quantity. One value (width 1) or one vector (width 3) applies to all grains.

@@ -26,6 +26,10 @@ MOST_LISTED = 3
 """Words that a message lists; with more of them it says only what they are for."""
 
 
+RAMP = "may be a ramp"
+"""Annotation of a field of a force that also takes a `Ramp`."""
+
+
 class Setting:
     """What a field takes; subclasses read a value of the user. This one takes any, to be checked where it is used."""
 
@@ -64,6 +68,11 @@ class Whole(Setting):
     def __init__(self, least: int, most: int | None = None, *, auto: bool = False):
         self.least, self.most, self.auto = least, most, auto
 
+    @property
+    def range(self) -> str:
+        """What is allowed, in words."""
+        return f"a whole number{f' of at least {self.least}' if self.most is None else f', {self.least} … {self.most}'}"
+
     def read(self, value: Any, name: str) -> Any:
         """The number, as given."""
         if self.auto and is_word(value, "auto"):
@@ -74,23 +83,27 @@ class Whole(Setting):
             raise BadInput([f'{line}, or "auto"' for line in error.problems] if self.auto else error.problems) from None
 
 
-class Wholes(Setting):
-    """A list of whole numbers that is not empty."""
+class List(Setting):
+    """A list of entries, each read as a setting; with `what`, which says what to give, it may not be empty."""
 
-    def __init__(self, least: int, what: str):
-        self.least, self.what = least, what
+    def __init__(self, entry: Setting, what: str = ""):
+        self.entry, self.what, self.unit = entry, what, entry.unit
 
-    def read(self, value: Any, name: str) -> tuple[int, ...]:
-        """The numbers."""
+    def read(self, value: Any, name: str) -> tuple[Any, ...]:
+        """The entries."""
         entries = components(value)
-        if not entries:
-            empty = " must be a list" if entries is None else " is empty"
-            raise BadInput(f"{name} = {shown(value)}{empty}; give {self.what}")
+        if entries is None or (not entries and self.what):
+            advice = f"; give {self.what}" if self.what else ""
+            raise BadInput(f"{name} = {shown(value)} {'must be a list' if entries is None else 'is empty'}{advice}")
         errors = ErrorCollector()
-        numbers = [errors.take(whole_number, one, name, self.least) for one in entries]
+        found = [errors.take(self.entry.read, one, f"{name}[{k}]") for k, one in enumerate(entries)]
         if errors.problems:
             raise BadInput(errors.problems)
-        return tuple(numbers)
+        return tuple(found)
+
+    def write(self, value: Any) -> list[Any]:
+        """The entries as in a case file."""
+        return [self.entry.write(one) for one in value]
 
 
 class Word(Setting):
@@ -236,6 +249,7 @@ class Declared(NamedTuple):
     setting: Setting
     condition: For | None
     optional: bool  # whether it may be None
+    ramp: bool  # whether it may be a ramp
 
 
 def declared(kind: type) -> dict[str, Declared]:
@@ -253,7 +267,8 @@ def _declared(kind: type) -> dict[str, Declared]:
         condition = next((each for each in about if isinstance(each, For)), None)
         setting = next((each for each in about if isinstance(each, Setting)), Setting() if condition else None)
         if setting is not None:
-            found[name] = Declared(setting, condition, setting.none or getattr(kind, name, setting) is None)
+            optional = setting.none or getattr(kind, name, setting) is None
+            found[name] = Declared(setting, condition, optional, RAMP in about)
     return found
 
 

@@ -53,7 +53,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 
 
 @parsing.command("build", short_help="Build an aggregate and write it to a file.", check=_check)
-@click.argument("kind", metavar="KIND", type=click.Choice((*KINDS, "pca")))
+@click.argument("kind", metavar="KIND", type=click.Choice(KINDS))
 @click.option("--grains", type=options.COUNT, metavar="N", help="Number of grains.")
 @click.option(
     "--shape", metavar="NX,NY,NZ", callback=_shape, help="Grains along the sides of a lattice, instead of --grains."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..version import __version__
+from ..basics.version import __version__
 from . import options, parsing, report
 from .references import ARTICLES, bibtex, software
 

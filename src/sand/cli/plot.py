@@ -224,7 +224,7 @@ def _first_frame(path: Path, given: Mapping[str, Any]) -> Any:
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
     from ..analysis.ledger_columns import LedgerColumns
-    from ..forces.pair.dipoles import kinetic_temperature
+    from ..basics.temperature import kinetic_temperature
     from ..io.ledger_table import read_ledger
     from ..io.run_folder import LEDGER
     from ..plotting.plots import HISTORY, grains_figure, history_figure

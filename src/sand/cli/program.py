@@ -9,8 +9,8 @@ from collections.abc import Callable
 import click
 
 from ..basics.descriptions import docstring
+from ..basics.version import __version__
 from ..errors import SandError
-from ..version import __version__
 from . import (
     analyse,
     build,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..version import __version__
+from ..basics.version import __version__
 
 TITLE, AUTHORS, LICENSE = "SAND: Soft Aggregate Numerical Dynamics", "The SAND developers", "BSD-3-Clause"
 LATEX = {"ü": r"{\"u}", "–": "--", "&": r"\&"}

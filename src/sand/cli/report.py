@@ -25,7 +25,7 @@ from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, 
 Rows = list[tuple[str, str]]
 """Labels and texts of a table of two columns."""
 LARGE = 1e8
-"""Size of trajectories [bytes] from which a note says that they are read."""
+"""Size [bytes] from which a note says that a trajectory is read, and above which a page takes long to open."""
 LONGEST_NOTE = 600
 """Largest number of characters of a note."""
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")

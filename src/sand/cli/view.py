@@ -16,8 +16,6 @@ from ..errors import BadInput
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
 from . import options, parsing, report
 
-LARGE = 100e6
-"""Size [B] above which a page takes long to open."""
 WAIT = 60.0
 """Longest wall time [s] to wait for the first frame of a run, which may have to compile first."""
 YOUNG = 5.0
@@ -81,8 +79,8 @@ def command(
     megabytes = f"{size / 1e6:.3g} MB"
     rows = [("file", str(target)), ("frames", str(len(dataset))), ("size", megabytes)]
     report.answer({"file": str(target), "bytes": size}, f"view {folder}", rows, **output)
-    if size > LARGE:
-        fewer = max(int(every * size / LARGE) + 1, 2)
+    if size > report.LARGE:
+        fewer = max(int(every * size / report.LARGE) + 1, 2)
         report.note(f"note: a page of {megabytes} opens slowly; --every {fewer} would reduce it to about 100 MB")
 
 

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 from .jit import COMPILE_TIMES, COMPILED, cache_folder, compile_if_free, in_cache
 from .memory import free_memory
 from .program import before_first_calls
-from .progress import compile_times, making_code, shown_line
+from .progress import LONGEST_WAIT, Timeout, compile_times, free_lock, making_code, shown_line
 from .recipes import NoRecipe, made_from, recipe_of
 from .stage import PythonStage, Stage
 from .table import Table, structure_of
@@ -35,7 +35,7 @@ __all__ = ["compile_ahead", "compile_free", "kernel_from", "number_of_helpers", 
 
 WORTH_HELPERS = 6.0
 """Expected time [s] of compilation from which on helpers save time."""
-HELPER_BYTES = 4.5e8
+HELPER_BYTES = 5e8
 """Memory that a helper needs (measured)."""
 LOOK = 0.05
 """Wall time [s] between two looks whether other processes have compiled the last stages."""
@@ -79,27 +79,38 @@ def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], proc
     KeyboardInterrupt
         After Ctrl-C; all helpers have ended then.
     """
-    if not COMPILED:
-        return
-    tasks = _missing(stages)
+    tasks = _missing(stages) if COMPILED else []
     total = sum(each.seconds for each in tasks)
-    if total < WORTH_HELPERS:
+    if not tasks or total < WORTH_HELPERS:
         return
-    helpers = 0 if _is_one_of_several[0] else number_of_helpers(processes, total, max(each.seconds for each in tasks))
-    if not (helpers or _is_one_of_several[0]):
+    alone, wanted = not _is_one_of_several[0], number_of_helpers(processes, total, max(each.seconds for each in tasks))
+    if alone and not wanted:
         return
-    began = time.perf_counter()
+    try:
+        lock = free_lock(cache_folder() / "helpers.lock")
+        if lock is None:  # other processes cannot tell what this one compiles
+            return
+    except Timeout:  # a process that started at the same time has helpers
+        lock, wanted = None, 0
+    helpers, began = wanted if alone else 0, time.perf_counter()
 
     def progress() -> str:
         left = [each.seconds for each in tasks if not in_cache(*each.kernel)]
         rest = max(total / (helpers + 1) - time.perf_counter() + began, 0.5 * sum(left) / (helpers + 1), SHORTEST)
         return f"compiling {len(tasks) - len(left)} of {len(tasks)} stages, {rest:.0f} s left; done once"
 
-    with making_code, _helpers([each.recipe for each in tasks if each.recipe], helpers), shown_line(progress):
-        left = compile_free(each.kernel for each in tasks)
-        while left:
-            time.sleep(LOOK)
-            left = compile_free(left)
+    try:
+        with making_code, _helpers([each.recipe for each in tasks if each.recipe], helpers), shown_line(progress):
+            left = compile_free(each.kernel for each in tasks)
+            while left and time.perf_counter() - began < LONGEST_WAIT:
+                time.sleep(LOOK)
+                left = compile_free(left)
+    except BaseException:  # Ctrl-C: what is left is missing when the program is run again
+        _looked_at.clear()
+        raise
+    finally:
+        if lock is not None:
+            lock.release()
 
 
 def compile_free(kernels: Iterable[tuple[Any, Any]]) -> list[tuple[Any, Any]]:

@@ -40,7 +40,7 @@ def _first_call(
             entry[0] = address
         except BaseException as error:  # Ctrl-C, an error in a formula: passed on by `Program.run`
             failures.append(error)
-            return FAILED
+            return STAGE_FAILED
         entry[2] = READY  # from here on the status that is returned is valid
         return status
 
@@ -58,7 +58,7 @@ def _python_call(
             ctypes.c_int64.from_address(result).value = stage.in_python(tables[0](), parameters, block)  # type: ignore[arg-type]
         except BaseException as error:  # passed on by `Program.run`
             failures.append(error)
-            return FAILED
+            return STAGE_FAILED
         return 0
 
     return call
@@ -67,7 +67,7 @@ def _python_call(
 before_first_calls: list[Callable[[], None]] = []
 """Functions called before a stage is compiled, and while a job waits for its tasks; an exception of theirs, such as
 KeyboardInterrupt, prevents that."""
-FAILED = -1
+STAGE_FAILED = -1
 """Numba's status of a function that has raised a Python exception."""
 NOT_READY, READY = 0, 1
 """Last number of an entry.  While it is NOT_READY, a Python function is called, whose status may be undefined: a signal

@@ -15,7 +15,15 @@ from numba.core import event
 
 from .cache import read_record, write_record
 
-__all__ = ["CompilationListener", "Timeout", "acquire_lock", "announce", "compilation_notes", "compilation_seconds"]
+__all__ = [
+    "LONGEST_WAIT",
+    "CompilationListener",
+    "Timeout",
+    "acquire_lock",
+    "announce",
+    "compilation_notes",
+    "compilation_seconds",
+]
 __all__ += ["compile_times", "describe", "free_lock", "making_code", "shown_line", "suppress_notes"]
 
 LONGEST_WAIT = 300.0
@@ -91,7 +99,10 @@ def shown_line(describe: Callable[[], str]) -> Iterator[None]:
     The notes on single compilations are left out.
     """
     show, ended = _notify[-1], threading.Event()
-    rewrites = show is not _nowhere and sys.stderr is not None and sys.stderr.isatty()
+    if show is _nowhere:
+        yield
+        return
+    rewrites = sys.stderr is not None and sys.stderr.isatty()
 
     def keep_showing() -> None:
         width = 0

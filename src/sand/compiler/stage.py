@@ -33,7 +33,7 @@ from .progress import making_code
 from .table import (
     ALL_PARTS,
     ANY_TABLE,
-    BLOCK,
+    BLOCK_NUMBER,
     PARAMETERS,
     SPECIAL,
     Address,
@@ -162,7 +162,7 @@ class Stage:
 
     def in_python(self, table: Table, parameters: Any, block: int) -> Any:
         """Call the function without the compiler."""
-        special = {ALL_PARTS: table, BLOCK: block, PARAMETERS: parameters}
+        special = {ALL_PARTS: table, BLOCK_NUMBER: block, PARAMETERS: parameters}
         return self.function(*(special[name] if name in special else table[name] for name in self.needs))
 
     def prepare(self, table: Table, parameters: Any = (), block: int = 0) -> Callable[[], int]:
@@ -181,7 +181,7 @@ class Stage:
         if not COMPILED:
             return int(self.function(*parts))
         given = dict(zip(self.needs, parts, strict=True))
-        parameters, block, table = given.pop(PARAMETERS, ()), given.pop(BLOCK, 0), Table(tuple(given))
+        parameters, block, table = given.pop(PARAMETERS, ()), given.pop(BLOCK_NUMBER, 0), Table(tuple(given))
         for name, value in given.items():
             table.set(name, value)
         return self.run(table, parameters, block)
@@ -203,7 +203,7 @@ class Stage:
         """Index in the table, or name, and type of one argument; `own` is the structure of the parameters."""
         if name == PARAMETERS:
             return name, kind_of(own)
-        if name == BLOCK:
+        if name == BLOCK_NUMBER:
             return name, types.int64
         if name == ALL_PARTS:
             places = ((part, *place(part)) for part in self.parts)
@@ -264,7 +264,7 @@ class PythonStage:
 
     def in_python(self, table: Table, parameters: Any, block: int) -> Any:
         """Call the function."""
-        special = {ALL_PARTS: table, BLOCK: block, PARAMETERS: parameters}
+        special = {ALL_PARTS: table, BLOCK_NUMBER: block, PARAMETERS: parameters}
         return self.function(*(special[name] if name in special else table[name] for name in self.needs))
 
     def run(self, table: Table, parameters: Any = (), block: int = 0) -> int:

@@ -20,7 +20,7 @@ from .entries import described
 from .groups import WORD, Group, array_of, constant_word
 from .jit import COMPILED
 
-__all__ = ["ALL_PARTS", "BLOCK", "PARAMETERS", "SPECIAL", "Address", "Parts", "Table", "address_of", "kind_of"]
+__all__ = ["ALL_PARTS", "BLOCK_NUMBER", "PARAMETERS", "SPECIAL", "Address", "Parts", "Table", "address_of", "kind_of"]
 __all__ += ["open_parts", "structure_of", "words_of"]
 
 ROW = WORD.as_pointer()
@@ -110,11 +110,11 @@ class _Row:
         return self.builder.inttoptr(self.word(), self.context.get_value_type(types.CPointer(dtype)))
 
 
-ALL_PARTS, BLOCK = "s", "block"
+ALL_PARTS, BLOCK_NUMBER = "s", "block"
 """Arguments of a stage that are not parts: the table, whose parts are attributes of `s`, and the block."""
 PARAMETERS = "parameters"
 """Argument of a stage that is opened from its own parameters."""
-SPECIAL = ALL_PARTS, BLOCK, PARAMETERS
+SPECIAL = ALL_PARTS, BLOCK_NUMBER, PARAMETERS
 ANY_TABLE = Address("any")
 """Type of a table in the signature of a stage."""
 
@@ -129,7 +129,7 @@ def open_parts(typing_context: Any, table: Any, parameters: Any, block: Any) -> 
         for index, kind in table.parts:
             if index == ALL_PARTS:
                 found.append(given[0])
-            elif index == BLOCK:
+            elif index == BLOCK_NUMBER:
                 found.append(given[2])
             elif index == PARAMETERS:
                 found.append(_Row(context, builder, builder.bitcast(given[1], ROW)).value(kind))

@@ -29,18 +29,18 @@ from .case import THERMAL, Case, check_case
 
 def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Simulation:
     """Create a simulation of grains in a box with the forces, steps and seed of a case."""
+    extra: dict[str, Any] = case.components()
     return Simulation(
         grains,
         case.forces.build(),
         box=box,
-        walls=[wall.build(case.materials_by_name()) for wall in case.walls],
         stepping=case.stepping,
         neighbours=case.neighbours,
         seed=case.run.seed,
         frame_every=case.run.frame_every,
         row_every=case.run.row_every,
         checkpoint_every=case.run.checkpoint_every,
-        driven=case.driven,
+        **extra,
         **options,
     )
 

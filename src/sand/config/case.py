@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, create_model, model_validator
 
+from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
 from ..basics.material import PRESETS, Material, like_preset
-from ..basics.settings import For, Number, Reading, Word
-from ..engine.driven import Driven
-from ..engine.walls import Wall, read_walls, wall_columns
+from ..basics.settings import Flag, For, Number, Reading, Whole, Word
+from ..components.driven import Driven
 from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
@@ -30,7 +30,6 @@ from .commands import BODIES, refuse_other_command
 from .key_errors import validate
 from .sections import (
     Cadence,
-    Count,
     Duration,
     Moment,
     PathName,
@@ -38,11 +37,11 @@ from .sections import (
     Section,
     Seed,
     Stepping,
-    Steps,
     method_of,
     with_integrator,
     with_keys,
 )
+from .wall_section import WallSection, wall_columns, wall_errors
 
 
 def _condition(value: Any, name: str) -> Any:
@@ -57,7 +56,7 @@ class RunSection(Section):
 
     until: Duration = None
     """End of the run [s], simulated time; this, `steps` or `stop` is required; with several, the first one reached."""
-    steps: Steps | None = None
+    steps: Annotated[int | None, Whole(1, MOST_STEPS)] = None
     """End of the run as a number of steps, completed to the end of the cycle."""
     stop: Annotated[str | None, Reading(_condition)] = None
     """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
@@ -116,7 +115,7 @@ class GrainsSection(Section):
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
-    number: Annotated[Count | None, For("kind", "gas", "given")] = None
+    number: Annotated[int | None, Whole(1, MOST_GRAINS), For("kind", "gas", "given")] = None
     """Number of grains; with `classes` of grains and aggregates."""
     radius: Radii = None
     """Radius [m]: a length, `lognormal(MEDIAN, SIGMA, LEAST, MOST)`, `power law(EXPONENT, LEAST, MOST)`, or a list with
@@ -132,7 +131,7 @@ class GrainsSection(Section):
     """Temperature of velocities and spins [K]."""
     spins: Annotated[str, Word(among=SPINS), For("kind", "gas", "given")] = "kT/2"
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
-    exact_temperature: Annotated[bool, Field(strict=True), For("kind", "gas", "given")] = True
+    exact_temperature: Annotated[bool, Flag(), For("kind", "gas", "given")] = True
     """Whether velocities and spins are scaled to exactly this temperature; otherwise they are random draws."""
     classes: Annotated[list[GrainClass], For("kind", "gas")] = Field(default_factory=list)
     """Classes of grains and aggregates, each a table [[grains.classes]]; see below."""
@@ -142,7 +141,7 @@ class GrainsSection(Section):
     file: Annotated[PathName | None, For("kind", "file", needed="one, such as file = 'run/trajectory.gsd'")] = None
     """Run folder, trajectory or body of SAND, or a file of another program: XYZ, columns, CSV, LAMMPS data and dump,
     GSD; its content tells the format."""
-    frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True), For("kind", "file")] = -1
+    frame: Annotated[int, Whole(-(2**31), 2**31 - 1), For("kind", "file")] = -1
     """Index of the frame; −1 is the last."""
     length: Annotated[str | None, For("kind", "file")] = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
@@ -222,17 +221,8 @@ else:
     )
 
 
-@with_keys(Wall, "material")
-class WallSection(Section):
-    """[[walls]]: a plane to which grains stick; see `sand.Wall`."""
-
-    material: str
-    """Preset or name in [materials]."""
-
-    def build(self, materials: dict[str, Material]) -> Wall:
-        """Build the wall.  Raises BadInput."""
-        given = self.model_dump(exclude_none=True, exclude={"material"})
-        return Wall(material=materials.get(self.material, self.material), **given)
+COMPONENTS: dict[str, type] = {"walls": WallSection, "driven": Driven}
+"""The tables of components, and what reads them."""
 
 
 class Case(Section):
@@ -247,6 +237,10 @@ class Case(Section):
     stepping: Stepping = Verlet()
     neighbours: Neighbours = Neighbours()
     driven: list[Driven] = Field(default_factory=list)
+
+    def components(self) -> dict[str, list[Any]]:
+        """What the case has of each component, by its keyword of `sand.Simulation`."""
+        return {"walls": [wall.build(self.materials_by_name()) for wall in self.walls], "driven": self.driven}
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the materials of the case, by name."""
@@ -288,24 +282,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
             for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
                 if isinstance(name, str) and name not in known:
                     problems.append(f"{place}.material: unknown material '{name}'; {did_you_mean(name, known)}")
-    return problems + _wall_errors(content.get("walls"), known)
-
-
-def _wall_errors(walls: Any, known: Collection[str]) -> list[str]:
-    """Error messages for the numbers in [[walls]], and for materials that do not exist."""
-    problems: list[str] = []
-    for k, section in enumerate(walls if isinstance(walls, list) else []):
-        try:
-            wall = WallSection.model_validate(section)
-            if wall.material not in known:
-                hint = did_you_mean(wall.material, list(known))
-                problems.append(f"walls.{k}.material: unknown material '{wall.material}'; {hint}")
-            wall.model_copy(update={"material": "iron"}).build({})
-        except ValidationError:
-            continue  # reported by the validation of the whole file
-        except BadInput as error:
-            problems += error.at(f"walls.{k}").problems
-    return problems
+    return problems + wall_errors(content.get("walls"), known)
 
 
 def condition_errors(content: dict[str, Any]) -> list[str]:
@@ -321,19 +298,10 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     try:
         table = content.get("stepping")
         awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
-        condition.check([*Ledger(awake=awake).columns, *columns, *_wall_names(content.get("walls"))])
+        condition.check([*Ledger(awake=awake).columns, *columns, *wall_columns(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []
-
-
-def _wall_names(walls: Any) -> list[str]:
-    """Columns of the ledger with the [[walls]] of a case file; none if these have errors."""
-    try:
-        sections = [WallSection.model_validate(one) for one in walls or ()]
-        return wall_columns(read_walls([one.model_copy(update={"material": "iron"}).build({}) for one in sections]))
-    except (ValidationError, BadInput, TypeError):
-        return []
 
 
 def read_case(path: str | Path) -> Case:

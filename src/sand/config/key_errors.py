@@ -65,10 +65,17 @@ def _messages(slip: Any, model: type, table: str) -> list[str]:
     if kind == "missing":
         return [f"{place} is missing; add it"]
     if kind == "value_error":  # messages of settings classes may begin with the key already
-        return [f"{place}: {line.removeprefix(f'{parts[-1]}: ')}" for line in str(slip["ctx"]["error"]).splitlines()]
+        return [_at(place, parts[-1], line) for line in str(slip["ctx"]["error"]).splitlines()]
     if kind in ("dataclass_type", "model_type"):
         return [f"{place} = {given!r}: it must be a table, [{place}]"]
     return [f"{place} = {given!r}: {slip['msg'][0].lower()}{slip['msg'][1:]}"]
+
+
+def _at(place: str, key: str, line: str) -> str:
+    """A message with the place in front, or in place of the key with which it begins."""
+    if line.startswith((f"{key} =", f"{key}[")):
+        return place + line.removeprefix(key)
+    return f"{place}: {line.removeprefix(f'{key}: ')}"
 
 
 def _keys_at(model: type, path: tuple[Any, ...]) -> list[str]:

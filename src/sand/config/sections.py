@@ -13,17 +13,16 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
-    Field,
     ValidationInfo,
     create_model,
     field_validator,
     model_validator,
 )
 
-from ..basics.arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..basics.arguments import MOST_SEED
 from ..basics.grains import moment_size
 from ..basics.paths import checked_name
-from ..basics.settings import For, Reading, Setting
+from ..basics.settings import For, List, Reading, Setting, Whole
 from ..errors import did_you_mean
 from ..integrate.integrator import methods_of_clusters, moves_bodies
 from ..integrate.registry import INTEGRATORS
@@ -122,12 +121,10 @@ PathName = Annotated[str, AfterValidator(lambda value, info: checked_name(value,
 """Name of a file or folder."""
 Moment = Annotated[Any, Reading(_checked_moment)]
 """A magnetic moment, absolute or per mass; stays as given."""
-Count = Annotated[int, Field(ge=1, le=MOST_GRAINS, strict=True)]
-"""A number of grains."""
-Steps = Annotated[int, Field(ge=1, le=MOST_STEPS, strict=True)]
-"""A number of steps."""
-Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
+Seed = Annotated[int, Whole(0, MOST_SEED)]
 """Seed of random numbers."""
+Seeds = Annotated[list[int], List(Whole(0, MOST_SEED), "seeds, such as [1, 2]")]
+"""Seeds of random numbers, at least one."""
 
 
 def method_of(table: dict[str, Any]) -> str:

@@ -16,12 +16,12 @@ from pydantic import BaseModel
 
 from ..basics.descriptions import docstring, parameter_docs
 from ..basics.material import PRESETS
-from ..engine.driven import Driven
+from ..basics.settings import Whole
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
 from ..neighbours.search import Neighbours
 from ..setup.grain_classes import GrainClass
-from .case import BoxSection, GrainsSection, MaterialSection, RunSection, WallSection
+from .case import COMPONENTS, BoxSection, GrainsSection, MaterialSection, RunSection
 
 WIDTH = 110
 """Columns of comments."""
@@ -69,12 +69,17 @@ def run_tables() -> list[Table]:
         Table("[grains]", "", [key for key in keys_of(GrainsSection) if key.name != "classes"]),
         Table("[[grains.classes]]", summary(GrainClass), keys_of(GrainClass)),
         material_table(),
-        Table("[[walls]]", summary(WallSection).removeprefix("[[walls]]: ").capitalize(), keys_of(WallSection)),
         *force_tables(),
         *stepping_tables(),
         Table("[neighbours]", summary(Neighbours), keys_of(Neighbours)),
-        Table("[[driven]]", summary(Driven), keys_of(Driven)),
+        *(Table(f"[[{name}]]", _purpose(name, own), keys_of(own)) for name, own in COMPONENTS.items()),
     ]
+
+
+def _purpose(name: str, section: type) -> str:
+    """What the table of a component is for."""
+    text = summary(section).removeprefix(f"[[{name}]]: ")
+    return text[:1].upper() + text[1:]
 
 
 def force_tables() -> list[Table]:
@@ -154,7 +159,7 @@ def keys_of(kind: Any) -> list[Key]:
         return [
             Key(
                 name,
-                notes.get(name, "") + _bounds(field.annotation, field.metadata),
+                notes.get(name, "") + _bounds(field.metadata),
                 REQUIRED if field.is_required() else field.get_default(call_default_factory=True),
             )
             for name, field in kind.model_fields.items()
@@ -170,11 +175,9 @@ def _default_of(one: Any) -> Any:
     return REQUIRED if one.default_factory is dataclasses.MISSING else None
 
 
-def _bounds(kind: Any, metadata: list[Any]) -> str:
-    """Text for the bounds of a number, or nothing."""
-    words = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
-    found = [f"{text} {getattr(one, key)}" for one in metadata for key, text in words.items() if hasattr(one, key)]
-    return f" A {'' if kind is float else 'whole '}number {', '.join(found)}." if found else ""
+def _bounds(metadata: list[Any]) -> str:
+    """Text for the range of a whole number, or nothing."""
+    return next((f" {each.range.capitalize()}." for each in metadata if isinstance(each, Whole)), "")
 
 
 def _attribute_docstrings(kind: type) -> dict[str, str]:

@@ -8,7 +8,7 @@ from ..compiler.jit import loop
 from .law import ContactConstants, ContactLaw, Pairing, contact_constants
 
 
-class Columns(NamedTuple):
+class ConstantAccess(NamedTuple):
     """Access to the constants of contacts, for one contact law."""
 
     load: Callable  # (table, c) → ContactConstants in column c
@@ -21,8 +21,8 @@ class Columns(NamedTuple):
 def uniform_contacts(contacts):
     """Whether one set of constants serves all contacts.
 
-    Uniform constants are stored as BLOCK identical columns, individual ones as one column per allocated contact.
-    If BLOCK contacts are allocated the two cannot be distinguished; the answer False is then also correct.
+    Uniform constants are stored as CONTACTS_PER_BLOCK identical columns, individual ones as one column per allocated
+    contact.  If as many contacts are allocated the two cannot be distinguished; the answer False is then also correct.
     """
     return contacts.constants.shape[1] != contacts.flag.size
 
@@ -38,7 +38,7 @@ FASTEST_MODE = ContactConstants._fields.index("max_squared_frequency")
 
 
 @functools.cache
-def column_loops(law: ContactLaw) -> Columns:
+def column_loops(law: ContactLaw) -> ConstantAccess:
     """Access to the constants of contacts, for one contact law."""
     names, of_materials = constant_names(law), contact_constants(law)
     rows = [f"table[{row}, c]" for row in range(len(names))]
@@ -67,7 +67,7 @@ def column_loops(law: ContactLaw) -> Columns:
         pairing = load_pairing(pairings, grains.material[i], grains.material[j])
         return of_materials(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
 
-    return Columns(load, store, at, of_pair)
+    return ConstantAccess(load, store, at, of_pair)
 
 
 _PAIRING = ", ".join(f"pairings[{row}, a, b]" for row in range(len(Pairing._fields)))

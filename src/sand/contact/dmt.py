@@ -15,14 +15,13 @@ import math
 from typing import NamedTuple
 
 from ..compiler.jit import formula
+from .jkr import HERTZ_CONTACT_RADIUS
 from .law import ContactLaw, NormalMode, register
 
 ATOMIC_DISTANCE = 0.16e-9
 """Equilibrium distance z₀ [m] of two surfaces (Maugis 1992)."""
 DMT_BELOW, JKR_ABOVE = 0.1, 5.0
 """Tabor parameters below which DMT, and above which JKR theory is accurate."""
-HERTZ_CONTACT_RADIUS = 0.3
-"""a/R at which the highest frequency of a contact without adhesion is evaluated."""
 
 
 class Constants(NamedTuple):

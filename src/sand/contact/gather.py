@@ -15,7 +15,7 @@ from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
 from ..numerics.vec import add, load, put, sub
 
-BLOCK = 64
+GRAINS_AT_ONCE = 64
 """Grains per block; the contacts of a block stay in the first-level cache."""
 LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
 """Contact counts of this number and more, separately as grain 1 and as grain 2, share a class."""
@@ -72,7 +72,7 @@ def _has_few_contacts(contacts, first, last):
 def gather(grains, contacts, first, last):
     """Set force and torque of the grains first … last − 1 (uint64) to the sums over their contacts, in a fixed order.
 
-    `first` and `last` are multiples of BLOCK, except where `last` is the number of grains.
+    `first` and `last` are multiples of GRAINS_AT_ONCE, except where `last` is the number of grains.
     """
     if _has_few_contacts(contacts, first, last):
         gather_few(grains, contacts, first, last)
@@ -126,8 +126,8 @@ def _gather_class(contacts, g):
 def _set_gather_order(contacts, n, total):
     """Fill `gather_order`: the grains of each block sorted by class, or by index where contacts are many."""
     order = contacts.gather_order
-    for first in range(0, n, BLOCK):
-        last = min(first + BLOCK, n)
+    for first in range(0, n, GRAINS_AT_ONCE):
+        last = min(first + GRAINS_AT_ONCE, n)
         for g in range(first, last):
             order[g] = g
         if total < DENSE_FROM * n:

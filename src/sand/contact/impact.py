@@ -32,18 +32,6 @@ def impact_share(speed, mass, radius, modulus):
     return speed * math.sqrt(3.0 * mass / (32.0 * math.pi * radius**3 * modulus))
 
 
-@formula
-def impact_pressure(share):
-    """Largest pressure p₀/E* = (2/π) (10π s²)^(1/5) of an impact of s = `share` between spheres without adhesion."""
-    return 2.0 / math.pi * (10.0 * math.pi * share * share) ** 0.2
-
-
-@formula
-def impact_overlap(share):
-    """Largest overlap δ/R = (10π s²)^(2/5) of an impact of s = `share` between spheres without adhesion."""
-    return (10.0 * math.pi * share * share) ** 0.4
-
-
 @loop
 def note_impact(clock, speed, mass, radius, modulus):
     """Keep share and speed of an impact in `State.clock` if it is the fastest so far; arguments as `impact_share`."""

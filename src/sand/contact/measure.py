@@ -129,7 +129,7 @@ def contacts_stage(law: ContactLaw) -> Stage:
     constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
     normal_force, normal_energy = law.force, law.energy
 
-    @stage("the table of contacts")
+    @stage("the table of contacts", seconds=1.5)
     def measure_contacts(grains, contacts, count, span, settings, parameters):
         """Fill `parameters[0]` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
         out, follow = parameters[0], settings.follow

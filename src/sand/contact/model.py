@@ -14,7 +14,7 @@ from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.ramps import rampable
-from ..basics.settings import For, Number, Settings, Word
+from ..basics.settings import RAMP, For, Number, Settings, Word
 from ..basics.units import format_quantity
 from ..errors import BadInput
 from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
@@ -26,17 +26,10 @@ DAMPED_SPEED_GAIN = 3.4
 """Largest sticking speed with the default damping ratio over that without damping (docs/physics/contact-options.md)."""
 _CONSTANT = "a number in kg/s, such as '1e-9 kg/s'"
 _VISCOUS_TIME = "a time in s, such as '1.25e-11 s' for silica; it depends on the material and the size of the grains"
-FACTORS = ("slide_factor", "roll_factor", "twist_factor", "surface_energy_factor")
-"""Settings that multiply a constant of all contacts."""
-RAMPABLE = (
-    *FACTORS,
-    *("rolling_limit", "damping_ratio", "damping_constant", "viscous_time", "bath_temperature", "settling_time"),
-)
-"""Settings that may change during a run."""
 
 
 @checked
-@rampable(*RAMPABLE)
+@rampable
 @dataclass(frozen=True)
 class Contact(Settings):
     """Adhesive contacts: normal force of a contact law, and springs against sliding, rolling and twisting.
@@ -93,19 +86,23 @@ class Contact(Settings):
 
     slip: Annotated[str, Word("clamp", "reset")] = "clamp"
     stiffness: Annotated[str, Word("frozen", "dt97")] = "frozen"
-    slide_factor: Annotated[Any, Number(least=0.0)] = 1.0
-    roll_factor: Annotated[Any, Number(least=0.0)] = 1.0
-    twist_factor: Annotated[Any, Number(least=0.0)] = 1.0
-    surface_energy_factor: Annotated[Any, Number(least=0.0)] = 1.0
-    rolling_limit: Annotated[Any, Number("m", above=0.0)] = None
+    slide_factor: Annotated[Any, Number(least=0.0), RAMP] = 1.0
+    roll_factor: Annotated[Any, Number(least=0.0), RAMP] = 1.0
+    twist_factor: Annotated[Any, Number(least=0.0), RAMP] = 1.0
+    surface_energy_factor: Annotated[Any, Number(least=0.0), RAMP] = 1.0
+    rolling_limit: Annotated[Any, Number("m", above=0.0), RAMP] = None
     damping: Annotated[str, Word("none", "critical", "constant", "viscoelastic")] = "none"
     damping_ratio: Annotated[
-        Any, Number(above=0.0, most=5.0), For("damping", "critical", default=DEFAULT_DAMPING_RATIO)
+        Any, Number(above=0.0, most=5.0), RAMP, For("damping", "critical", default=DEFAULT_DAMPING_RATIO)
     ] = None
-    damping_constant: Annotated[Any, Number("kg/s", above=0.0), For("damping", "constant", needed=_CONSTANT)] = None
-    viscous_time: Annotated[Any, Number("s", above=0.0), For("damping", "viscoelastic", needed=_VISCOUS_TIME)] = None
-    bath_temperature: Annotated[Any, Number("K", above=0.0)] = None
-    settling_time: Annotated[Any, Number("s", above=0.0)] = None
+    damping_constant: Annotated[Any, Number("kg/s", above=0.0), RAMP, For("damping", "constant", needed=_CONSTANT)] = (
+        None
+    )
+    viscous_time: Annotated[Any, Number("s", above=0.0), RAMP, For("damping", "viscoelastic", needed=_VISCOUS_TIME)] = (
+        None
+    )
+    bath_temperature: Annotated[Any, Number("K", above=0.0), RAMP] = None
+    settling_time: Annotated[Any, Number("s", above=0.0), RAMP] = None
     mixing: Annotated[str, Word(among=MIXING)] = "geometric"
     law: Annotated[str, Word(among=LAWS)] = "jkr"
 

@@ -23,8 +23,6 @@ from .mechanics import displacements_of, scaled_stiffness
 from .tangential import sliding
 from .update import pose_at
 
-MODES = ("normal", "sliding", "rolling", "twisting")
-
 
 class Responses(NamedTuple):
     """Poses, displacements, stiffnesses and limits of C contacts."""

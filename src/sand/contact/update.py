@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..basics.arrays import BLOCK as CONTACTS_PER_BLOCK
+from ..basics.arrays import CONTACTS_PER_BLOCK
 from ..basics.box import nearest_image
 from ..basics.state import (
     CONTACT_STEP,
@@ -45,7 +45,7 @@ from .mechanics import (
 )
 from .pair_types import pair_type_count
 
-BLOCK = np.uint64(CONTACTS_PER_BLOCK)
+BLOCK_SIZE = np.uint64(CONTACTS_PER_BLOCK)
 """Contacts per block."""
 SLIP_FRACTION = 0.1
 """Fraction of a block's contacts flagged in the last step, above which the block uses `_slip_contact`."""
@@ -292,9 +292,9 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
         """
         pending = slipped = slid = rolled = twisted = deepest = 0.0
         damped1 = damped2 = damped3 = damped4 = 0.0
-        for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
-            begin = first + b * BLOCK
-            end = begin + BLOCK if begin + BLOCK < last else last
+        for b in range((last - first + BLOCK_SIZE - np.uint64(1)) // BLOCK_SIZE):
+            begin = first + b * BLOCK_SIZE
+            end = begin + BLOCK_SIZE if begin + BLOCK_SIZE < last else last
             column = np.uint64(0) if uniform_contacts(contacts) else begin
             slipped_before = 0.0
             for k in range(end - begin):

@@ -40,14 +40,13 @@ from ..limits.solid_limits import torn_clusters
 from ..neighbours.search import ChosenSearch, Neighbours
 from ..setup.from_frame import StrainedContacts
 from .cluster_cutoff import follow_clusters
-from .driven import Driven, check_driven, driven_arrays
+from .component import Component, Setup, check
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .input_checks import check_system
 from .kinds import ForcesByType, kind_of
 from .new_state import new_state
 from .ramped import RampedForces
-from .walls import Wall, check_walls, place_walls, wall_numbers
 
 WIDE_FROM = 64
 """Fewest grains for the widest SIMD vectors; with fewer, most lanes of the last vector would be idle."""
@@ -68,8 +67,7 @@ def build_engine(
     stepping: Integrator,
     neighbours: Neighbours,
     seed: int = 0,
-    driven: Sequence[Driven] = (),
-    walls: Sequence[Wall] = (),
+    extra: Sequence[Component] = (),
     *,
     fresh: bool = True,
     contacts: StrainedContacts | None = None,
@@ -81,10 +79,8 @@ def build_engine(
     ----------
     seed : int, optional
         Seed of the random kicks of gas and bath.
-    driven : Sequence[Driven], optional
-        Grains with prescribed motion.
-    walls : Sequence[Wall], optional
-        Walls, each with its own name.
+    extra : Sequence[Component], optional
+        Components, such as walls.
     fresh : bool, optional
         Whether this is a new start, whose overlaps are checked; a resumed run may be in the middle of an impact.
     contacts : StrainedContacts or None, optional
@@ -97,21 +93,20 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    kind = kind_of(stepping)
-    warnings = check_system(grains, forces, box, fresh=fresh) + kind.check(forces, driven, walls, neighbours)
-    check_driven(driven, grains, forces, stepping, neighbours)
+    kind, nouns = kind_of(stepping), [each.noun for each in extra]
+    warnings = check_system(grains, forces, box, fresh=fresh) + kind.check(forces, nouns, neighbours)
     by_type = _forces_by_type(forces, grains)
-    check_walls(walls, grains, by_type.contact, box, stepping, fresh=fresh)
+    setup = Setup(grains, by_type, box, stepping, neighbours, fresh)
+    check(extra, setup)
     pair_gap = kind.pair_gap(grains, box)
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     if fresh:  # grains of another simulation may have other identities, and have crossed its box
         wrapped.arrays.id[...] = np.arange(len(grains))
         wrapped.arrays.image[...] = 0
-    held = driven_arrays(driven, grains)
-    if held is not None:
-        wrapped.arrays.velocity[:, held.grain], wrapped.arrays.spin[:, held.grain] = held.velocity, held.spin
-    if held is not None or kind.keeps_order:
+    for each in extra:
+        each.prepare(wrapped)
+    if kind.keeps_order or any(each.keeps_order for each in extra):
         neighbours = dataclasses.replace(neighbours, order="as given")
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     if by_type.contact is not None and fresh:
@@ -131,14 +126,14 @@ def build_engine(
     if follower is not None:
         force, sums, _ = long_range[follower.index]
         long_range[follower.index] = force, sums, follower.force.numbers_at(cutoffs[follower.index])
-    verlet = stepping.contact_stepping
+    verlet, uniform = stepping.contact_stepping, not any(each.own_columns for each in extra)
     control = _step_control(grains, verlet, kind.limiting_steps(by_type), pair_gap)
     stepping = stepping.resolved(grains, control)
     parameters = StepParameters(
         box.span,
-        _contact_parameters(by_type.contact, grains, verlet, seed, uniform=held is None),
+        _contact_parameters(by_type.contact, grains, verlet, seed, uniform=uniform),
         found.search,
-        _respa_settings(by_type, verlet, long_range, every_step=held is not None),
+        _respa_settings(by_type, verlet, long_range, every_step=any(each.every_step for each in extra)),
         _external_work(by_type.external, box),
         _gas_settings(by_type.gas, grains, seed),
         control,
@@ -146,21 +141,24 @@ def build_engine(
         ForceNumbers(len(long_range), len(by_type.external)),
     )
     parameters = parameters._replace(flight_limits=kind.flight_limits(parameters, by_type, grains))
+    law = (by_type.contact or Contact()).contact_law
+    further = {n: own for each in extra for n, own in each.stages(setup, law, parameters.settings).items()}
     components = Components(
-        (by_type.contact or Contact()).contact_law,
+        law,
         [(sums, numbers) for _, sums, numbers in long_range],
         [(force.formula, force.numbers()) for force in by_type.external],
         stepping.flight,
         bool(by_type.gas),
         bool(grains.body_moment.any()),
         len(grains) >= WIDE_FROM,
-        held,
-        wall_numbers(walls, grains, by_type.contact),
+        further,
+        np.array([i for each in extra for i in each.heavy()], np.int64),
     )
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
     state = new_state(wrapped, box, parameters, components, capacity, over_all_pairs=over_all_pairs)
-    place_walls(state, walls, components.law, state.contacts.lost.shape[0], damped=parameters.settings.damped)
+    for each in extra:
+        each.place(state, law, parameters.settings)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
@@ -176,9 +174,7 @@ def build_engine(
 
     kind.complete(engine, forces, build)
     if any(map(ramps_of, forces)):
-        changing = functools.partial(
-            _changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=held is None
-        )
+        changing = functools.partial(_changing_parameters, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=uniform)
         engine.ramped = RampedForces(forces, changing)
         engine.set_ramped_parameters()
     given = add_contacts(engine, by_type.contact, contacts)

@@ -24,11 +24,12 @@ from ..basics.state import (
     CUTOFF,
     State,
 )
+from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity
 from ..errors import BadInput
 from ..forces.base import LongRangeForce
 from ..forces.pair.cutoff import HALF_BOX_RATIO, CutoffChoice
-from ..forces.pair.dipoles import CAPTURE_RADII, CapturingPair, Dipoles, capturing_pair, kinetic_temperature
+from ..forces.pair.dipoles import CAPTURE_RADII, CapturingPair, Dipoles, capturing_pair
 from ..setup.from_frame import StrainedContacts
 
 GROWTH = 1.1

@@ -62,14 +62,13 @@ from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.external_loops import external_energies_for
 from ..forces.pair.long_range_loops import LongRangeSums, long_range_energies_for
-from ..integrate.driven import HEAVY
 from ..integrate.driver import advance
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.integrator import Integrator
-from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
+from ..integrate.parts import HEAVY, PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.respa import clear_long_range_loads
 from ..integrate.stage_list import Components, build_program, variant_of
-from ..integrate.stages import NO_STEP, bath_wall_work, bath_work
+from ..integrate.stages import NO_STEP, StageNumber, bath_work
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
     SHARED,
@@ -637,17 +636,16 @@ class Engine:
 
     def _record_bath_work(self, state: State) -> None:
         """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
-        walls = self.components.walls
         with self._held(state):
             bath_work.run(self.table_of(state), (), NO_STEP)
-            if walls is not None:
-                bath_wall_work.run(self.table_of(state), walls, NO_STEP)
+            if (further := self.components.further.get(StageNumber.BATH_WALL_WORK)) is not None:
+                stage, numbers = further
+                stage.run(self.table_of(state), numbers, NO_STEP)
 
     @contextlib.contextmanager
     def _held(self, state: State | None = None) -> Iterator[None]:
-        """While constants of contacts are computed, driven grains have a mass that counts as infinite."""
-        driven, arrays = self.components.driven, (state or self._state).grains.arrays
-        index: Any = [] if driven is None else driven.grain
+        """While constants of contacts are computed, some grains have a mass that counts as infinite."""
+        index, arrays = self.components.heavy, (state or self._state).grains.arrays
         for quantity in (arrays.mass, arrays.inertia):
             quantity[index] *= HEAVY
         try:

@@ -14,9 +14,7 @@ from ..forces.gas.model import Gas
 from ..integrate.integrator import Integrator
 from ..integrate.parts import StepParameters
 from ..neighbours.search import Neighbours
-from .driven import Driven
 from .engine import Engine
-from .walls import Wall
 
 KINDS = {"rigid-clusters": "rigid.assembly"}
 """Modules of the integrators, by name, whose engines are not those of grains; each has a class `Kind`."""
@@ -40,10 +38,11 @@ class Kind:
     keeps_order = False
     """Whether grains keep the order in which they were given."""
 
-    def check(
-        self, forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall], neighbours: Neighbours
-    ) -> list[str]:
-        """Refuse what such an engine cannot do, all problems at once (BadInput); returns warnings."""
+    def check(self, forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
+        """Refuse what such an engine cannot do, all problems at once (BadInput); returns warnings.
+
+        `others` are the nouns of the components, such as "walls".
+        """
         return []
 
     def pair_gap(self, grains: Grains, box: Box) -> float:

@@ -24,7 +24,6 @@ from ..setup.aggregates import chain, rest_distance
 from ..setup.encounters import combined
 from ..simulation.simulation import Simulation
 
-SHAPES = ("T", "branched", "bent", "straight", "ring", "broken", "gone")
 PERPENDICULAR = 30.0
 """Largest deviation of the crossbar of a T from perpendicular [°]."""
 STRAIGHT = 20.0
@@ -40,7 +39,7 @@ START = 2.3
 class Shape(NamedTuple):
     """Shape of a chain after an impact."""
 
-    name: str  # one of SHAPES
+    name: str  # T, branched, bent, straight, ring, broken or gone
     crossbar: float  # angle between crossbar and stem [°], 90 for a perfect T; NaN without a branch
     rolled: float  # rolling angle of the struck end grain about its neighbour [°]; NaN if it broke off
 

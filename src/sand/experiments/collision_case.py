@@ -12,11 +12,11 @@ from pydantic import Field
 from ..basics.arguments import MOST_GRAINS
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
-from ..basics.settings import For, Number, Reading, Word
+from ..basics.settings import For, List, Number, Reading, Whole, Word
 from ..config.case import ForcesSection, MaterialSection, material_errors, with_absolute_files
 from ..config.commands import refuse_other_command
 from ..config.key_errors import validate
-from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, with_integrator
+from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
 from ..setup.aggregates import KINDS, build
@@ -42,9 +42,9 @@ class BodySection(Section):
     `kind = "file"`."""
     length: Annotated[str | None, For("kind", "file")] = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in XYZ, 1 m in columns; GSD of other programs needs it."""
-    grains: Count | None = None
+    grains: Annotated[int | None, Whole(1, MOST_GRAINS)] = None
     """Number of grains; required except for a grain, a lattice or a file."""
-    shape: list[Count] | None = None
+    shape: Annotated[list[int] | None, List(Whole(1, MOST_GRAINS))] = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
     radius: Annotated[Any, Reading(lambda value, name: radii_of(value))] = None
     """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
@@ -102,7 +102,7 @@ class ImpactSection(Section):
     """Direction of flight of the projectile."""
     turn: bool = True
     """Rotate both bodies at random, by the seed."""
-    seeds: list[Seed] = Field(default_factory=lambda: [1], min_length=1)
+    seeds: Seeds = Field(default_factory=lambda: [1])
     """One collision is run for each seed."""
     out: PathName | None = None
     """Folder of the results."""

@@ -21,14 +21,12 @@ from ..compiler.program import before_first_calls
 from ..errors import BadInput, import_optional, warn
 from ..forces.own import IMPORTED
 from ..simulation.signals import STOPS
-from .worker import SHIELDED, Item, Result, begin_worker, do_task, done_apart
+from .worker import LONGEST_STOP, SHIELDED, Item, Result, begin_worker, do_task, done_apart
 
 ANSWER = 10.0
 """Timeout of the connection to a scheduler [s]."""
 LOOK = 0.5
 """Wall time [s] between two looks for a signal whose exception an import or the compiler has lost."""
-LONGEST_STOP = 60.0
-"""Wall time [s] that workers get to write their checkpoints; they need it only on a very slow disk."""
 MOST_ON_WINDOWS = 61
 """Largest number of processes of a pool on Windows, a limit of `concurrent.futures`."""
 SAFE_PATH = "PYTHONSAFEPATH"

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
 from ..config.case import check_case, with_absolute_files
 from ..config.commands import refuse_other_command
 from ..config.key_errors import validate
-from ..config.sections import Section, Seed
+from ..config.sections import Section, Seeds
 from ..errors import BadInput, ErrorCollector
 from ..io.run_folder import read_toml
 
@@ -20,7 +18,7 @@ DEFAULT_SEEDS = list(range(1, 9))
 class GrowSection(Section):
     """Section [grow]: one box for each seed."""
 
-    seeds: list[Seed] = Field(min_length=1)
+    seeds: Seeds
     """One box is run for each seed."""
 
 

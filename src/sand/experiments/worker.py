@@ -24,7 +24,7 @@ STOPPERS = frozenset({signal.SIGTERM, getattr(signal, "SIGXCPU", signal.SIGTERM)
 SHIELDED = frozenset(STOPS) - STOPPERS
 """Signals that workers ignore: they are sent to the parent, too, which then stops its workers."""
 LONGEST_STOP = 60.0
-"""Wall time [s] after which a worker without a parent ends without a checkpoint."""
+"""Wall time [s] that workers get to write their checkpoints; they need it only on a very slow disk."""
 SHORT = 0.02
 """Wall time [s] between two looks whether the checkpoint is written."""
 STOPPED = 1

@@ -42,7 +42,6 @@ from ..contact.events import count_new_contacts
 from ..contact.update import load_contact_sums, log_contact_sums
 from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
-from .driven import HOLD, HOLD_IN_EVENTS, RELEASE, RELEASE_FROM_EVENTS, RESET
 from .force_calls import (
     add_external_loads,
     add_pairs_in_contact,
@@ -62,7 +61,7 @@ from .respa import (
     integrate_displacement,
     update_constant_loads,
 )
-from .stages import NEXT_STEP, StageNumber
+from .stages import HOLD, HOLD_IN_EVENTS, NEXT_STEP, RELEASE, RELEASE_FROM_EVENTS, RESET, StageNumber
 from .step_control import cycle_steps, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
@@ -116,8 +115,8 @@ def drift_with_work(s, dt):
         gained -= sum_external(s, start, ENERGY)
     s.scratch[DT] = dt
     blocks = blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK)
-    driven = has_stage(s, StageNumber.DRIVE)
-    if driven:
+    drives = has_stage(s, StageNumber.DRIVE)
+    if drives:
         call_stage(s, StageNumber.DRIVE, HOLD)
     if s.clock[STEP] != dt:
         if has_stage(s, StageNumber.BATH_WORK):
@@ -125,7 +124,7 @@ def drift_with_work(s, dt):
         if has_stage(s, StageNumber.BATH_WALL_WORK):
             call_stage(s, StageNumber.BATH_WALL_WORK, NEXT_STEP)
     for_each_block(s, StageNumber.DRIFT, blocks)
-    if driven:
+    if drives:
         call_stage(s, StageNumber.DRIVE, RELEASE)
     if s.external_work.time_dependent:
         gained += sum_external(s, end, ENERGY)
@@ -171,20 +170,20 @@ def sum_loads(s, due, elapsed):
 @caller
 def loads_and_kick(s, due, elapsed):
     """Sum the loads and apply the second half kick; returns the squares of the largest speed and spin."""
-    driven = has_stage(s, StageNumber.DRIVE)
+    drives = has_stage(s, StageNumber.DRIVE)
     if has_stage(s, StageNumber.GATHER_AND_KICK):
         s.count[LONG_RANGE_SUMS] += 1
         s.scratch[DT] = 0.5 * s.clock[STEP]
         blocks = blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK)
-        if driven:
+        if drives:
             call_stage(s, StageNumber.DRIVE, HOLD)
         for_each_block(s, StageNumber.GATHER_AND_KICK, blocks)
-        if driven:
+        if drives:
             s.scratch[DT] = s.clock[STEP]
             call_stage(s, StageNumber.DRIVE, RELEASE)
         return largest_speeds(s.queue, blocks)
     sum_loads(s, due, elapsed)
-    if not driven:
+    if not drives:
         return kick(s.grains, 0.5 * s.clock[STEP])
     call_stage(s, StageNumber.DRIVE, HOLD)
     fastest, fastest_spin = kick(s.grains, 0.5 * s.clock[STEP])
@@ -289,20 +288,20 @@ def second_half(s):
     formed = count_new_contacts(s.grains, s.pair_list, s.count, s.span)
     if s.count[CONTACTS] + formed > s.contacts.pair.shape[1]:
         return Stop.CONTACTS_FULL.value
-    driven = has_stage(s, StageNumber.DRIVE)
-    if driven:
+    drives = has_stage(s, StageNumber.DRIVE)
+    if drives:
         call_stage(s, StageNumber.DRIVE, HOLD_IN_EVENTS)
     if has_stage(s, StageNumber.WALL_CONTACTS):
         stop = call_stage(s, StageNumber.WALL_CONTACTS)
         if stop != Stop.NONE.value:
-            if driven:
+            if drives:
                 call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)
             return stop
     broken = update_contacts(s)
     if formed > 0:
         call_stage(s, StageNumber.FORM)
         call_stage(s, StageNumber.SORT)
-    if driven:
+    if drives:
         call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)
     if formed > 0 or list_rebuilt:
         call_stage(s, StageNumber.CONTACT_STEP)
@@ -331,7 +330,7 @@ def second_half(s):
             call_stage(s, StageNumber.GAS_KICK)
         if settling:
             call_stage(s, StageNumber.SETTLE_CLUSTERS)
-        if gas and driven:
+        if gas and drives:
             call_stage(s, StageNumber.DRIVE, RESET)
         if gas or settling or s.respa.impulse:  # speeds changed between steps
             invalidate_speeds(s.pair_list)
@@ -370,6 +369,7 @@ def steps_until(s):
 
 @stage(
     "the time steps",
+    seconds=8.0,
     parts=(*DRIVER_PARTS, "contacts", "settings", "respa"),
 )
 def advance(s):

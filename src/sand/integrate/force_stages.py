@@ -34,7 +34,7 @@ def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stag
     begin, sum_block, end, blocks = sums.begin, sums.block, sums.end, sums.blocks
     add, subtract, reassign = contact_pair_loops(sums.pair)
 
-    @stage("the pair forces", long_vectors=long_vectors)
+    @stage("the pair forces", long_vectors=long_vectors, seconds=2.0)
     def sum_pairs(grains, long_range, span, parameters, block):
         """Sum one block of pairs; returns the number of blocks."""
         number = blocks(grains)

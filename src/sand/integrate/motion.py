@@ -7,14 +7,14 @@ import numpy as np
 
 from ..basics.box import Span, nearest_image
 from ..compiler.jit import formula, loop
-from ..contact.gather import BLOCK, gather
+from ..contact.gather import GRAINS_AT_ONCE, gather
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import axpy, dot, load, load4, put, put4, scale
 
 UNBOUNDED = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """A box without periodic boundaries, for drifts whose positions are wrapped afterwards."""
-BLOCK_OF_GRAINS = np.uint64(4 * BLOCK)
+BLOCK_OF_GRAINS = np.uint64(4 * GRAINS_AT_ONCE)
 """Grains gathered before they are kicked: whole blocks of `contact.gather`, whose forces stay in the L1 cache."""
 
 

@@ -33,6 +33,9 @@ CYCLE_LENGTH = 3  # length of the cycle for which rates are computed [s]; 0 for 
 SINCE = 4  # time since the last sum of the long-range forces [s]
 SCRATCH = 5
 
+HEAVY = 2.0**30
+"""Factor of masses that count as infinite in contact events, whose impulses are read from the changes of velocity."""
+
 
 class Stop(IntEnum):
     """Why the driver returned to Python."""

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..compiler.program import Program
 from ..compiler.stage import PythonStage, Stage
@@ -14,7 +17,6 @@ from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..forces.pair.long_range_loops import LongRangeSums
 from . import stages, taylor
-from .driven import DrivenArrays, drive
 from .force_stages import (
     EXTERNAL_STAGES,
     IN_CONTACT,
@@ -31,6 +33,8 @@ from .force_stages import (
 from .parts import ContactParameters, StepParameters
 from .stages import StageNumber
 
+NO_GRAINS = np.zeros(0, np.int64)
+
 
 class Components(NamedTuple):
     """What the program of a simulation is made of."""
@@ -42,8 +46,8 @@ class Components(NamedTuple):
     gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
-    driven: DrivenArrays | None = None  # grains with prescribed motion
-    walls: Any = None  # contact.wall_loops.WallNumbers; None without walls
+    further: Mapping[int, tuple[Stage, Any]] = MappingProxyType({})  # stages of components by number, with parameters
+    heavy: np.ndarray = NO_GRAINS  # grains whose mass counts as infinite in contacts
 
 
 def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
@@ -53,7 +57,7 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
         StageNumber.DRIFT: stages.drift_stage(given.magnetic, given.wide),
         StageNumber.EXPLAIN: stages.explain_stop,
     }
-    if given.pair_forces or given.external_forces or given.walls is not None:
+    if given.pair_forces or given.external_forces or StageNumber.WALL_LOADS in given.further:
         found[StageNumber.GATHER] = stages.gather_stage(given.wide)
     else:
         found[StageNumber.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
@@ -70,13 +74,7 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     if given.flight is not None:
         found[StageNumber.FLIGHT] = given.flight
     program: dict[int, tuple[Stage | PythonStage, Any]] = {number: (each, ()) for number, each in found.items()}
-    if given.driven is not None:
-        program[StageNumber.DRIVE] = drive, given.driven
-    if given.walls is not None:
-        of_walls = stages.wall_stages(given.law, variant_of(parameters.settings))
-        program |= {number: (each, given.walls) for number, each in of_walls.items()}
-        if variant_of(parameters.settings) == THERMAL:
-            program[StageNumber.BATH_WALL_WORK] = stages.bath_wall_work, given.walls
+    program |= given.further
     number: int = StageNumber.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:

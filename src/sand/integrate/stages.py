@@ -33,6 +33,9 @@ from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_fini
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
 
+HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)
+"""What the stage DRIVE does: masses before and after kicks, and around contact events; velocities after drag."""
+
 
 class StageNumber(IntEnum):
     """Entries of the program of a simulation."""
@@ -102,7 +105,7 @@ def pair_list_stage(law: ContactLaw, celled: bool) -> Stage:
     """Rebuild the pair list of a contact law, with cells or without; returns a `Stop`."""
     build_pair_list = pair_list_loop(law, celled)
 
-    @stage("the list of contact candidates")
+    @stage("the list of contact candidates", seconds=1.0)
     def pair_list_of_law(grains, contacts, pair_list, long_range, count, span, settings, search, criteria):
         found = build_pair_list(
             grains, contacts, pair_list, long_range, count, span, criteria.pair_gap, settings, search
@@ -129,7 +132,7 @@ def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Sta
     """Update of a block of contacts; stores its sums."""
     contact_pass = contact_pass_loop(law, damping)
 
-    @stage("the contact forces", long_vectors=long_vectors)
+    @stage("the contact forces", long_vectors=long_vectors, seconds=3.5)
     def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):
         first = block * CONTACTS_PER_BLOCK
         last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
@@ -153,12 +156,12 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
         log_stiffness_work(grains, contacts, count, lost, span, clock[STEP])
         return 0
 
-    @stage("the slip and breaking of contacts")
+    @stage("the slip and breaking of contacts", seconds=2.0)
     def settle_contacts(grains, contacts, pair_list, clock, count, lost, span, settings):
         """Slip or break flagged contacts; returns 1 if any contact broke."""
         return 1 if settle(grains, contacts, pair_list, count, lost, span, settings, clock[STEP]) else 0
 
-    @stage("the forming of contacts")
+    @stage("the forming of contacts", seconds=1.5)
     def form(grains, contacts, pair_list, clock, count, lost, span, settings):
         form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, clock[STEP])
         return 0
@@ -171,7 +174,7 @@ def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of walls by number, whose parameters are `contact.wall_loops.WallNumbers`: contacts, loads, step."""
     update, find_step = wall_loops(law, damping).update, wall_step_loop(law)
 
-    @stage("the contacts with walls")
+    @stage("the contacts with walls", seconds=4.0)
     def update_walls(grains, walls, wall_contacts, clock, count, lost, span, settings, parameters):
         """Move the walls, and form, slip and break their contacts; returns a `Stop`."""
         found = update(grains, walls, wall_contacts, clock, count, lost, span, settings, parameters)

@@ -17,7 +17,7 @@ from ..compiler.stage import stage
 from ..forces.pair.long_range_loops import PARALLEL_FROM
 from .motion import BLOCK_OF_GRAINS
 
-WORD, SHARED, FAILED, FINISHED, ACTIVE = 0, 1, 2, 8, 16
+WORD, SHARED, FAILED_BLOCK, FINISHED, ACTIVE = 0, 1, 2, 8, 16
 """Indices into `TaskQueue.words`: the current task; 1 if blocks are shared among threads; 1 plus the number of a block
 that failed in a worker, or 0; the number of finished blocks; the number of active workers.  The last two have cache
 lines of their own."""
@@ -94,7 +94,7 @@ def share_blocks(s, number, blocks):
     """Process all blocks of a stage together with the workers."""
     words = s.queue.words
     write(words, FINISHED, 0)
-    write(words, FAILED, 0)
+    write(words, FAILED_BLOCK, 0)
     write(words, WORD, (number << TASK) | (blocks << BLOCKS))
     word = fetch_add(words, WORD, 1 << FRONT)
     while has_block_left(word):
@@ -106,8 +106,8 @@ def share_blocks(s, number, blocks):
         spins += 1
         if spins > SPINS_BEFORE_YIELD:
             yield_cpu()
-    if read(words, FAILED) > 0:  # a worker cannot raise an exception: the block is processed again, here
-        call_stage(s, number, read(words, FAILED) - 1)
+    if read(words, FAILED_BLOCK) > 0:  # a worker cannot raise an exception: the block is processed again, here
+        call_stage(s, number, read(words, FAILED_BLOCK) - 1)
 
 
 @caller
@@ -135,7 +135,7 @@ def take_blocks(s):
             if has_block_left(word):
                 block = field_of(word, BLOCKS) - 1 - field_of(word, BACK)
                 if stage_fails(s, word >> TASK, block):
-                    write(words, FAILED, block + 1)
+                    write(words, FAILED_BLOCK, block + 1)
                 fetch_add(words, FINISHED, 1)
             spins = 0
         elif spins > SPINS_BEFORE_YIELD:

@@ -22,7 +22,7 @@ from .grain_files import FileBox, GrainData, GrainFile, is_gsd, open_grains
 from .run_folder import replace_file
 from .trajectory import Frames, TrajectoryWriter
 
-SINGLE = 6e-8
+SINGLE_PRECISION = 6e-8
 """Relative rounding error of single precision, in which trajectories store masses."""
 OPEN = Box.open()
 SUFFIXES = (".xyz", ".extxyz", ".gsd")
@@ -170,7 +170,7 @@ def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choi
 
 def kept_masses(mass: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     """Masses from a file, (N,) [kg]; the nominal ones where they are equal to single precision."""
-    return np.where(np.abs(mass - nominal) <= 8.0 * SINGLE * nominal, nominal, mass)
+    return np.where(np.abs(mass - nominal) <= 8.0 * SINGLE_PRECISION * nominal, nominal, mass)
 
 
 def _box_of(data: GrainData, unit: float) -> tuple[Box, np.ndarray | None]:

@@ -41,7 +41,6 @@ class ArraySpec(NamedTuple):
     required: bool = True
 
 
-CONTACT_VECTORS = ("pointer1", "pointer2", "force", "torque1", "torque2")
 STORED = {
     "clock": ArraySpec("f8", (tuple(range(LEAST_CLOCK, len(CLOCK) + 1)),), "no nan"),
     "count": ArraySpec("i8", (len(COUNT),), "any"),

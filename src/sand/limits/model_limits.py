@@ -12,12 +12,13 @@ from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
 from ..basics.material import Material
+from ..basics.temperature import kinetic_temperature
 from ..basics.units import MELTED, format_quantity
 from ..contact.law import contact_constants, ringing_energy
 from ..contact.model import DAMPED_SPEED_GAIN, Contact
 from ..forces.base import Force
 from ..forces.gas.model import Gas
-from ..forces.pair.dipoles import Dipoles, kinetic_temperature
+from ..forces.pair.dipoles import Dipoles
 from ..theory.magnetic_limits import QUOTED_SIZES, MagneticLimits, contact_field, magnetic_limits
 
 CREEP = 10.0

@@ -16,12 +16,13 @@ import numpy as np
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
+from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.gas.model import Gas
 from ..forces.pair.cutoff import CutoffForce
-from ..forces.pair.dipoles import Dipoles, kinetic_temperature
+from ..forces.pair.dipoles import Dipoles
 from ..forces.pair.ewald_force import EwaldForce
 
 SHARE = 0.1

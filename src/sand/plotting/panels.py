@@ -12,6 +12,7 @@ from ..analysis.ledger_columns import AWAKE, LOSSES
 from ..basics.constants import BOLTZMANN
 from ..basics.state import DAMPING, LOST
 from ..io.ledger_table import TEMPERATURES
+from ..simulation.ledger import KINETIC
 from .style import (
     BLUE,
     BROWN,
@@ -30,7 +31,6 @@ from .style import (
     si_prefix,
 )
 
-KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
 LOSS_CHANNELS = {name: (f"lost_{name}",) for name in LOST if name not in (*DAMPING, "quieting")} | {
     "settling": ("lost_settling", "lost_quieting"),

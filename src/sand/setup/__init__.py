@@ -12,9 +12,6 @@ from .growing import bcca, bpca, dla, dlca
 from .moments import magnetic_energy, relaxed
 from .population import Lognormal, PowerLaw
 
-pca = bpca
-"""Former name of `bpca`."""
-
 __all__ = [
     "KINDS",
     "Encounter",
@@ -39,7 +36,6 @@ __all__ = [
     "in_space_order",
     "lattice",
     "magnetic_energy",
-    "pca",
     "rbd",
     "relaxed",
     "turned",

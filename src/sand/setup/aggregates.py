@@ -165,14 +165,13 @@ KINDS: dict[str, Callable[..., Grains]] = {
     "lattice": lattice,
     "hexagonal": hexagonal,
     "bpca": bpca,
-    "pca": bpca,
     "bcca": bcca,
     "dla": dla,
     "dlca": dlca,
     "fractal": fractal,
     "rbd": rbd,
 }
-"""Builders by name, as in case files; "pca" is the former name of "bpca"."""
+"""Builders by name, as in case files."""
 _DIMENSIONS = {"chain": "1", "bcca": "1.9", "dla": "2.5", "dlca": "1.8"}
 """Fractal dimensions for messages; 3 for all others."""
 

@@ -13,10 +13,8 @@ from ..basics.grains import Grains
 from ..basics.material import Material, as_material
 from ..basics.units import format_quantity
 from ..errors import BadInput, did_you_mean, refuse_other
+from ..io.read_grains import SINGLE_PRECISION
 from .overlap_fit import APART, ITERATIONS, deficit, least_shift, overlapping, scaled_box
-
-SINGLE = 6e-8
-"""Relative rounding error of single precision, in which diameters and masses are stored."""
 
 
 class StrainedContacts(NamedTuple):
@@ -80,7 +78,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     position = restore_overlaps(frame.position, frame.radius, frame.box, pair, frame.overlap)
     kinds = [materials[frame.materials[k]] for k in frame.material]
     nominal = Grains(position, frame.radius, kinds).mass
-    rounded = np.abs(frame.mass - nominal) <= 8.0 * SINGLE * nominal
+    rounded = np.abs(frame.mass - nominal) <= 8.0 * SINGLE_PRECISION * nominal
     grains = Grains(
         position,
         frame.radius,
@@ -151,7 +149,7 @@ def restore_overlaps(
     else:
         i, j = constrained[int(np.abs(lacking).argmax())]
         raise BadInput(f"the overlap of grains {i} and {j} does not fit their positions; the frame is damaged")
-    if np.abs(x - initial).max() > max(1e-3, 64.0 * SINGLE * rounding):
+    if np.abs(x - initial).max() > max(1e-3, 64.0 * SINGLE_PRECISION * rounding):
         raise BadInput("the overlaps of the frame do not fit its positions; it is damaged, or not from SAND")
     # positions that need no correction keep their bits
     return np.where(x == initial, position, x * unit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,11 +39,11 @@ from ..basics.units import has_unit_within, si
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
-from ..engine.driven import Driven, kept_driven, refuse_changed_motion
+from ..engine.component import Component
+from ..engine.component import present as present_ones
 from ..engine.engine import Engine
 from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
-from ..engine.walls import Wall
 from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force, LongRangeForce
 from ..forces.gas.model import Gas
@@ -380,10 +380,9 @@ def changed_engine(
     engine: Engine,
     columns: Sequence[str],
     seed: int,
-    driven: Sequence[Driven] = (),
-    walls: Sequence[Wall] = (),
-) -> tuple[Engine, tuple[Force, ...], tuple[Driven, ...]]:
-    """The engine after a change, its forces and driven grains; the engine before stays as it is.
+    extra: Mapping[str, Component],
+) -> tuple[Engine, tuple[Force, ...], dict[str, Component]]:
+    """The engine after a change, its forces and components; the engine before stays as it is.
 
     Parameters
     ----------
@@ -393,10 +392,8 @@ def changed_engine(
         The engine before.
     columns : Sequence[str]
         Columns of the ledger, which are those of the start.
-    driven : Sequence[Driven], optional
-        The driven grains before.
-    walls : Sequence[Wall], optional
-        The walls.
+    extra : Mapping[str, Component]
+        The components before.
 
     Raises
     ------
@@ -404,13 +401,14 @@ def changed_engine(
         If something does not fit; all problems at once, as far as each can be found without the others.
     """
     errors, state = ErrorCollector(), engine.state
-    driven = kept_driven(driven, change._kept)
+    extra = {name: each.kept(change._kept) for name, each in extra.items()}
     forces = errors.take(change.checked_forces, present)
     grains = errors.take(change.checked_grains)
     if forces is not None and grains is not None:
         errors.take(change.refuse_overlaps, grains, forces)
     if grains is not None:
-        errors.take(refuse_changed_motion, driven, grains)
+        for each in present_ones(extra):
+            errors.problems += each.problems_of_change(grains, rebuilt=False)
     errors.done()
     regroups = change.regroups
     cutoff = None if change.box != state.box or state.cutoff[CUT_RADIUS] == 0.0 else state.cutoff.copy()
@@ -418,7 +416,7 @@ def changed_engine(
     same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
     forces = fitting_forces(forces, engine.stepping)
     parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed)
-    new = build_engine(*parts, fresh=False, cutoff=cutoff, driven=driven, walls=walls)
+    new = build_engine(*parts, fresh=False, cutoff=cutoff, extra=present_ones(extra))
     without = [name for name in new.columns() if name not in columns]
     if without:
         raise BadInput(
@@ -427,11 +425,10 @@ def changed_engine(
         )
     grains.arrays.material[...] = same.arrays.material  # materials are numbered anew
     rebuilt = regroups or any(len(set(shapes)) > 1 for shapes in _long_range_shapes(state, new.state))
-    if walls and (rebuilt or change.box != state.box):
-        raise BadInput(
-            "walls: with walls a change cannot add or remove grains, set or scale the box, or leave out a force; start "
-            "a new simulation from a frame"
-        )
+    if rebuilt or change.box != state.box:
+        for each in present_ones(extra):
+            errors.problems += each.problems_of_change(grains, rebuilt=True)
+        errors.done()
     if rebuilt:
         arrays = regrouped_arrays(state, change._kept, grains, new.state)
     else:
@@ -455,7 +452,7 @@ def changed_engine(
     new.refresh_loads()
     if regroups:
         _as_initial(new.regular_state, int(arrays["count"][MADE]), float(arrays["lost"][FORMING]))
-    return new, forces, driven
+    return new, forces, extra
 
 
 def _long_range_shapes(*states: State) -> list[tuple[tuple[int, ...], ...]]:

@@ -16,8 +16,8 @@ from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
 from ..basics.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from ..contact.measure import ENERGIES
+from ..engine.component import Component
 from ..engine.engine import Engine
-from ..engine.walls import wall_row
 from ..errors import BadInput
 from ..io.ledger_table import TEMPERATURES
 
@@ -35,11 +35,9 @@ CORRECTION = "angular_momentum_corrected"
 OF_MOTION = (*MOMENTA, CORRECTION, INTERNAL, *TEMPERATURES)
 """Columns of the motion that are not part of the total energy."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
-LOST_WALLS = "lost_walls"
-"""Column of the energy that moving walls took from grains and contacts; only with walls."""
 COUNTED = {"step", "time", *NUMBERS, AWAKE}
 """Columns that need no energies, see `Ledger.counts_of`."""
-WHOLE = {"step", *NUMBERS, AWAKE, "wall_contacts"} - {"mean_cluster_size"}
+WHOLE = {"step", *NUMBERS, AWAKE} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
@@ -74,22 +72,25 @@ class Ledger(LedgerColumns):
     ----------
     forces : Sequence[str], optional
         Names of the energy columns of long-range and per-grain forces.
-    walls : Sequence[str], optional
-        Columns of the walls, see `walls.wall_columns`.
+    extra : Sequence[Component], optional
+        Components, such as walls, which may have columns of their own.
     awake : bool, optional
         Whether clusters may be at rest: with the column `awake`.
     """
 
-    def __init__(self, forces: Sequence[str] = (), walls: Sequence[str] = (), *, awake: bool = False):
+    def __init__(self, forces: Sequence[str] = (), extra: Sequence[Component] = (), *, awake: bool = False):
         others = [name for name in forces if name != MAGNETIC]
-        self.walls, numbers = tuple(walls), (*NUMBERS, AWAKE) if awake else NUMBERS
+        self._extra, numbers = tuple(extra), (*NUMBERS, AWAKE) if awake else NUMBERS
+        self._further = [name for each in extra for name in each.losses()]
         own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
-        if taken := [name for name in walls if name in {*own, *forces, LOST_WALLS, MAGNETIC}]:
-            raise BadInput(f"walls: '{taken[0]}' is a column of the ledger; give this wall another name")
-        lost = (*LOSSES, LOST_WALLS) if walls else LOSSES
-        of_state = (*lost, "total", *OF_MOTION, *numbers, *walls)
+        for each in extra:
+            if taken := [name for name in each.columns() if name in {*own, *forces, *self._further, MAGNETIC}]:
+                advice = f"give one of the {each.noun} another name"
+                raise BadInput(f"{each.name}: '{taken[0]}' is a column of the ledger; {advice}")
+        self._more = [name for each in extra for name in each.columns()]
+        of_state = (*LOSSES, *self._further, "total", *OF_MOTION, *numbers, *self._more)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
         self.frame_times: list[float] = []
         # engine, counts of contacts, and numbers of clusters for these
@@ -113,14 +114,15 @@ class Ledger(LedgerColumns):
         """The row of the present state of an engine: energies, losses [J], momenta (SI), temperatures [K], counts."""
         lost, bodies, state = engine.losses().tolist(), engine.body_motion(), engine.state
         energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *engine.contact_energies()]
-        forces, moved = engine.force_energies(), {LOST_WALLS: -math.fsum(state.walls.work)} if self.walls else {}
+        forces, own = engine.force_energies(), {name: v for each in self._extra for name, v in each.row(state).items()}
+        further = [own[name] for name in self._further]
         row = dict.fromkeys(self.columns, 0.0)  # 0 for forces that a change left out
         row |= self.counts_of(engine) | dict(zip((*KINETIC, *ENERGIES, *LOSSES), (*energies, *lost), strict=True))
-        row |= forces | moved | {"total": math.fsum([*energies, *forces.values(), *lost, *moved.values()])}
+        row |= forces | {"total": math.fsum([*energies, *forces.values(), *lost, *further])}
         row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
         row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
         row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
-        return row | wall_row(state, self.walls)
+        return row | own
 
     def counts_of(self, engine: Engine) -> dict[str, float]:
         """The part of the row of the present state that needs no energies: step, time [s], contacts and clusters."""
@@ -164,7 +166,8 @@ class Ledger(LedgerColumns):
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
-        types = [int if name in WHOLE else float for name in columns]
+        whole = WHOLE.union(*(each.whole() for each in self._extra))
+        types = [int if name in whole else float for name in columns]
         self.columns = tuple(columns)
         self.rows = [
             {name: kind(v) for name, kind, v in zip(columns, types, row, strict=True)} for row in table.tolist()
@@ -178,8 +181,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, LOST_WALLS, *OF_MOTION, *NUMBERS, AWAKE}
-        others |= set(self.walls)
+        others = {"total", "step", "time", *LOSSES, *self._further, *OF_MOTION, *NUMBERS, AWAKE, *self._more}
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN

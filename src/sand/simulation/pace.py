@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 SAMPLE_SECONDS = 1.0
 """Wall time [s] of steps, compilation excluded, after which the estimate is made."""
-MOST_STEPS, MOST_SECONDS = 1e12, 365.25 * 86400.0
+WARN_STEPS, WARN_SECONDS = 1e12, 365.25 * 86400.0
 """Remaining steps, and wall time [s], above which the estimate becomes a warning."""
 
 
@@ -47,8 +47,8 @@ class RunTimeEstimate:
         step = (time - self._first[0]) / taken
         left = min((self._end - time) / step if step > 0.0 else math.inf, self._last - steps)
         rest = left * self._seconds / taken
-        if left > MOST_STEPS or rest > MOST_SECONDS:
-            years = f"about {rest / MOST_SECONDS:.2g} years" if rest > MOST_SECONDS else f"{rest / 86400.0:.2g} days"
+        if left > WARN_STEPS or rest > WARN_SECONDS:
+            years = f"about {rest / WARN_SECONDS:.2g} years" if rest > WARN_SECONDS else f"{rest / 86400.0:.2g} days"
             self._warn(
                 f"{LONG} {left:.1g} more steps, {years} at the present speed; stop it with Ctrl-C "
                 "and choose an earlier end or fewer steps",

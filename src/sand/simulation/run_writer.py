@@ -30,6 +30,7 @@ from ..basics.state import (
     SUBSTEPS,
     WOKEN,
 )
+from ..basics.version import __version__
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
@@ -40,7 +41,6 @@ from ..io.ledger_table import TEMPERATURES, LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
-from ..version import __version__
 from .contact_table import measured_columns
 from .displays import DISPLAYS
 from .ledger import Ledger

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import Any
 
+from ..engine.component import present
 from ..forces.base import LongRangeForce
 from .cadence import SHORTEST_DURATION
 
@@ -29,8 +30,8 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
         Condition that ends the run.
     """
     of_grains = simulation.grains.materials  # first, in the order of their indices
-    walls = simulation._system.walls
-    materials = list({m.name: m for m in (*of_grains, *(wall.material for wall in walls))}.values())
+    extra = present(simulation._system.extra)
+    materials = list({m.name: m for m in (*of_grains, *(m for each in extra for m in each.materials()))}.values())
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     if recipe["kind"] != "gas":  # a gas names the materials from which it is drawn
         names = [m.name for m in of_grains]
@@ -59,8 +60,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
             m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
         },
         "forces": forces,
-        **({"walls": [wall.parameters() for wall in walls]} if walls else {}),
         "stepping": simulation.stepping.parameters(),
         "neighbours": simulation.neighbours.parameters(),  # as resolved at the start
-        **({"driven": [each.parameters() for each in simulation.driven]} if simulation.driven else {}),
+        **{each.name: each.parameters() for each in extra},
     }

@@ -19,7 +19,7 @@ from .updater import read_updaters
 
 ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
 """Arguments of a simulation that are fixed once it is built."""
-RESULTS = (
+RESULT_ATTRIBUTES = (
     *("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound"),
     *("wall_seconds", "wall_times"),
 )
@@ -51,7 +51,7 @@ def _refusal(name: str) -> str:
             f"{name} of a simulation cannot change once it is built; build a new one: "
             f"sand.Simulation(sim.grains, sim.forces, {name}=…)"
         )
-    if name in RESULTS:
+    if name in RESULT_ATTRIBUTES:
         return f"{name} of a simulation follows from its run and cannot be assigned"
     if name in QUANTITIES:
         return f"{name} of the grains of a simulation cannot be assigned; build a new one from sand.Grains(…, {name}=…)"
@@ -165,7 +165,7 @@ class ReadOnlySettings:
         if self._built and not name.startswith("_") and name not in changeable:
             # a subclass may use any name that a simulation does not have
             own = type(self).__module__.startswith("sand.")
-            if (own or name in ARGUMENTS or name in RESULTS) and (refusal := _refusal(name)):
+            if (own or name in ARGUMENTS or name in RESULT_ATTRIBUTES) and (refusal := _refusal(name)):
                 raise NoSuchAttribute(refusal)
             if own:
                 raise NoSuchAttribute(

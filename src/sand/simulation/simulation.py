@@ -15,14 +15,16 @@ from ..basics.arguments import checked
 from ..basics.box import Box, as_box
 from ..basics.grains import Grains
 from ..basics.state import CONTACTS, OUTSIDE, State
+from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
+from ..components import read_components
+from ..components.driven import Driven
+from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
-from ..engine.driven import Driven, read_driven
-from ..engine.walls import Wall, WallState, read_walls, wall_columns, wall_states
+from ..engine.component import Component, present
 from ..errors import BadInput, FilesFailed
 from ..forces.base import Force
-from ..forces.pair.dipoles import kinetic_temperature
 from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
@@ -72,8 +74,7 @@ class System:
     stepping: Integrator
     neighbours: Neighbours
     seed: int | None
-    walls: tuple[Wall, ...]
-    driven: tuple[Driven, ...]
+    extra: dict[str, Component]
     next_id: int
 
 
@@ -133,7 +134,6 @@ class Simulation(ReadOnlySettings):
     stepping: Integrator = held_by("_system", "stepping")
     neighbours: Neighbours = held_by("_system", "neighbours")
     seed: int | None = held_by("_system", "seed")
-    driven: tuple[Driven, ...] = held_by("_system", "driven")
     start: Grains = held_by("_system", "start")
     observers: list[Observer] = held_by("_output", "observers")
     updaters: list[Updater] = held_by("_output", "updaters")
@@ -167,22 +167,20 @@ class Simulation(ReadOnlySettings):
         driven: Any = (),
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        forces, walls, driven, box = read_forces(forces), read_walls(walls), read_driven(driven), as_box(box)
+        forces, extra, box = read_forces(forces), read_components(walls=walls, driven=driven), as_box(box)
         seed = None if seed is None else seed_given(seed, bits=63)
         self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         forces = fitting_forces(forces, integrator)
-        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), driven, walls)
+        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), present(extra))
         arrays, meta = ({}, {}) if restart is None else restart
         is_new = restart is None
         self._engine = engine = build_engine(*parts, fresh=is_new, contacts=contacts, cutoff=arrays.get("cutoff"))
         fitted = engine.stepping, engine.neighbours
-        self._system = System(
-            grains.copy(), forces, box, *fitted, seed, walls, driven, meta.get("next_id", len(grains))
-        )
+        self._system = System(grains.copy(), forces, box, *fitted, seed, extra, meta.get("next_id", len(grains)))
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
-        self.ledger = Ledger(engine.columns(), wall_columns(walls), awake=engine.state.at_rest is not None)
+        self.ledger = Ledger(engine.columns(), present(extra), awake=engine.state.at_rest is not None)
         self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
         self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None
@@ -272,7 +270,12 @@ class Simulation(ReadOnlySettings):
     def walls(self) -> tuple[WallState, ...]:
         """The walls at `time`: position, velocity, force, impulse, work, number of contacts."""
         self._begin()
-        return wall_states(self._system.walls, self.state)
+        return wall_states(self._system.extra["walls"].items, self.state)
+
+    @property
+    def driven(self) -> tuple[Driven, ...]:
+        """The grains with prescribed motion."""
+        return self._system.extra["driven"].items
 
     @property
     @exclusive
@@ -468,12 +471,12 @@ class Simulation(ReadOnlySettings):
             if self.writer:
                 self.writer.changed(self)
             return
-        fixed = int(self.seed or 0), self.driven, system.walls
-        engine, forces, driven = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
+        fixed = int(self.seed or 0), system.extra
+        engine, forces, extra = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
         before = self._log_row()["total"]
         self._engine = engine
         start, box, next_id = self.grains.copy(), change.box, change._next_id
-        self._system = replace(system, start=start, forces=forces, box=box, driven=driven, next_id=next_id)
+        self._system = replace(system, start=start, forces=forces, box=box, extra=extra, next_id=next_id)
         for text in truncation_warnings(self.grains, forces, box):
             self._warnings.show(text, text.partition(",")[0])
         self._origin.choices = {}  # chosen anew

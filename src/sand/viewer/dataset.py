@@ -13,12 +13,12 @@ from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import own_label
 from ..analysis.tracking import SINGLE, Lineage
 from ..basics.paths import user_path
+from ..basics.version import __version__
 from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
-from ..version import __version__
 from .by_identity import ByIdentity
 from .dimensions import fit_dimension
 from .packets import frame_bytes, frame_packet, grains_packet

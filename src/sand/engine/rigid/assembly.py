@@ -25,11 +25,9 @@ from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
 from ...neighbours.search import Neighbours
 from .. import kinds
-from ..driven import Driven
 from ..engine import Engine
 from ..kinds import Build, ForcesByType
 from ..part import Part
-from ..walls import Wall
 from .body_steps import PERIODS, BodySteps
 from .quick_bodies import QuickBodies
 
@@ -44,11 +42,9 @@ class Kind(kinds.Kind):
 
     keeps_order = True
 
-    def check(
-        self, forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall], neighbours: Neighbours
-    ) -> list[str]:
+    def check(self, forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
         """As `kinds.Kind.check`."""
-        return _check(forces, driven, walls, neighbours)
+        return _check(forces, others, neighbours)
 
     def pair_gap(self, grains: Grains, box: Box) -> float:
         """Largest gap [m] of pairs that the driver of bodies looks at."""
@@ -139,9 +135,7 @@ def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Gra
     return PERIODS * found
 
 
-def _check(
-    forces: Sequence[Force], driven: Sequence[Driven], walls: Sequence[Wall], neighbours: Neighbours
-) -> list[str]:
+def _check(forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
     """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
     contact = next((f for f in forces if isinstance(f, Contact)), None)
     problems = []
@@ -162,10 +156,7 @@ def _check(
     for force in forces:
         for name in ramps_of(force):
             problems.append(f"rigid clusters cannot follow the ramp {force.name}.{name}; use a number, or {GRAINS}")
-    if driven:
-        problems.append(f"rigid clusters cannot have driven grains; {GRAINS}")
-    if walls:
-        problems.append(f"rigid clusters cannot have walls; {GRAINS}")
+    problems += [f"rigid clusters cannot have {noun}; {GRAINS}" for noun in others]
     if neighbours.order == "curve":
         problems.append(f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}")
     if problems:

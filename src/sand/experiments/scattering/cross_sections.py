@@ -22,7 +22,7 @@ from ...basics.units import si
 from ...errors import BadInput, warn
 from ..executors import results_of
 from .encounters import Flight
-from .flight_driver import BOUND, FAILED, HIT
+from .flight_driver import BOUND, FLIGHT_FAILED, HIT
 from .flights import COLUMNS, Trajectory, count_inaccurate, fly, inaccurate_text, replay, trajectory
 from .problem import flight
 from .sampling import CERTAIN, Strata, Task, cut
@@ -197,7 +197,7 @@ def measure(
 
 def _warn(strata: Strata, rows: np.ndarray) -> None:
     """Warn if σ is unreliable. Raises BadInput if more than 1 % of the flights failed."""
-    failed = int((rows[:, END] == FAILED).sum())
+    failed = int((rows[:, END] == FLIGHT_FAILED).sum())
     if failed > 0.01 * len(rows):
         raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin is extreme")
     if text := inaccurate_text(count_inaccurate(rows), len(rows), float(rows[:, DRIFT].max())):
@@ -306,7 +306,7 @@ def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds:
         flights=int(tries.sum()),
         hits=int(hits.sum()),
         bound=int((ends == BOUND).sum()),
-        failed=int((ends == FAILED).sum()),
+        failed=int((ends == FLIGHT_FAILED).sum()),
         speed=setup.speed,
         distance=setup.distance,
         seed=seed,

@@ -17,7 +17,7 @@ from .initial_conditions import InitialConditions
 from .two_aggregates import TWO_AGGREGATES, Aggregates, Body
 from .two_spheres import TWO_SPHERES, Model, Spheres
 
-MOST_STEPS = 2_000_000
+MOST_FLIGHT_STEPS = 2_000_000
 """Largest number of steps of a flight; flights that reach it are bound."""
 
 
@@ -86,7 +86,7 @@ class Flight:
     spin_energy: tuple[float, float] = (0.0, 0.0)
     field: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tolerance: float = 1e-8
-    most_steps: int = MOST_STEPS
+    most_steps: int = MOST_FLIGHT_STEPS
     temperature: float = 0.0
     contact: bool = False
 

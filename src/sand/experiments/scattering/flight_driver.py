@@ -23,9 +23,9 @@ ORDER = 8.0
 """Order of the error estimate of a step."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 """Step-size control: safety factor, smallest and largest ratio of successive steps."""
-HIT, MISS, BOUND, FAILED = range(4)
+HIT, MISS, BOUND, FLIGHT_FAILED = range(4)
 """Ends of a flight: contact, escape, still together after the largest number of steps, state not finite."""
-RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
+FLIGHT_RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
 """Results of a flight: impact parameter and smallest gap [m], relative speed at the start and at the end [m/s], time
 [s], energy error over the largest kinetic energy ½m̄u² during the flight."""
 EXACT = 1e-7
@@ -164,7 +164,7 @@ def flight_of(model: Model) -> Callable:
             if not error_ratio <= 1.0:
                 dt *= step_size_factor(error_ratio)
                 if not dt > SMALLEST * first:
-                    return FAILED, time, steps, closest, 0.0
+                    return FLIGHT_FAILED, time, steps, closest, 0.0
                 continue
             new_gap, longest_step = gap_of(new, parameters)
             if new_gap < -EXACT * limits.touch and gap > 0.0:  # overlap: shorten the step by the secant method

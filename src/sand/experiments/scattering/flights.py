@@ -14,7 +14,7 @@ from ...basics.grains import Grains
 from ...basics.units import si
 from ...errors import BadInput
 from .encounters import Flight
-from .flight_driver import HIT, RESULTS, allocate_workspace, flights_of
+from .flight_driver import FLIGHT_RESULTS, HIT, allocate_workspace, flights_of
 from .initial_conditions import R, U
 from .problem import impact_parameter
 from .sampling import Task
@@ -29,7 +29,7 @@ OFFSETS = {
     "spin_projectile": SPIN1,
     "spin_target": SPIN2,
 }
-COLUMNS = ("stratum", "number", *RESULTS)
+COLUMNS = ("stratum", "number", *FLIGHT_RESULTS)
 """Columns of the rows of `fly` and of flights.csv."""
 LARGEST_DRIFT = 1e-6
 """Energy error of a flight, over the largest kinetic energy of its relative motion, above which it is counted."""
@@ -93,7 +93,7 @@ def _run(
             raise BadInput(f"{name} = {value!r} must be a whole number of at least 0, below 2^64")
     model, parameters = setup.pair()
     work = allocate_workspace(model.size, rows)
-    results, ends = np.zeros((numbers.size, len(RESULTS))), np.zeros((numbers.size, model.size))
+    results, ends = np.zeros((numbers.size, len(FLIGHT_RESULTS))), np.zeros((numbers.size, model.size))
     flights_of(model)(
         np.uint64(seed),
         strata.astype(np.uint64),
@@ -219,7 +219,7 @@ def grains_at_contact(
 
     square = np.array([impact_parameter(b, setup) ** 2])
     results, ends, _ = _run(setup, np.array([stratum]), np.array([number]), square, square, seed)
-    end = int(results[0, RESULTS.index("end")])
+    end = int(results[0, FLIGHT_RESULTS.index("end")])
     return ENDS[end], grains_at(setup, ends[0])[0] if end == HIT else None
 
 
@@ -248,7 +248,7 @@ def _recorded(
     rows = 4096
     while True:
         results, _, history = _run(setup, given[0], given[1], given[2], given[3], seed, azimuth, rows)
-        steps = int(results[0, RESULTS.index("steps")])
+        steps = int(results[0, FLIGHT_RESULTS.index("steps")])
         if steps < rows:
             return _trajectory(setup, results[0], history[: steps + 1])
         rows = steps + 1
@@ -266,7 +266,7 @@ def _trajectory(setup: Flight, results: np.ndarray, history: np.ndarray) -> Traj
     single = setup.spheres
     has_exchange = results[0] != HIT and not drift.any()
     vectors = {name: y[:, k : k + 3] if single else np.zeros((0, 3)) for name, k in OFFSETS.items()}
-    named = {name: float(value) for name, value in zip(RESULTS, results, strict=True)}
+    named = {name: float(value) for name, value in zip(FLIGHT_RESULTS, results, strict=True)}
     return Trajectory(
         end=ENDS[int(named["end"])],
         time=time,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...io.run_folder import FIGURE, FLIGHTS, RESULTS, SCATTERING
+from ...io.run_folder import FIGURE, FLIGHTS, RESULTS_CSV, SCATTERING
 from ...io.table import GrowingTable, write_table
 from ...plotting.run_figure import save
 from ...simulation.run_writer import versions
@@ -62,7 +62,7 @@ class ScatterJob(Job):
                 self.before.setdefault(int(row[0]), []).append(row[1:])
         measure_all = {"cross-section": self._cross_sections, "map": self._map, "trajectories": self._trajectories}
         rows, figure, results = measure_all[settings.job](executor, progress)
-        write_table(self.folder / RESULTS, rows)
+        write_table(self.folder / RESULTS_CSV, rows)
         save(figure, self.folder / FIGURE)
         if self.table is not None:
             self.table.sort()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field
 
 from ...basics.material import PRESETS
-from ...basics.settings import For
+from ...basics.settings import For, Number, Whole
 from ...config.case import MaterialSection, material_errors, with_absolute_files
 from ...config.commands import refuse_other_command
 from ...config.key_errors import validate
@@ -43,15 +43,15 @@ class MeasureSection(Section):
 
     job: Literal["cross-section", "map", "trajectories"] = "cross-section"
     """Quantity to compute: cross-sections, a map of hit probabilities, or trajectories."""
-    relative_error: Annotated[float, Field(ge=1e-4, le=0.5, strict=True)] = 0.02
+    relative_error: Annotated[float, Number(least=1e-4, most=0.5)] = 0.02
     """Relative standard error of cross-sections at which sampling stops, 1e-4 … 0.5."""
     impact_parameters: Annotated[list[Any], For("job", "trajectories")] = Field(default_factory=list)
     """Impact parameters of trajectories [m], or as text "0.95 b_max"."""
     spins: Annotated[list[Any], For("job", "trajectories")] = Field(default_factory=list)
     """Spins of trajectories, each as `flight.spin`; they replace it."""
-    cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
+    cells: Annotated[int, Whole(1, 1000)] = 24
     """Cells of a map along the impact parameter."""
-    per_cell: Annotated[int, Field(ge=1, le=10**9, strict=True)] = 64
+    per_cell: Annotated[int, Whole(1, 10**9)] = 64
     """Trajectories per cell of a map."""
     seed: Seed = 0
     """Seed of all random numbers."""

@@ -9,12 +9,12 @@ from ...basics.arguments import checked
 from ...basics.box import Box
 from ...basics.grains import Grains
 from ...basics.ramps import rampable
-from ...basics.settings import AlongZ, Settings
+from ...basics.settings import RAMP, AlongZ, Settings
 from .formulas import UniformElectric, uniform_electric
 
 
 @checked
-@rampable("strength")
+@rampable
 @dataclass(frozen=True)
 class ElectricField(Settings):
     """A uniform electric field: force q E, energy −q E·x.
@@ -30,7 +30,7 @@ class ElectricField(Settings):
         If `strength` is not one or three finite numbers in V/m; one line each.
     """
 
-    strength: Annotated[Any, AlongZ("V/m")]
+    strength: Annotated[Any, AlongZ("V/m"), RAMP]
 
     name = "electric"
     references = "Jackson 1975"

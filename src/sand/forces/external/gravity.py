@@ -9,7 +9,7 @@ from ...basics.arguments import checked
 from ...basics.box import Box
 from ...basics.grains import Grains
 from ...basics.ramps import rampable
-from ...basics.settings import Reading, Settings
+from ...basics.settings import RAMP, Reading, Settings
 from ...basics.vectors import along_z, components
 from ...errors import BadInput, shown
 from .formulas import UniformGravity, uniform_gravity
@@ -27,7 +27,7 @@ def _downwards(value: Any, name: str) -> tuple[float, float, float]:
 
 
 @checked
-@rampable("acceleration")
+@rampable
 @dataclass(frozen=True)
 class Gravity(Settings):
     """A uniform acceleration: force m g, energy −m g·x.
@@ -43,7 +43,7 @@ class Gravity(Settings):
         If `acceleration` is not one or three finite numbers in m/s^2, or one number below 0; one line each.
     """
 
-    acceleration: Annotated[Any, Reading(_downwards, unit="m/s^2")]
+    acceleration: Annotated[Any, Reading(_downwards, unit="m/s^2"), RAMP]
 
     name = "gravity"
     references = "Newton 1687"

@@ -12,7 +12,7 @@ from ...basics.arguments import checked
 from ...basics.box import Box
 from ...basics.grains import Grains
 from ...basics.ramps import force_at, forces_at_points, rampable, ramps_of
-from ...basics.settings import AlongZ, Direction, For, Number, Reading, Settings, Word
+from ...basics.settings import RAMP, AlongZ, Direction, For, Number, Reading, Settings, Word
 from ...basics.units import si
 from ...errors import BadInput
 from ...numerics.vec import across, add, cross, dot, norm, scale, sub
@@ -41,7 +41,7 @@ def _frequency(value: Any, name: str) -> float:
 
 
 @checked
-@rampable("flux_density", "amplitude")
+@rampable
 @dataclass(frozen=True)
 class Field(Settings):
     """A uniform magnetic flux density: torque μ×B(t), energy −μ·B(t) (Eqs. 40, 41).
@@ -82,9 +82,9 @@ class Field(Settings):
         If a value is invalid or out of range, or the shape requires or does not use a key; one line each.
     """
 
-    flux_density: Annotated[Any, AlongZ("T")]
+    flux_density: Annotated[Any, AlongZ("T"), RAMP]
     shape: Annotated[str, Word("constant", "oscillating", "rotating", "ramp")] = "constant"
-    amplitude: Annotated[Any, AlongZ("T"), For("shape", *_WAVE, needed=_ALONG_Z)] = None
+    amplitude: Annotated[Any, AlongZ("T"), RAMP, For("shape", *_WAVE, needed=_ALONG_Z)] = None
     frequency: Annotated[
         Any,
         Reading(_frequency, unit="Hz"),

@@ -13,7 +13,7 @@ from ...basics.box import Box
 from ...basics.constants import BOLTZMANN, LIGHT
 from ...basics.grains import Grains
 from ...basics.ramps import rampable
-from ...basics.settings import Flag, Number, Settings, Vector
+from ...basics.settings import RAMP, Flag, Number, Settings, Vector
 from ...basics.units import MELTED, format_quantity
 from . import drag as law
 from .gas_loops import GasParameters, shortest_stopping_time
@@ -28,7 +28,7 @@ underestimates drag by 6 % (specular reflection) or 4 % (diffuse reflection)."""
 
 
 @checked
-@rampable("temperature", "density", "pressure", "accommodation", "wind")
+@rampable
 @dataclass(frozen=True)
 class Gas(Settings):
     """A rarefied gas: drag (Epstein) and Brownian motion of every grain.
@@ -66,13 +66,13 @@ class Gas(Settings):
         If a parameter is out of range, or both or neither of density and pressure are given; one line each.
     """
 
-    temperature: Annotated[Any, Number("K", above=0.0)]
-    density: Annotated[Any, Number("kg/m^3", above=0.0)] = None
-    pressure: Annotated[Any, Number("Pa", above=0.0)] = None
+    temperature: Annotated[Any, Number("K", above=0.0), RAMP]
+    density: Annotated[Any, Number("kg/m^3", above=0.0), RAMP] = None
+    pressure: Annotated[Any, Number("Pa", above=0.0), RAMP] = None
     molecule_mass: Annotated[Any, Number("kg", above=0.0)] = law.NEBULA_MOLECULE * law.ATOMIC_MASS
-    accommodation: Annotated[Any, Number(least=0.0, most=1.0)] = 1.0
+    accommodation: Annotated[Any, Number(least=0.0, most=1.0), RAMP] = 1.0
     brownian: Annotated[bool, Flag()] = True
-    wind: Annotated[Any, Vector("m/s")] = (0.0, 0.0, 0.0)
+    wind: Annotated[Any, Vector("m/s"), RAMP] = (0.0, 0.0, 0.0)
     cross_section: Annotated[Any, Number("m^2", above=0.0)] = None
 
     name = "gas"

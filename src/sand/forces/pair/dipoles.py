@@ -14,6 +14,7 @@ from ...basics.constants import BOLTZMANN, MAGNETIC
 from ...basics.grains import Grains
 from ...basics.ramps import rampable
 from ...basics.settings import Word
+from ...basics.temperature import kinetic_temperature, sums_of_clusters
 from ...basics.units import format_quantity
 from .cutoff import HALF_BOX_RATIO, Cut, CutoffChoice, CutoffRadius, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
@@ -46,7 +47,7 @@ class CapturingPair(NamedTuple):
 
 
 @checked
-@rampable()
+@rampable
 @dataclass(frozen=True)
 class Dipoles(EwaldForce):
     """Forces and torques between magnetic moments.
@@ -230,7 +231,7 @@ def capturing_pair(grains: Grains, labels: np.ndarray | None, temperature: float
     temperature : float
         T [K] of the translation of clusters. The speed √(kT/2m̄), m̄ the reduced mass, is √(kT/m) for equal masses m.
     """
-    mass, moment, number = _bodies(grains, labels, grains.moment)
+    mass, moment, number = sums_of_clusters(grains, labels, grains.moment)
     size = np.linalg.norm(moment, axis=1)
     if np.count_nonzero(size) < 2:
         return CapturingPair(0.0, 0, 0)
@@ -241,26 +242,3 @@ def capturing_pair(grains: Grains, labels: np.ndarray | None, temperature: float
     reduced = mass[a] * mass[b] / (mass[a] + mass[b])
     speed = math.sqrt(BOLTZMANN * temperature / (2.0 * reduced))
     return CapturingPair(float(capture_radius(size[a], size[b], reduced, speed, MAGNETIC)), first, second)
-
-
-def _bodies(
-    grains: Grains, labels: np.ndarray | None, vectors: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass [kg], sum of vectors (K, 3) and number of grains of each cluster, or of each grain if `labels` is None."""
-    if labels is None:
-        return grains.mass, vectors, np.ones(len(grains), int)
-    sums = np.column_stack([np.bincount(labels, vectors[:, axis]) for axis in range(3)])
-    return np.bincount(labels, grains.mass), sums, np.bincount(labels)
-
-
-def kinetic_temperature(grains: Grains, labels: np.ndarray | None = None) -> float:
-    """T [K] from the translational energy (3/2) (N − 1) k_B T of N grains in the centre-of-mass frame; 0 for one grain.
-
-    The momentum is zero in this frame, so that 3 (N − 1) degrees of freedom are left. With `labels` (N,), the cluster
-    of each grain, it is that of the translation of the clusters.
-    """
-    mass, momentum, _ = _bodies(grains, labels, grains.mass[:, None] * grains.velocity)
-    velocity = grains.velocity if labels is None else momentum / mass[:, None]
-    drift = momentum.sum(axis=0) / mass.sum()
-    energy = 0.5 * (mass * ((velocity - drift) ** 2).sum(axis=1)).sum()
-    return float(2.0 * energy / (3.0 * max(len(mass) - 1, 1) * BOLTZMANN))

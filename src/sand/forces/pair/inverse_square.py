@@ -91,7 +91,7 @@ class InverseSquare(PairForce):
 
 
 @checked
-@rampable()
+@rampable
 @dataclass(frozen=True)
 class Charges(EwaldForce, InverseSquare):
     """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
@@ -201,7 +201,7 @@ class Charges(EwaldForce, InverseSquare):
 
 
 @checked
-@rampable()
+@rampable
 @dataclass(frozen=True)
 class Attraction(InverseSquare):
     """Newtonian attraction between the grains, U = −G m1 m2/r; rarely relevant below kilometres.

@@ -17,7 +17,7 @@ from ...basics.box import Box
 from ...basics.constants import COULOMB
 from ...basics.grains import Grains
 from ...basics.ramps import forces_at_points, rampable
-from ...basics.settings import Number
+from ...basics.settings import RAMP, Number
 from ...basics.units import format_quantity
 from ...compiler.jit import formula
 from ...numerics.vec import dot, scale
@@ -54,7 +54,7 @@ def screened_coulomb(apart, a, b, constants):
 
 
 @checked
-@rampable("screening_length")
+@rampable
 @dataclass(frozen=True)
 class ScreenedCharges(PairForce):
     """Screened Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r) exp(−r/λ).
@@ -79,7 +79,7 @@ class ScreenedCharges(PairForce):
         If a parameter is missing or invalid; later, if the cut-off exceeds half the box.
     """
 
-    screening_length: Annotated[Any, Number("m", above=0.0)]
+    screening_length: Annotated[Any, Number("m", above=0.0), RAMP]
     cutoff: CutoffRadius = "auto"
     cut: Cut = "smooth"
 

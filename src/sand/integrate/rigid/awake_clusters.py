@@ -84,7 +84,7 @@ def measure_clusters_stage(law: ContactLaw) -> Stage:
     """The stage that fills `ClusterMeasures`, its parameters, and `clusters.offset`, from the centres of mass."""
     constants_at, at_break = column_loops(law).at, law.at_break
 
-    @stage("the vibrations of awake clusters")
+    @stage("the vibrations of awake clusters", seconds=1.0)
     def measure_clusters(grains, contacts, clusters, count, span, parameters):
         clusters.listed[:] = 0
         for first in range(grains.mass.size):

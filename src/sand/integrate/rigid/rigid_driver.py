@@ -299,6 +299,7 @@ def body_steps_until(s):
 
 @stage(
     "the steps of rigid bodies",
+    seconds=8.0,
     parts=(*DRIVER_PARTS, "bodies", "gas", "flight_limits"),
 )
 def advance_bodies(s):

@@ -12,7 +12,6 @@ from ...errors import BadInput
 from ..extended_xyz import unlisted
 from .data import NAMED, FileBox, GrainData, GrainFile, data_of, known_as, numbers
 
-ANGSTROM = 1e-10
 PERIODIC = dict.fromkeys(("T", "TRUE", "1"), True) | dict.fromkeys(("F", "FALSE", "0"), False)
 """Values of pbc."""
 

@@ -24,7 +24,7 @@ DIRECTION, OFFSET, START, STEPS, RETURN, SIDEWAYS, TURN1, TURN2 = range(8)
 """Purposes of random numbers."""
 TOUCH = 1e-3
 """Gap, in radii of the largest grain, at which a walk ends; the grains are then moved into contact."""
-MOST_STEPS = 100_000
+MOST_WALK_STEPS = 100_000
 """Largest number of steps of one walk."""
 
 
@@ -198,8 +198,8 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
     u, _ = random_direction(seed, number, grain, START)
     x = scale(size, u)
     length, start = math.inf, first
-    for step in range(MOST_STEPS):
-        draw = number * MOST_STEPS + step
+    for step in range(MOST_WALK_STEPS):
+        draw = number * MOST_WALK_STEPS + step
         best, one, other = math.inf, first, EMPTY
         for k in range(last - first):
             b = start + k if start + k < last else start + k - (last - first)

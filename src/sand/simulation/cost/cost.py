@@ -173,7 +173,7 @@ def _speeds(kind: str) -> tuple[dict[str, float], str]:
     A kind of step that was not measured has the speed of the machine: the median of all measured ratios and of 1, the
     rough estimate, so that one odd record changes little.
     """
-    table = _read()
+    table = read_speeds()
     known = table.get(kind, {})
     every = [one["ratio"] for runs in table.values() for mode, one in runs.items() if mode in MODES]
     machine = math.exp(float(np.median([0.0, *map(math.log, every)])))
@@ -297,7 +297,7 @@ class StepTimer:
         spent = math.fsum(one["seconds"] for one in found.values())
         if spent < 2.0 * self._recorded or not found:  # many short runs of one simulation write it only sometimes
             return
-        self._recorded, table = spent, _read()
+        self._recorded, table = spent, read_speeds()
         known = table.setdefault(self._kind, {})
         known |= {
             mode: one for mode, one in found.items() if one["seconds"] > REPLACES * known.get(mode, one)["seconds"]
@@ -309,7 +309,7 @@ def _path() -> Path:
     return cache_folder().parent / "step-speeds.json"
 
 
-def _read() -> dict[str, dict[str, dict[str, float]]]:
+def read_speeds() -> dict[str, dict[str, dict[str, float]]]:
     """The table, by kind of simulation and kind of step; one that is damaged or of other units counts as empty."""
     try:
         content = read_record(_path())

@@ -12,18 +12,27 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.arrays import empty_contact_arrays, wall_arrays
-from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.material import Material, as_material
 from ..basics.ramps import ramps_of
 from ..basics.settings import Direction, Number, Reading, Settings, Vector
 from ..basics.state import WALL_CONTACTS, State
 from ..contact.constants_table import constant_names
+from ..contact.damping import THERMAL
+from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..contact.wall_loops import WallNumbers
+from ..engine.component import Component, Setup
 from ..errors import BadInput, shown
-from ..integrate.integrator import Integrator
+from ..integrate.parts import ContactParameters
+from ..integrate.stage_list import variant_of
+from ..integrate.stages import StageNumber, bath_wall_work, wall_stages
 from ..setup.checks import most_overlap
+
+LOST = "lost_walls"
+"""Column of the ledger: energy [J] that moving walls took from grains and contacts."""
+CONTACTS_OF_ALL = "wall_contacts"
+"""Column of the ledger: number of contacts with walls."""
 
 
 def _name_of_columns(value: Any, name: str) -> str:
@@ -122,35 +131,97 @@ def read_walls(value: Any) -> tuple[Wall, ...]:
     return tuple(dataclasses.replace(one, name=name) for one, name in zip(value, names, strict=True))
 
 
-def check_walls(
-    walls: Sequence[Wall], grains: Grains, contact: Contact | None, box: Box, stepping: Integrator, *, fresh: bool
-) -> None:
-    """Check that walls, grains, contact model, box and integrator fit together.
+class Walls(Component):
+    """Walls to which grains stick (`Wall`)."""
 
-    Raises
-    ------
-    BadInput
-        With all problems.
-    """
-    problems: list[str] = []
-    if walls and contact is None:
-        problems.append("walls: there is no sand.Contact() among the forces, by which grains stick to walls; add it")
-    if walls and ramps_of(contact):
-        problems.append("walls: ramps of sand.Contact do not reach contacts with walls; give constant values")
-    if walls and stepping.flight is not None:
-        problems.append(f"walls: {type(stepping).__name__} does not know walls; use stepping=sand.Verlet()")
-    for wall in walls:
-        problems += _material_problems(wall, grains, contact)
-        axes = [axis for axis, v, length in zip("xyz", wall.normal, box.lengths, strict=True) if v and length]
-        if axes:
+    name = "walls"
+    noun = "walls"
+
+    def problems(self, setup: Setup) -> list[str]:
+        """As `Component.problems`."""
+        problems: list[str] = []
+        contact, stepping = setup.forces.contact, setup.stepping
+        if contact is None:
             problems.append(
-                f"walls: the normal of '{wall.name}' has a component along {axes[0]}, along which the box is periodic; "
-                "open this axis, or give another normal"
+                "walls: there is no sand.Contact() among the forces, by which grains stick to walls; add it"
             )
-        elif fresh and contact is not None and wall.material.surface_energy is not None:
-            problems += _grain_problems(wall, grains, contact)
-    if problems:
-        raise BadInput(problems)
+        if ramps_of(contact):
+            problems.append("walls: ramps of sand.Contact do not reach contacts with walls; give constant values")
+        if stepping.flight is not None:
+            problems.append(f"walls: sand.{type(stepping).__name__} does not know walls; use stepping=sand.Verlet()")
+        for wall in self.items:
+            problems += _material_problems(wall, setup.grains, contact)
+            lengths = setup.box.lengths
+            axes = [axis for axis, v, length in zip("xyz", wall.normal, lengths, strict=True) if v and length]
+            if axes:
+                problems.append(
+                    f"walls: the normal of '{wall.name}' has a component along {axes[0]}, along which the box is "
+                    "periodic; open this axis, or give another normal"
+                )
+            elif setup.fresh and contact is not None and wall.material.surface_energy is not None:
+                problems += _grain_problems(wall, setup.grains, contact)
+        return problems
+
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
+        """Contacts, loads, the limit of the step, and the work of a bath."""
+        contact, variant = setup.forces.contact, variant_of(settings)
+        assert contact is not None
+        table = [
+            [contact.pairing(material, wall.material) for wall in self.items] for material in setup.grains.materials
+        ]
+        numbers = WallNumbers(
+            np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0)),
+            np.array([math.inf if wall.mass is None else wall.mass for wall in self.items]),
+            np.array([wall.force or 0.0 for wall in self.items]),
+        )
+        of_bath = {StageNumber.BATH_WALL_WORK: bath_wall_work} if variant == THERMAL else {}
+        return {number: (each, numbers) for number, each in (wall_stages(law, variant) | of_bath).items()}
+
+    def place(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
+        """Give a new state its walls, and memory for their contacts."""
+        channels = state.contacts.lost.shape[0]
+        arrays = wall_arrays(len(self.items), len(state.grains))
+        for name in ("position", "normal", "velocity"):
+            given = [getattr(wall, "point" if name == "position" else name) for wall in self.items]
+            getattr(arrays, name)[...] = np.array(given).T
+        state.walls = arrays
+        columns = len(constant_names(law))
+        state.wall_contacts = empty_contact_arrays(0, 0, columns, channels=channels, damped=settings.damped)
+        state.__post_init__()  # aligns the arrays
+
+    def problems_of_change(self, grains: Grains, *, rebuilt: bool) -> list[str]:
+        """As `Component.problems_of_change`."""
+        if not rebuilt:
+            return []
+        return [
+            "walls: with walls a change cannot add or remove grains, set or scale the box, or leave out a force; start "
+            "a new simulation from a frame"
+        ]
+
+    def columns(self) -> list[str]:
+        """Force of the grains on each wall [N], position along its normal [m]; number of contacts."""
+        own = ("force_x", "force_y", "force_z", "position")
+        return [*(f"{wall.name}_{key}" for wall in self.items for key in own), CONTACTS_OF_ALL]
+
+    def whole(self) -> list[str]:
+        """Numbers of contacts."""
+        return [CONTACTS_OF_ALL]
+
+    def losses(self) -> list[str]:
+        """The energy that moving walls took from grains and contacts."""
+        return [LOST]
+
+    def row(self, state: State) -> dict[str, float]:
+        """As `Component.row`."""
+        arrays = state.walls
+        along = (arrays.position * arrays.normal).sum(axis=0)
+        values = [float(v) for v in np.vstack([arrays.force, along]).T.ravel()]
+        found = dict(zip(self.columns(), [*values, int(state.count[WALL_CONTACTS])], strict=True))
+        return {LOST: -math.fsum(arrays.work)} | found
+
+    def materials(self) -> list[Material]:
+        """Materials of the walls."""
+        return [wall.material for wall in self.items]
 
 
 def _material_problems(wall: Wall, grains: Grains, contact: Contact | None) -> list[str]:
@@ -199,31 +270,6 @@ def _grain_problems(wall: Wall, grains: Grains, contact: Contact) -> list[str]:
     ]
 
 
-def wall_numbers(walls: Sequence[Wall], grains: Grains, contact: Contact | None) -> WallNumbers | None:
-    """Constant numbers of the walls for their stages; None without walls."""
-    if not walls or contact is None:
-        return None
-    table = [[contact.pairing(material, wall.material) for wall in walls] for material in grains.materials]
-    return WallNumbers(
-        np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0)),
-        np.array([math.inf if wall.mass is None else wall.mass for wall in walls]),
-        np.array([wall.force or 0.0 for wall in walls]),
-    )
-
-
-def place_walls(state: State, walls: Sequence[Wall], law: Any, channels: int, *, damped: bool) -> None:
-    """Give a new state its walls, and memory for their contacts; `channels` is the number of losses per contact."""
-    if not walls:
-        return
-    arrays = wall_arrays(len(walls), len(state.grains))
-    arrays.position[...] = np.array([wall.point for wall in walls]).T
-    arrays.normal[...] = np.array([wall.normal for wall in walls]).T
-    arrays.velocity[...] = np.array([wall.velocity for wall in walls]).T
-    state.walls = arrays
-    state.wall_contacts = empty_contact_arrays(0, 0, len(constant_names(law)), channels=channels, damped=damped)
-    state.__post_init__()  # aligns the arrays
-
-
 def wall_states(walls: Sequence[Wall], state: State) -> tuple[WallState, ...]:
     """The walls in a state."""
     arrays, on = state.walls, state.wall_contacts.pair[1, : state.count[WALL_CONTACTS]]
@@ -239,19 +285,3 @@ def wall_states(walls: Sequence[Wall], state: State) -> tuple[WallState, ...]:
         )
         for w, wall in enumerate(walls)
     )
-
-
-def wall_columns(walls: Sequence[Wall]) -> list[str]:
-    """Columns of the ledger: force of the grains on each wall [N], position along its normal [m], contacts."""
-    own = ("force_x", "force_y", "force_z", "position")
-    return [*(f"{wall.name}_{key}" for wall in walls for key in own), *(["wall_contacts"] if walls else [])]
-
-
-def wall_row(state: State, columns: Sequence[str]) -> dict[str, float]:
-    """Values of `columns`, those of `wall_columns`, in a state; empty without walls."""
-    if not columns:
-        return {}
-    arrays = state.walls
-    along = (arrays.position * arrays.normal).sum(axis=0)
-    values = [float(v) for v in np.vstack([arrays.force, along]).T.ravel()]
-    return dict(zip(columns, [*values, int(state.count[WALL_CONTACTS])], strict=True))

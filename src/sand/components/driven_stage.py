@@ -14,13 +14,9 @@ import numpy as np
 from ..basics.state import OUTSIDE
 from ..compiler.jit import loop
 from ..compiler.stage import stage
+from ..integrate.parts import DT, HEAVY
+from ..integrate.stages import HOLD, HOLD_IN_EVENTS, RELEASE, RELEASE_FROM_EVENTS
 from ..numerics.vec import add, dot, load, put, sub
-from .parts import DT
-
-HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)
-"""What the stage does: masses before and after kicks, and around contact events; velocities and spins after drag."""
-HEAVY = 2.0**30
-"""Factor of masses in contact events, whose impulses are read from the remaining changes of velocity."""
 
 
 class DrivenArrays(NamedTuple):

@@ -1,0 +1,17 @@
+"""Components of a simulation, such as walls and driven grains: one file and one line here each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..engine.component import Component
+from .driven import DrivenGrains, read_driven
+from .walls import Walls, read_walls
+
+READERS = {"walls": (read_walls, Walls), "driven": (read_driven, DrivenGrains)}
+"""By keyword of `sand.Simulation`: what reads the user's value, and the component; in the order in which they act."""
+
+
+def read_components(**given: Any) -> dict[str, Component]:
+    """The components of a simulation by keyword.  Raises BadInput."""
+    return {name: component(read(given[name])) for name, (read, component) in READERS.items()}

@@ -1,0 +1,121 @@
+"""Components: features of a simulation that are no formula, such as walls.  Each is a folder of `sand.components`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.material import Material
+from ..basics.state import State
+from ..contact.law import ContactLaw
+from ..errors import BadInput
+from ..integrate.integrator import Integrator
+from ..integrate.parts import ContactParameters
+from ..neighbours.search import Neighbours
+from .kinds import ForcesByType
+
+
+class Setup(NamedTuple):
+    """What the components of a simulation have to fit to."""
+
+    grains: Grains
+    forces: ForcesByType
+    box: Box
+    stepping: Integrator
+    neighbours: Neighbours
+    fresh: bool  # whether this is a new start; a resumed run may be in the middle of an impact
+
+
+class Component:
+    """A feature of a simulation that is no formula; what a class does not define is nothing.
+
+    Attributes
+    ----------
+    name : str
+        Its keyword of `sand.Simulation`, and its table in case files.
+    noun : str
+        What it adds, in sentences: "rigid clusters cannot have walls".
+    keeps_order : bool
+        Whether grains keep the order in which they were given.
+    every_step : bool
+        Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
+    own_columns : bool
+        Whether each contact needs its own constants, also between equal grains.
+    items : Sequence
+        What the user gave, such as `sand.Wall` objects.
+    """
+
+    name: ClassVar[str]
+    noun: ClassVar[str]
+    keeps_order: ClassVar[bool] = False
+    every_step: ClassVar[bool] = False
+    own_columns: ClassVar[bool] = False
+
+    def __init__(self, items: Sequence[Any]):
+        self.items = tuple(items)
+
+    def problems(self, setup: Setup) -> list[str]:
+        """Why it does not fit to the other parts of a simulation, a sentence each."""
+        return []
+
+    def prepare(self, grains: Grains) -> None:
+        """Give the grains of a start what it prescribes."""
+
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
+        """Stages that the driver calls, by number, with their parameters."""
+        return {}
+
+    def heavy(self) -> list[int]:
+        """Grains whose mass counts as infinite in contacts."""
+        return []
+
+    def place(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
+        """Give a new state the arrays that it needs."""
+
+    def kept(self, kept: np.ndarray) -> Component:
+        """What is left of it after a change; `kept` (K,) are the earlier indices of grains 0 … K − 1."""
+        return self
+
+    def problems_of_change(self, grains: Grains, *, rebuilt: bool) -> list[str]:
+        """Why it does not allow a change to these grains, after which arrays are others (`rebuilt`), or the box is."""
+        return []
+
+    def columns(self) -> list[str]:
+        """Columns of the ledger besides energies."""
+        return []
+
+    def whole(self) -> list[str]:
+        """Those of its columns that have whole numbers."""
+        return []
+
+    def losses(self) -> list[str]:
+        """Columns of the ledger with energies [J] that are part of the total."""
+        return []
+
+    def row(self, state: State) -> dict[str, float]:
+        """Values of all its columns."""
+        return {}
+
+    def materials(self) -> list[Material]:
+        """Materials that a case file has to define."""
+        return []
+
+    def parameters(self) -> list[dict[str, Any]]:
+        """Its tables in a case file, SI."""
+        return [each.parameters() for each in self.items]
+
+
+def present(components: Mapping[str, Component]) -> list[Component]:
+    """The components that a simulation has."""
+    return [each for each in components.values() if each.items]
+
+
+def check(components: Sequence[Component], setup: Setup) -> None:
+    """Check that components fit to the other parts of a simulation.  Raises BadInput with all problems."""
+    problems = [line for each in components for line in each.problems(setup)]
+    if problems:
+        raise BadInput(problems)
