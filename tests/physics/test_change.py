@@ -9,6 +9,8 @@ import sand
 from sand.basics.state import CONTACTS
 from sand.errors import BadInput
 
+from .setups import struck_chain
+
 pytestmark = pytest.mark.filterwarnings(
     "ignore:charges. the cut-off, .* ends an interaction", "ignore:dipoles. the cut-off, .* ends an interaction"
 )
@@ -302,3 +304,18 @@ def test_charges_sum_all_images_after_a_change_to_a_periodic_box():
         with sim.change() as change:
             change.box = slab
         assert any("ends an interaction that is not small" in text for text in sim.warnings)
+
+
+@pytest.mark.compiled("contacts")
+def test_a_copy_made_within_a_change_runs():
+    """The copy has the state before the change, and no open change: it can run, which the original cannot yet."""
+    setup = struck_chain()
+    sim = sand.Simulation(setup.grains, setup.forces)
+    sim.run(steps=5)
+    with sim.change() as change:
+        change.velocity[0] = 0.0
+        other = sim.copy()
+        assert other.run(steps=5).steps == 10
+        with pytest.raises(sand.BadInput, match="end the block first"):
+            sim.run(steps=5)
+    assert (sim.grains.velocity[0] == 0.0).all() and sim.steps == 5

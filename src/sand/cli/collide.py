@@ -10,7 +10,6 @@ import click
 
 from ..basics.threads import set_threads
 from . import options, parsing, report
-from .job import run_job
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""
@@ -50,7 +49,9 @@ def command(
 
 def collide(job: Any, *, as_json: bool, quiet: bool, **execution: Any) -> None:
     """Run a `CollisionJob` and print the results; `execution` as for `job.run_job`. Raises BadInput as it does."""
-    content = run_job(job, as_json=as_json, quiet=quiet, **execution)
+    from .job import run_job
+
+    content = run_job(job, as_json=as_json, quiet=quiet or as_json, **execution)
     heading = f"resume {job.folder}" if job.resume else f"collide {job.path}"
     rows = [*collision_rows(content["collisions"]), ("files", f"{job.folder}/")]
     report.answer(content, heading, rows, as_json=as_json, quiet=quiet)

@@ -10,7 +10,6 @@ import click
 from ..basics.threads import set_threads
 from ..errors import BadInput
 from . import options, parsing, report
-from .job import run_job
 
 
 @parsing.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
@@ -43,6 +42,8 @@ def command(case: str, seeds: list[int] | None, out: str | None, threads: int | 
 
 def grow(job: Any, *, quiet: bool, as_json: bool, **execution: Any) -> None:
     """Run or continue the boxes of a case; `execution` as for `job.run_job`. Raises BadInput as it does."""
+    from .job import run_job
+
     content = run_job(job, quiet=quiet, as_json=as_json, lines=True, **execution)
     text = f"all boxes are in {job.folder}; measure them with: sand analyse {shlex.quote(str(job.folder))}"
     report.answer(content, text, [], as_json=as_json, quiet=quiet)

@@ -11,7 +11,6 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import FLIGHTS
 from . import options, parsing, report
-from .job import run_job
 
 
 def _check(values: Mapping[str, Any]) -> Iterator[str]:
@@ -51,6 +50,8 @@ def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: An
 
 def scatter(job: Any, *, quiet: bool, as_json: bool, **execution: Any) -> None:
     """Run a `ScatterJob` and print the results; `execution` as for `job.run_job`. Raises BadInput as it does."""
+    from .job import run_job
+
     content = run_job(job, quiet=quiet, as_json=as_json, **execution)
     rows = [*result_rows(content), ("files", report.listed(job.folder))]
     content["folder"] = str(job.folder)

@@ -143,9 +143,13 @@ class Origin:
     choices: dict[str, str] = field(default_factory=dict)
 
 
-def held_by(group: str, name: str) -> Any:
-    """Make an attribute of a simulation that a group of its settings holds."""
-    return property(attrgetter(f"{group}.{name}"), lambda self, value: setattr(getattr(self, group), name, value))
+def held_by(group: str, name: str, text: str) -> Any:
+    """Make an attribute of a simulation that a group of its settings holds, with its description."""
+
+    def assign(simulation: Any, value: Any) -> None:
+        setattr(getattr(simulation, group), name, value)
+
+    return property(attrgetter(f"{group}.{name}"), assign, doc=text)
 
 
 class ReadOnlySettings:

@@ -129,22 +129,22 @@ class Simulation(ReadOnlySettings):
         If arguments are invalid or do not fit together; all problems at once, one line each.
     """
 
-    forces: tuple[Force, ...] = held_by("_system", "forces")
-    box: Box = held_by("_system", "box")
-    stepping: Integrator = held_by("_system", "stepping")
-    neighbours: Neighbours = held_by("_system", "neighbours")
-    seed: int | None = held_by("_system", "seed")
-    start: Grains = held_by("_system", "start")
-    observers: list[Observer] = held_by("_output", "observers")
-    updaters: list[Updater] = held_by("_output", "updaters")
-    frame_every: float | str | None = held_by("_output", "frame_every")
-    row_every: float | str | None = held_by("_output", "row_every")
-    checkpoint_every: float | str | None = held_by("_output", "checkpoint_every")
-    temperature: float = held_by("_origin", "temperature")
-    recipe: dict[str, Any] | None = held_by("_origin", "recipe")
-    origin: str = held_by("_origin", "origin")
-    title: str = held_by("_origin", "title")
-    planned: tuple[float, float, str | None] = held_by("_origin", "planned")
+    forces: tuple[Force, ...] = held_by("_system", "forces", "Forces of the simulation.")
+    box: Box = held_by("_system", "box", "Box.")
+    stepping: Integrator = held_by("_system", "stepping", "Integrator.")
+    neighbours: Neighbours = held_by("_system", "neighbours", "Settings of the neighbour search, as resolved.")
+    seed: int | None = held_by("_system", "seed", "Seed of random forces.")
+    start: Grains = held_by("_system", "start", "Grains at the start, or after the last change.")
+    observers: list[Observer] = held_by("_output", "observers", "Observers; assignable.")
+    updaters: list[Updater] = held_by("_output", "updaters", "Updaters; assignable.")
+    frame_every: float | str | None = held_by("_output", "frame_every", "When frames are written; assignable.")
+    row_every: float | str | None = held_by("_output", "row_every", "When rows are added; assignable.")
+    checkpoint_every: float | str | None = held_by("_output", "checkpoint_every", "When checkpoints are written.")
+    temperature: float = held_by("_origin", "temperature", "Kinetic temperature at the start [K].")
+    recipe: dict[str, Any] | None = held_by("_origin", "recipe", "Table [grains] of the case file.")
+    origin: str = held_by("_origin", "origin", "Description of the file that the grains come from.")
+    title: str = held_by("_origin", "title", 'Title of the figure; "": the numbers of grains.')
+    planned: tuple[float, float, str | None] = held_by("_origin", "planned", "Planned end: time [s], step, condition.")
 
     def __init__(
         self,
