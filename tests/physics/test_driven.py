@@ -144,7 +144,7 @@ def test_changes_keep_the_prescribed_motion():
 
 WRONG = {
     "sand.Driven([])": ["driven: grains = [] is empty"],
-    "sand.Driven([-1], velocity=[1, 2], spin=[0, 0, '1 m'])": ["grains = -1", "velocity = [1, 2]", "spin z = '1 m'"],
+    "sand.Driven([-1], velocity=[1, 2], spin=[0, 0, '1 m'])": ["grains[0] = -1", "velocity = [1, 2]", "spin z = '1 m'"],
     "run(sand.Driven([0, 9]), sand.Driven([0]))": ["there is no grain 9", "grain 0 is given more than once"],
     "run(sand.Driven([0, 1, 2]))": ["all 3 grains are driven"],
     "run('all')": ["driven = 'a'"],

@@ -210,7 +210,7 @@ def test_grains_at_contact():
 def test_rigid_bodies_of_one_grain_move_as_spheres():
     """The rigid-body kernel with one grain per body and the kernel of spheres agree to 1e-6 of R at the end."""
     from sand.experiments.scattering.encounters import body_of
-    from sand.experiments.scattering.flight_driver import allocate_workspace, flights_of
+    from sand.experiments.scattering.flight_driver import Flights, allocate_workspace, flights_of
     from sand.experiments.scattering.two_aggregates import AGGREGATES, TWO_AGGREGATES, Aggregates
 
     pair = unequal_pair()
@@ -220,7 +220,7 @@ def test_rigid_bodies_of_one_grain_move_as_spheres():
     square = np.array([1.5e-7**2])
     nought = np.zeros(1, np.uint64)
     flights_of(TWO_AGGREGATES)(
-        np.uint64(0), nought, nought, square, square, allocate_workspace(AGGREGATES), results, ends,
+        np.uint64(0), Flights(nought, nought, square, square, results, ends), allocate_workspace(AGGREGATES),
         pair.start(0.0), rules, pair.limits(),
     )  # fmt: skip
     apart = one.projectile[-1] - one.target[-1]

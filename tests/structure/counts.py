@@ -138,15 +138,15 @@ class Count(NamedTuple):
 
 
 COUNTS = (
-    Count("functions with more than 8 positional parameters", lambda: len(parameters()), 34, 8),
-    Count("most positional parameters", lambda: max(parameters().values(), default=0), 12, 10),
+    Count("functions with more than 8 positional parameters", lambda: len(parameters()), 0, 8),
+    Count("most positional parameters", lambda: max(parameters().values(), default=0), 8, 10),
     Count("attributes that Simulation sets", attributes_of_simulation, 14, 15),
     Count("pairs of folders of which one imports the other", pairs_of_folders, 243, 200),
     Count("files that name rigid clusters outside their own", lambda: len(files_that_name(RIGID, "rigid")), 3, 3),
-    Count("files that name walls outside their own", lambda: len(files_that_name(WALL)), 26, 3),
+    Count("files that name walls outside their own", lambda: len(files_that_name(WALL)), 17, 3),
     Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN)), 4, 3),
-    Count("code lines", code_lines, 35600, 32850),
-    Count("private accesses of unit tests", private_accesses_of_tests, 24, 30),
+    Count("code lines", code_lines, 35500, 32850),
+    Count("private accesses of unit tests", private_accesses_of_tests, 28, 30),
 )
 
 

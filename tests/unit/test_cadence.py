@@ -50,7 +50,7 @@ def test_impossible_cadences_are_refused(given, message):
     with pytest.raises(sand.BadInput, match=message) as caught:
         sand.Simulation(sand.Grains([[0, 0, 0]], "10 nm", "iron"), frame_every=given)
     assert len(caught.value.problems) == 1
-    with pytest.raises(sand.BadInput, match=f"run.frame_every: .*{message}"):
+    with pytest.raises(sand.BadInput, match=f"run.frame_every.*{message.removeprefix('frame_every')}"):
         check_case({**CASE, "run": {"until": "1 us", "frame_every": given}}, "some.toml")
 
 

@@ -19,10 +19,10 @@ from sand.contact.law import contact_constants
 from sand.contact.mechanics import displacements_of
 from sand.contact.model import Contact
 from sand.contact.tangential import pointers_for
+from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLIPPED_FLAG
 from sand.contact.update import (
-    BROKEN_FLAG,
-    PENDING_FLAG,
-    SLIPPED_FLAG,
+    ContactRange,
+    ContactStep,
     _flag_contact,
     contact_loop,
     contact_pass_loop,
@@ -45,9 +45,10 @@ flag_contacts, columns = contact_loop(JKR, _flag_contact), column_loops(JKR)
 
 
 def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
-    passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, 0, dt)
+    step = ContactStep(span, law, 0, dt)
+    passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), step)
     log_contact_sums(count, lost, passed)
-    update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
+    update_flagged_contacts(grains, contacts, near, count, lost, step)
     return passed.pending
 
 
@@ -56,9 +57,9 @@ pass_and_update = kernel(_pass_and_update, cached=False)
 
 def update_flagged_only(grains, contacts, near, count, lost, span, law, dt):
     """Reference: a pass that only flags contacts beyond a limit, then the update of each flagged contact."""
-    used = np.uint64(count[CONTACTS])
-    flag_contacts(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, 0, dt)
-    update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
+    used, step = np.uint64(count[CONTACTS]), ContactStep(span, law, 0, dt)
+    flag_contacts(grains, contacts, ContactRange(np.uint64(0), used, used, np.uint64(0)), step)
+    update_flagged_contacts(grains, contacts, near, count, lost, step)
 
 
 def random_contacts(material, box, seed=1):

@@ -6,7 +6,7 @@ import pytest
 from sand.basics.arrays import ContactArrays, empty_contact_arrays
 from sand.basics.state import CONTACTS, COUNT
 from sand.contact.events import compact_contacts
-from sand.contact.update import BROKEN_FLAG
+from sand.contact.transitions import BROKEN_FLAG
 
 BY_GRAIN = {"side", "start", "gather_order"}
 """Arrays that are rebuilt from the pairs."""

@@ -16,9 +16,10 @@ the dissipated energy is its work by the trapezoidal rule, as that of all forces
 then closes to the order of the integrator.
 """
 
+import functools
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +50,20 @@ class Motion(NamedTuple):
 
     velocity: tuple  # U [m/s]
     spin: tuple  # Ω [1/s]
+
+
+class Surfaces(NamedTuple):
+    """The two sides of a contact in the second half of a step; the second one is a grain or a wall.
+
+    A wall is the limit r2 → ∞: W → 0, while W×(x1 − x2) → r1 ω1×n and a1 → r1.
+    """
+
+    radii: tuple  # r1, r2 [m]; (r1, 0) at a wall, so that a1 = |x1 − x2| r1/(r1 + r2)
+    velocity: tuple  # v1 − v2 [m/s]
+    separation: tuple  # x1 − x2 [m]; r1 n at a wall
+    rolling: tuple  # W [1/s] of `surface_rotation`; 0 at a wall
+    motion: Motion  # U at the end of the step, and Ω
+    ids: tuple  # of both sides, for the noise
 
 
 class DampingLoad(NamedTuple):
@@ -153,7 +168,7 @@ def extrapolated(before, now, dt):
 
 @formula
 def loads_on_grains(damping, separation, r1, r2):
-    """Force on grain 1 and torques on both grains."""
+    """Force on grain 1 and torques on both grains, for x1 − x2 [m]."""
     moment, share = cross(separation, damping.force), r1 / (r1 + r2)
     torque1 = axpy(-share, moment, damping.torque)
     return damping.force, torque1, sub(axpy(share, moment, scale(-1.0, damping.torque)), moment)
@@ -210,6 +225,20 @@ def stored_load(contacts, c):
 
 
 @loop
+def store_loads(contacts, c, loads):
+    """Store force on grain 1 [N] and torques on both sides [N m] of contact c."""
+    put(contacts.force, c, loads[0])
+    put(contacts.torque1, c, loads[1])
+    put(contacts.torque2, c, loads[2])
+
+
+@loop
+def stored_loads(contacts, c):
+    """Force on grain 1 [N] and torques on both sides [N m] of contact c, as stored."""
+    return load(contacts.force, c), load(contacts.torque1, c), load(contacts.torque2, c)
+
+
+@loop
 def measured_load(contacts, c):
     """Loads of the dashpots of contact c; 0 in simulations without damping."""
     if contacts.damping.shape[1] == 0:
@@ -218,17 +247,104 @@ def measured_load(contacts, c):
 
 
 @loop
-def start_motion(grains, contacts, c, separation):
-    """Set the stored motion of a new contact to that of its grains, and its damping loads to 0."""
+def surfaces_of_pair(grains, contacts, c, pose):
+    """The two sides of contact c between grains."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
+    r1, r2 = grains.radius[i], grains.radius[j]
     velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
     w1, w2 = load(grains.spin, i), load(grains.spin, j)
-    rolling = surface_rotation(w1, w2, grains.radius[i], grains.radius[j])
+    separation = scale(pose.distance, pose.n)
+    rolling = surface_rotation(w1, w2, r1, r2)
     motion = relative_motion(separation, velocity, rolling, w1, w2)
-    store_rows(contacts.damping, VELOCITY, c, motion.velocity)
-    store_rows(contacts.damping, SPIN, c, motion.spin)
-    store_rows(contacts.damping, FORCE, c, NO_LOAD.force)
-    store_rows(contacts.damping, TORQUE, c, NO_LOAD.torque)
+    return Surfaces((r1, r2), velocity, separation, rolling, motion, (grains.id[i], grains.id[j]))
+
+
+class Held(NamedTuple):
+    """A contact at the end of a step, as far as its dashpots depend on it."""
+
+    pose: Any  # mechanics.Pose, or wall_mechanics.WallPose
+    radius: float  # of the contact [m]
+    constants: Any  # law.ContactConstants
+
+
+class DampingVariant(NamedTuple):
+    """Functions of the dashpots in one variant of the contact update; `bodies` is what `surfaces_of` takes."""
+
+    update: (
+        Callable  # of one contact: returns `loads` with damping, and the energies [J] that the four modes dissipated
+    )
+    single: Callable  # of one contact that the pass has not updated: adds to its loads, and logs its losses
+    at_touch: Callable  # of a new contact, likewise; returns the normal impulse [N s] since first touch
+    at_break: Callable  # of a broken contact: logs its losses; returns the normal force [N] at the start of the step
+
+
+@functools.cache
+def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> DampingVariant:
+    """The dashpots of contacts with `surfaces_of(bodies, contacts, c, pose)`, in one variant of the contact update."""
+    if damping == NONE:
+        return NO_DAMPING
+    thermal = damping == THERMAL
+
+    @loop
+    def update(bodies, contacts, c, held, loads, active, step):
+        """Update and store the dashpots of contact c at the end of a step, and log its losses.
+
+        If it is not `active`, the stored loads stay those of the start of the step, and nothing is lost.
+        """
+        r, velocity, separation, rolling, motion, ids = surfaces_of(bodies, contacts, c, held.pose)
+        n = held.pose.n
+        before = Motion(load_rows(contacts.damping, VELOCITY, c), load_rows(contacts.damping, SPIN, c))
+        start = stored_load(contacts, c)
+        dashpots = dashpots_of(held.radius, held.constants)
+        end = damping_load(extrapolated(before, motion, step.dt), n, dashpots)
+        if thermal:
+            deviates = unit_deviates(step.settings.seed, step.number, ids[0], ids[1])
+            noise = thermal_load(dashpots, n, deviates, step.settings.bath, step.dt)
+            end = DampingLoad(add(end.force, noise.force), add(end.torque, noise.torque))
+        lost = damping_losses(start, end, n, velocity, motion, rolling, step.dt)
+        first, others = _chosen(active, lost[:3], NO_LOAD.force), lost[3] if active else 0.0
+        lost = (first[0], first[1], first[2], others)
+        contacts.lost[DAMPING_ROW, c] += lost[0] + lost[1] + lost[2] + lost[3]
+        store_rows(contacts.damping, VELOCITY, c, _chosen(active, motion.velocity, before.velocity))
+        store_rows(contacts.damping, SPIN, c, _chosen(active, motion.spin, before.spin))
+        store_rows(contacts.damping, FORCE, c, _chosen(active, end.force, start.force))
+        store_rows(contacts.damping, TORQUE, c, _chosen(active, end.torque, start.torque))
+        force, torque1, torque2 = loads_on_grains(end, separation, r[0], r[1])
+        return (add(loads[0], force), add(loads[1], torque1), add(loads[2], torque2)), lost
+
+    @loop
+    def single(bodies, contacts, lost, c, held, step):
+        loads, dissipated = update(bodies, contacts, c, held, stored_loads(contacts, c), True, step)
+        store_loads(contacts, c, loads)
+        add_damping_energies(lost, dissipated)
+
+    @loop
+    def at_touch(bodies, contacts, lost, c, held, closing, elapsed, step):
+        motion = surfaces_of(bodies, contacts, c, held.pose).motion
+        store_rows(contacts.damping, VELOCITY, c, motion.velocity)
+        store_rows(contacts.damping, SPIN, c, motion.spin)
+        store_rows(contacts.damping, FORCE, c, NO_LOAD.force)
+        store_rows(contacts.damping, TORQUE, c, NO_LOAD.torque)
+        loads, dissipated = update(bodies, contacts, c, held, stored_loads(contacts, c), True, step)
+        impulse = dot(sub(loads[0], load(contacts.force, c)), held.pose.n) * elapsed
+        store_loads(contacts, c, loads)
+        # along n the force acts since first touch, otherwise for half a step in the velocity Verlet kick
+        contacts.lost[DAMPING_ROW, c] += impulse * closing - dissipated[0]
+        add_damping_energies(lost, (impulse * closing, dissipated[1], dissipated[2], dissipated[3]))
+        return impulse
+
+    @loop
+    def at_break(bodies, contacts, lost, c, pose, opening, elapsed, dt):
+        # the loads of the start of the step acted for half a step in the velocity Verlet kick; along n, the impulse of
+        # the break extends this to the time until the break, dt − elapsed
+        _, velocity, _, rolling, motion, _ = surfaces_of(bodies, contacts, c, pose)
+        start = stored_load(contacts, c)
+        losses = damping_losses(start, NO_LOAD, pose.n, velocity, motion, rolling, dt)
+        normal = dot(start.force, pose.n)
+        add_damping_energies(lost, (-normal * opening * (dt - elapsed), losses[1], losses[2], losses[3]))
+        return normal
+
+    return DampingVariant(update, single, at_touch, at_break)
 
 
 @formula
@@ -238,148 +354,23 @@ def _chosen(condition, u, v):
 
 
 @loop
-def _update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt, thermal):
-    """Update and store the dashpots of contact c at the end of a step, and log its losses.
-
-    Parameters
-    ----------
-    radius : float
-        Contact radius [m].
-    loads : tuple
-        Force on grain 1 [N] and torques on both grains [N m] without damping.
-    active : bool
-        False: the stored loads stay those of the start of the step, and nothing is lost.
-    number : int
-        Number of the step, for the noise.
-    thermal : bool
-        Whether the bath adds its noise.
-
-    Returns
-    -------
-    tuple
-        The loads with damping, and the energies [J] dissipated by the four modes.
-    """
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    r1, r2 = grains.radius[i], grains.radius[j]
-    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
-    w1, w2 = load(grains.spin, i), load(grains.spin, j)
-    separation = scale(pose.distance, pose.n)
-    rolling = surface_rotation(w1, w2, r1, r2)
-    motion = relative_motion(separation, velocity, rolling, w1, w2)
-    before = Motion(load_rows(contacts.damping, VELOCITY, c), load_rows(contacts.damping, SPIN, c))
-    start = stored_load(contacts, c)
-    dashpots = dashpots_of(radius, constants)
-    end = damping_load(extrapolated(before, motion, dt), pose.n, dashpots)
-    if thermal:
-        deviates = unit_deviates(settings.seed, number, grains.id[i], grains.id[j])
-        noise = thermal_load(dashpots, pose.n, deviates, settings.bath, dt)
-        end = DampingLoad(add(end.force, noise.force), add(end.torque, noise.torque))
-    lost = damping_losses(start, end, pose.n, velocity, motion, rolling, dt)
-    first, others = _chosen(active, lost[:3], (0.0, 0.0, 0.0)), lost[3] if active else 0.0
-    lost = (first[0], first[1], first[2], others)
-    contacts.lost[DAMPING_ROW, c] += lost[0] + lost[1] + lost[2] + lost[3]
-    store_rows(contacts.damping, VELOCITY, c, _chosen(active, motion.velocity, before.velocity))
-    store_rows(contacts.damping, SPIN, c, _chosen(active, motion.spin, before.spin))
-    store_rows(contacts.damping, FORCE, c, _chosen(active, end.force, start.force))
-    store_rows(contacts.damping, TORQUE, c, _chosen(active, end.torque, start.torque))
-    force, torque1, torque2 = loads_on_grains(end, separation, r1, r2)
-    return (add(loads[0], force), add(loads[1], torque1), add(loads[2], torque2)), lost
-
-
-@loop
-def _update_cold(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt):
-    return _update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt, False)
-
-
-@loop
-def _update_thermal(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt):
-    return _update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt, True)
-
-
-@loop
-def _no_update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt):
+def _no_update(bodies, contacts, c, held, loads, active, step):
     return loads, (0.0, 0.0, 0.0, 0.0)
 
 
 @loop
-def _log_break(grains, contacts, lost, c, pose, opening, elapsed, dt):
-    """Log the energies [J] that the dashpots of contact c dissipated in the step in which it broke.
-
-    The loads of the start of the step acted for half a step in the velocity Verlet kick; along n, the impulse of the
-    break extends this to the time until the break, dt − `elapsed`.
-
-    Returns
-    -------
-    float
-        Force [N] of the normal dashpot at the start of the step, on grain 1 along n.
-    """
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
-    w1, w2 = load(grains.spin, i), load(grains.spin, j)
-    separation, start = scale(pose.distance, pose.n), stored_load(contacts, c)
-    rolling = surface_rotation(w1, w2, grains.radius[i], grains.radius[j])
-    motion = relative_motion(separation, velocity, rolling, w1, w2)
-    losses = damping_losses(start, NO_LOAD, pose.n, velocity, motion, rolling, dt)
-    normal = dot(start.force, pose.n)
-    losses = (-normal * opening * (dt - elapsed), losses[1], losses[2], losses[3])
-    add_damping_energies(lost, losses)
-    return normal
-
-
-@loop
-def _no_break(grains, contacts, lost, c, pose, opening, elapsed, dt):
-    return 0.0
-
-
-@loop
-def _no_single(grains, contacts, lost, c, pose, radius, constants, settings, number, dt):
+def _no_single(bodies, contacts, lost, c, held, step):
     return
 
 
 @loop
-def _no_touch(grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, number, dt):
+def _no_touch(bodies, contacts, lost, c, held, closing, elapsed, step):
     return 0.0
 
 
-class DampingVariant(NamedTuple):
-    """Functions of the dashpots in one variant of the contact update."""
-
-    update: Callable  # in the pass over contacts, see `_update`
-    single: Callable  # of one contact that the pass has flagged: updates its stored loads
-    at_touch: Callable  # of a new contact; returns the normal impulse [N s] since first touch
-    at_break: Callable  # of a broken contact, see `_log_break`
+@loop
+def _no_break(bodies, contacts, lost, c, pose, opening, elapsed, dt):
+    return 0.0
 
 
-def _variant(update: Callable) -> DampingVariant:
-    @loop
-    def single(grains, contacts, lost, c, pose, radius, constants, settings, number, dt):
-        loads = load(contacts.force, c), load(contacts.torque1, c), load(contacts.torque2, c)
-        loads, dissipated = update(grains, contacts, c, pose, radius, constants, loads, True, settings, number, dt)
-        put(contacts.force, c, loads[0])
-        put(contacts.torque1, c, loads[1])
-        put(contacts.torque2, c, loads[2])
-        add_damping_energies(lost, dissipated)
-
-    @loop
-    def at_touch(grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, number, dt):
-        start_motion(grains, contacts, c, scale(pose.distance, pose.n))
-        loads = load(contacts.force, c), load(contacts.torque1, c), load(contacts.torque2, c)
-        loads, dissipated = update(grains, contacts, c, pose, radius, constants, loads, True, settings, number, dt)
-        impulse = dot(sub(loads[0], load(contacts.force, c)), pose.n) * elapsed
-        put(contacts.force, c, loads[0])
-        put(contacts.torque1, c, loads[1])
-        put(contacts.torque2, c, loads[2])
-        # along n the force acts since first touch, otherwise for half a step in the velocity Verlet kick
-        contacts.lost[DAMPING_ROW, c] += impulse * closing - dissipated[0]
-        add_damping_energies(lost, (impulse * closing, dissipated[1], dissipated[2], dissipated[3]))
-        return impulse
-
-    return DampingVariant(update, single, at_touch, _log_break)
-
-
-VARIANTS = {
-    NONE: DampingVariant(_no_update, _no_single, _no_touch, _no_break),
-    DASHPOTS: _variant(_update_cold),
-    THERMAL: _variant(_update_thermal),
-}
-"""The dashpots in each variant of the contact update."""
+NO_DAMPING = DampingVariant(_no_update, _no_single, _no_touch, _no_break)

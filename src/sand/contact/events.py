@@ -5,19 +5,19 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from ..basics.box import nearest_image
 from ..basics.state import (
     BREAKING,
     BROKEN,
     CONTACTS,
-    FORMING,
     INNER_COUNT,
     INNER_SKIN,
     LARGEST_OVERLAP,
     MADE,
     PAIRS,
     SLIPPED,
-    STEPS,
     TIME,
 )
 from ..compiler.jit import loop, rare
@@ -26,28 +26,13 @@ from ..numerics.quaternion import turned_back
 from ..numerics.vec import accrue, dot, load, load4, put, scale, sub
 from . import tangential
 from .constants_table import column_loops, load_pairing, uniform_contacts
-from .damping import NONE, VARIANTS
+from .damping import NONE, Held, damping_loops
 from .gather import sort_contacts_by_grain
-from .impact import note_impact
 from .law import ContactLaw
-from .losses import FORMING_ROW, add_slip_energies, add_slip_losses
-from .mechanics import (
-    Displacements,
-    contact_speed_gain,
-    displacements_of,
-    exceeds_limits,
-    scaled_stiffness,
-    slip_losses,
-)
-from .update import (
-    BROKEN_FLAG,
-    PENDING_FLAG,
-    displacements_before,
-    overlap_share,
-    pose_at,
-    single_contact_loop,
-    slipped_pose,
-)
+from .losses import record_slip
+from .mechanics import displacements_of, exceeds_limits, release_loss, scaled_stiffness, slip_losses, time_since
+from .transitions import BROKEN_FLAG, PENDING_FLAG, Break, Touch, breaking_loop, clear_contact, touch_loop
+from .update import displacements_before, overlap_share, pose_at, single_contact_loop, slipped_pose
 
 
 @loop
@@ -71,36 +56,22 @@ def mark_separated(pair_list, count, i, j):
 @functools.cache
 def settle_loop(law: ContactLaw, damping: str) -> Callable:
     """The loop that breaks or slips flagged contacts, for one contact law and variant of damping."""
-    constants_at, radius_root, at_break = column_loops(law).at, law.radius_root, law.at_break
-    contact_radius, write_loads, damping_loops = law.contact_radius, single_contact_loop(law), VARIANTS[damping]
-    damping_of_break, damp = damping_loops.at_break, damping_loops.single
+    constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
+    write_loads, dashpots = single_contact_loop(law), damping_loops(damping)
+    break_contact, damp = breaking_loop(law, dashpots), dashpots.single
 
     @rare
-    def break_contact(grains, contacts, pair_list, count, lost, c, pose, constants, dt):
-        """Log the energy of a contact that broke within the step, and flag it as broken.
-
-        The contact force just before the break ended a time τ before the end of the step, but velocity Verlet
-        applied it for half a step: the difference is applied as an impulse.
-        """
+    def break_pair(grains, contacts, lost, c, pose, constants, dt):
+        """Break contact c in a step of dt [s]."""
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         overlap = grains.radius[i] + grains.radius[j] - pose.distance
         opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-        stretched = -constants.break_overlap - overlap
-        elapsed = min(stretched / opening, dt) if opening > 0.0 else 0.0
-        energy, force = at_break(constants)
-        lost[BREAKING] += energy
-        force += damping_of_break(grains, contacts, lost, c, pose, opening, elapsed, dt)
-        apply_pair_impulse(grains, i, j, pose.n, force * (0.5 * dt - elapsed))
-        count[BROKEN] += 1
-        contacts.flag[c] = BROKEN_FLAG
-        put(contacts.force, c, (0.0, 0.0, 0.0))
-        put(contacts.torque1, c, (0.0, 0.0, 0.0))
-        put(contacts.torque2, c, (0.0, 0.0, 0.0))
-        mark_separated(pair_list, count, i, j)
+        broken = Break(pose, -constants.break_overlap - overlap, opening, constants)
+        apply_pair_impulse(grains, i, j, pose.n, break_contact(grains, contacts, lost, c, broken, dt))
 
     @rare
-    def update_flagged_contacts(grains, contacts, pair_list, count, lost, span, settings, dt):
-        """Break or slip the flagged contacts, one by one.
+    def update_flagged_contacts(grains, contacts, pair_list, count, lost, step):
+        """Break or slip the flagged contacts, one by one, in a step (`update.ContactStep`).
 
         Returns
         -------
@@ -114,32 +85,29 @@ def settle_loop(law: ContactLaw, damping: str) -> Callable:
             i, j = contacts.pair[0, c], contacts.pair[1, c]
             r1, r2 = grains.radius[i], grains.radius[j]
             constants = constants_at(contacts, c)
-            pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-            displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
-            if exceeds_limits(displacements, pose.n, constants):
-                start = displacements_before(grains, contacts, c, pose, constants, dt)
-                present = scaled_stiffness(constants, radius_root(displacements.overlap, constants), settings.follow)
-                if displacements.overlap < -constants.break_overlap:
-                    zero = (0.0, 0.0, 0.0)
-                    unloaded = Displacements(displacements.overlap, zero, zero, 0.0)
-                    slid, rolled, twisted = slip_losses(start, displacements, unloaded, present)
-                    lost[BREAKING] += slid + rolled + twisted
-                    break_contact(grains, contacts, pair_list, count, lost, c, pose, constants, dt)
+            pose = pose_at(grains, contacts, step.span, c, contacts.twist[c])
+            overlap = r1 + r2 - pose.distance
+            reached = displacements_of(pose, overlap, r1, r2, constants)
+            y = radius_root(overlap, constants)
+            if exceeds_limits(reached, pose.n, constants):
+                start = displacements_before(grains, contacts, c, pose, constants, step.dt)
+                present = scaled_stiffness(constants, y, step.settings.follow)
+                if overlap < -constants.break_overlap:
+                    lost[BREAKING] += release_loss(start, reached, present)
+                    break_pair(grains, contacts, lost, c, pose, constants, step.dt)
+                    count[BROKEN] += 1
+                    mark_separated(pair_list, count, i, j)
                     broken = True
                     continue
-                new_pose = slipped_pose(displacements, pose, r1, r2, constants, settings.reset)
-                left = displacements_of(new_pose, displacements.overlap, r1, r2, constants)
-                slipped = slip_losses(start, displacements, left, present)
-                add_slip_losses(contacts.lost, c, slipped)
-                add_slip_energies(lost, slipped)
+                new_pose = slipped_pose(reached, pose, r1, r2, constants, step.settings.reset)
+                left = displacements_of(new_pose, overlap, r1, r2, constants)
+                record_slip(contacts, lost, c, slip_losses(start, reached, left, present))
                 put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), new_pose.n1))
                 put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), new_pose.n2))
                 contacts.twist[c] = left.twist
                 count[SLIPPED] += 1
-            write_loads(grains, contacts, span, settings, c)
-            overlap = r1 + r2 - pose.distance
-            radius = contact_radius(overlap, radius_root(overlap, constants), constants)
-            damp(grains, contacts, lost, c, pose, radius, constants, settings, count[STEPS], dt)
+            write_loads(grains, contacts, step.span, step.settings, c)
+            damp(grains, contacts, lost, c, Held(pose, contact_radius(overlap, y, constants), constants), step)
         return broken
 
     return update_flagged_contacts
@@ -205,6 +173,15 @@ def count_new_contacts(grains, pair_list, count, span):
     return new_contacts
 
 
+class InitialContacts(NamedTuple):
+    """Contacts with given displacements."""
+
+    pair: np.ndarray  # (2, C) grain indices
+    slide: np.ndarray  # (3, C) ζ and ξ [m] in the laboratory frame; their components along n are ignored
+    roll: np.ndarray
+    twist: np.ndarray  # (C,) φ [rad]
+
+
 class FormingLoops(NamedTuple):
     """Loops that form contacts, for one contact law."""
 
@@ -215,11 +192,9 @@ class FormingLoops(NamedTuple):
 @functools.cache
 def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
     """The loops that form contacts, for one contact law and variant of damping."""
-    columns, write_loads = column_loops(law), single_contact_loop(law)
-    contact_radius, damping_of_touch = law.contact_radius, VARIANTS[damping].at_touch
+    columns, write_loads, touch = column_loops(law), single_contact_loop(law), touch_loop(law, damping_loops(damping))
+    radius_root, contact_radius = law.radius_root, law.contact_radius
     constants_at, constants_of_pair, store_constants = columns.at, columns.of_pair, columns.store
-    radius_root, at_touch = law.radius_root, law.at_touch
-    normal_force, normal_energy, normal_stiffness = law.force, law.energy, law.stiffness
 
     @rare
     def add_contact(grains, contacts, count, span, settings, i, j, formed):
@@ -232,12 +207,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
         n = scale(1.0 / math.sqrt(dot(separation, separation)), separation)
         put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), scale(-1.0, n)))
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n))
-        contacts.twist[c] = 0.0
-        contacts.formed[c] = formed
-        contacts.flag[c] = 0
-        contacts.every_step[c] = 0
-        for row in range(contacts.lost.shape[0]):
-            contacts.lost[row, c] = 0.0
+        clear_contact(contacts, c, formed)
         constants = constants_of_pair(grains, settings.pairings, i, j)
         first, last = (0, contacts.constants.shape[1]) if settings.uniform_contacts else (c, c + 1)
         if c == 0 or not settings.uniform_contacts:
@@ -246,57 +216,34 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
         write_loads(grains, contacts, span, settings, c)
         return c
 
-    @loop
-    def speed_gain(overlap, closing, reduced, constants, dt):
-        """Increase of the closing speed [m/s] since first touch, see `mechanics.contact_speed_gain`."""
-        y = radius_root(overlap, constants)
-        energy_drop = at_touch(constants) - normal_energy(overlap, y, constants)
-        force, stiffness = normal_force(overlap, y, constants), normal_stiffness(overlap, y, constants)
-        return contact_speed_gain(energy_drop, force, stiffness, closing, reduced, dt)
-
     @rare
-    def form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, dt):
-        """Form the contacts of pairs that began to touch within the step, and log the energy −U(0).
-
-        The grains have moved freely for a time τ = overlap / closing speed w since first touch.  An impulse along n
-        gives them the speed w′ that the contact force would have given them, less the contribution that velocity
-        Verlet still adds; to first order the impulse is F (τ − dt/2).  Without the second order, (F τ)²/2m̄, there
-        would be an energy error of the same sign in every contact formed.
-        """
+    def form_contacts(grains, contacts, pair_list, count, lost, clock, step):
+        """Form the contacts of pairs that began to touch within the step (`update.ContactStep`)."""
         for p in range(count[PAIRS]):
             i, j = pair_list.pair[0, p], pair_list.pair[1, p]
-            separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+            separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), step.span)
             radii = grains.radius[i] + grains.radius[j]
             squared_distance = dot(separation, separation)
             if pair_list.in_contact[p] == 1 or squared_distance > radii * radii:
                 continue
             distance = math.sqrt(squared_distance)
-            n = scale(1.0 / distance, separation)
+            n, overlap = scale(1.0 / distance, separation), radii - distance
             closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
-            elapsed = min((radii - distance) / closing, dt) if closing > 0.0 else 0.0
-            c = add_contact(grains, contacts, count, span, settings, i, j, clock[TIME] + dt - elapsed)
-            pose, constants = pose_at(grains, contacts, span, c, 0.0), constants_at(contacts, c)
-            radius = contact_radius(radii - distance, radius_root(radii - distance, constants), constants)
-            impulse = damping_of_touch(
-                grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, count[STEPS], dt
-            )
-            share = overlap_share(radii - distance, grains.radius[i], grains.radius[j])
+            formed = clock[TIME] + step.dt - time_since(overlap, closing, step.dt)
+            c = add_contact(grains, contacts, count, step.span, step.settings, i, j, formed)
+            share = overlap_share(overlap, grains.radius[i], grains.radius[j])
             clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], share)
+            pairing = load_pairing(step.settings.pairings, grains.material[i], grains.material[j])
             reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
-            # the step of 0 s at the start of a run finds grains that overlap already
-            gain = speed_gain(radii - distance, closing, reduced, constants, dt) if dt > 0.0 else 0.0
-            if dt > 0.0:
-                pairing = load_pairing(settings.pairings, grains.material[i], grains.material[j])
-                note_impact(clock, closing, reduced, constants.reduced_radius, pairing.modulus)
-            impulse -= reduced * gain + 0.5 * dt * dot(load(contacts.force, c), n)
-            apply_pair_impulse(grains, i, j, n, impulse)
-            lost[FORMING] -= at_touch(constants)
-            contacts.lost[FORMING_ROW, c] -= at_touch(constants)
+            pose, constants = pose_at(grains, contacts, step.span, c, 0.0), constants_at(contacts, c)
+            radius = contact_radius(overlap, radius_root(overlap, constants), constants)
+            touched = Touch(n, Held(pose, radius, constants), overlap, closing, reduced, pairing.modulus)
+            apply_pair_impulse(grains, i, j, n, touch(grains, contacts, lost, clock, c, touched, step))
             pair_list.in_contact[p] = 1
             count[MADE] += 1
 
     @stage("the first contacts")
-    def add_initial_contacts(grains, contacts, count, span, settings, pair, slide, roll, twist):
+    def add_initial_contacts(grains, contacts, count, span, settings, initial):
         """Append contacts with given displacements, before the first step.
 
         Parameters
@@ -309,12 +256,8 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             The box.
         settings : ContactParameters
             Settings of the contact model.
-        pair : ndarray
-            (2, C) grain indices.
-        slide, roll : ndarray
-            (3, C) ζ and ξ [m] in the laboratory frame; their components along n are ignored.
-        twist : ndarray
-            (C,) φ [rad].
+        initial : InitialContacts
+            The contacts.
 
         Returns
         -------
@@ -322,19 +265,19 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             First contact that is stretched beyond breaking, or −1.
         """
         broken = -1
-        for k in range(twist.size):
-            i, j = pair[0, k], pair[1, k]
+        for k in range(initial.twist.size):
+            i, j = initial.pair[0, k], initial.pair[1, k]
             c = add_contact(grains, contacts, count, span, settings, i, j, 0.0)
             separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             distance = math.sqrt(dot(separation, separation))
             n = scale(1.0 / distance, separation)
             r1, r2 = grains.radius[i], grains.radius[j]
-            zeta, xi = load(slide, k), load(roll, k)
+            zeta, xi = load(initial.slide, k), load(initial.roll, k)
             zeta, xi = sub(zeta, scale(dot(zeta, n), n)), sub(xi, scale(dot(xi, n), n))
             n1, n2 = tangential.pointers_for(zeta, xi, n, r1, r2)
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
-            contacts.twist[c] = twist[k]
+            contacts.twist[c] = initial.twist[k]
             write_loads(grains, contacts, span, settings, c)
             if broken < 0 and r1 + r2 - distance < -constants_at(contacts, c).break_overlap:
                 broken = k

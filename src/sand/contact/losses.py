@@ -8,6 +8,7 @@ from ..basics.state import (
     RECORDED,
     ROLLING,
     SLIDING,
+    STIFFNESS,
     TWISTING,
 )
 from ..compiler.jit import loop
@@ -22,6 +23,20 @@ def add_slip_losses(losses, c, energies):
     losses[SLIDING_ROW, c] += energies[0]
     losses[ROLLING_ROW, c] += energies[1]
     losses[TWISTING_ROW, c] += energies[2]
+
+
+@loop
+def record_slip(contacts, lost, c, energies):
+    """Add energies [J] that contact c dissipated by sliding, rolling and twisting to its losses and to the table."""
+    add_slip_losses(contacts.lost, c, energies)
+    add_slip_energies(lost, energies)
+
+
+@loop
+def record_stiffness_loss(contacts, lost, c, energy):
+    """Add the energy [J] that changing stiffnesses removed from the springs of contact c, likewise."""
+    contacts.lost[STIFFNESS_ROW, c] += energy
+    lost[STIFFNESS] += energy
 
 
 @loop

@@ -83,12 +83,36 @@ def contact_load(pose, normal, r1, r2, constants):
         Constants with the present stiffnesses (see `scaled_stiffness`).
     """
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    force = axpy(normal, pose.n, scale(constants.slide_stiffness * along / pose.distance, zeta))
-    rolling_torque = scale(constants.reduced_radius**2 * constants.roll_stiffness, cross(pose.n1, pose.n2))
+    pull = constants.slide_stiffness * along / pose.distance
+    force, torque1, torque = load_on_grain(pose, pose.n2, zeta, pull, normal, r1, constants)
+    return force, torque1, add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
+
+
+@formula
+def load_on_grain(pose, n2, slide, pull, normal, radius, constants):
+    """Force F_n n + `pull` ζ and torque −r k_s n1×ζ − M on a grain, and M = R² k_r n1×n2 + k_t φ n.
+
+    Parameters
+    ----------
+    pose : Pose or WallPose
+        The pose.
+    n2 : tuple
+        Contact pointer of the other grain; n at a wall.
+    slide : tuple
+        ζ [m].
+    pull : float
+        k_s (d·n)/D [N/m]; −k_s at a wall.
+    normal : float
+        F_n [N].
+    radius : float
+        Radius r of the grain [m].
+    constants : ContactConstants
+        Constants with the present stiffnesses.
+    """
+    force = axpy(normal, pose.n, scale(pull, slide))
+    rolling_torque = scale(constants.reduced_radius**2 * constants.roll_stiffness, cross(pose.n1, n2))
     torque = axpy(constants.twist_stiffness * pose.twist, pose.n, rolling_torque)
-    torque1 = sub(scale(-r1 * constants.slide_stiffness, cross(pose.n1, zeta)), torque)
-    torque2 = add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
-    return force, torque1, torque2
+    return force, sub(scale(-radius * constants.slide_stiffness, cross(pose.n1, slide)), torque), torque
 
 
 @formula
@@ -180,6 +204,14 @@ def slip_losses(start, end, left, constants):
 
 
 @formula
+def release_loss(start, end, constants):
+    """As `slip_losses` of all three modes together, of a contact that breaks."""
+    zero = (0.0, 0.0, 0.0)
+    slid, rolled, twisted = slip_losses(start, end, Displacements(end.overlap, zero, zero, 0.0), constants)
+    return slid + rolled + twisted
+
+
+@formula
 def stiffness_loss(start, end, start_constants, end_constants):
     """Energy [J] that changing stiffnesses remove from the springs in a step: ½ (k_start − k_end) q_start·q_end.
 
@@ -197,6 +229,15 @@ def stiffness_loss(start, end, start_constants, end_constants):
     roll = (start_constants.roll_stiffness - end_constants.roll_stiffness) * dot(start.roll, end.roll)
     twist = (start_constants.twist_stiffness - end_constants.twist_stiffness) * start.twist * end.twist
     return 0.5 * (slide + roll + twist)
+
+
+@formula
+def time_since(path, speed, dt):
+    """Time [s] since two surfaces passed a point `path` [m] behind, at most dt; 0 where the speed [m/s] is not above 0.
+
+    For forming the path is the overlap and the speed that of closing, for breaking the path is −δ − δ_c.
+    """
+    return min(path / speed, dt) if speed > 0.0 else 0.0
 
 
 @formula

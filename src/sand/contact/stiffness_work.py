@@ -3,11 +3,11 @@
 import functools
 from collections.abc import Callable
 
-from ..basics.state import CONTACTS, STIFFNESS
+from ..basics.state import CONTACTS
 from ..compiler.jit import rare
 from .constants_table import column_loops
 from .law import ContactLaw
-from .losses import STIFFNESS_ROW
+from .losses import record_stiffness_loss
 from .mechanics import displacements_of, scaled_stiffness, stiffness_loss
 from .update import displacements_before, pose_at
 
@@ -28,8 +28,6 @@ def stiffness_work_loop(law: ContactLaw) -> Callable:
             displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
             at_start = scaled_stiffness(constants, radius_root(start.overlap, constants), True)
             now = scaled_stiffness(constants, radius_root(displacements.overlap, constants), True)
-            energy = stiffness_loss(start, displacements, at_start, now)
-            lost[STIFFNESS] += energy
-            contacts.lost[STIFFNESS_ROW, c] += energy
+            record_stiffness_loss(contacts, lost, c, stiffness_loss(start, displacements, at_start, now))
 
     return log_stiffness_work

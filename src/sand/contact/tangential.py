@@ -44,9 +44,13 @@ def pointers_for(slide, roll, n, r1, r2):
     shared = scale(1.0 / (r1 + r2), slide)
     t1 = axpy(1.0 / r1, roll, shared)
     t2 = sub(scale(1.0 / r2, roll), shared)
-    n1 = axpy(-math.sqrt(max(1.0 - dot(t1, t1), 0.0)), n, t1)
-    n2 = axpy(math.sqrt(max(1.0 - dot(t2, t2), 0.0)), n, t2)
-    return n1, n2
+    return pointer(-1.0, n, t1), pointer(1.0, n, t2)
+
+
+@formula
+def pointer(sign, n, t):
+    """The unit vector ±n√(1−t²) + t, for t perpendicular to n."""
+    return axpy(sign * math.sqrt(max(1.0 - dot(t, t), 0.0)), n, t)
 
 
 @formula

@@ -14,7 +14,7 @@ computes slip for every contact and selects the result where a limit is exceeded
 import functools
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
 from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
 from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
-from .damping import NONE, VARIANTS
+from .damping import NONE, Held, damping_loops, store_loads
 from .law import ContactLaw
 from .losses import add_damping_energies, add_slip_energies, add_slip_losses
 from .mechanics import (
@@ -44,6 +44,7 @@ from .mechanics import (
     slip_losses,
 )
 from .pair_types import pair_type_count
+from .transitions import PENDING_FLAG, SLIPPED_FLAG
 
 BLOCK_SIZE = np.uint64(CONTACTS_PER_BLOCK)
 """Contacts per block."""
@@ -51,10 +52,34 @@ SLIP_FRACTION = 0.1
 """Fraction of a block's contacts flagged in the last step, above which the block uses `_slip_contact`."""
 MIN_REMAINDER = 4
 """Remaining contacts from which a padded SIMD vector is faster than a scalar loop."""
-PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG = 1, 2, 3
-"""Flags of contacts beyond a limit: to be handled by `events.settle_loop`; broken in this step; slipped in this step in
-the pass over contacts.
-"""
+
+
+class ContactStep(NamedTuple):
+    """What is the same for all contacts in a step."""
+
+    span: Any  # box.Span, the box
+    settings: Any  # ContactParameters, settings of the contact model
+    number: int  # of the step, for the noise of damping
+    dt: float  # length of the step [s]
+
+
+class ContactRange(NamedTuple):
+    """A range of contacts, all uint64."""
+
+    first: int  # contacts first … last − 1
+    last: int
+    used: int  # contacts in use; columns beyond it may be computed as padding, and are never read
+    column: int  # column of the constants of the first contact; those of the others follow
+
+
+class Reached(NamedTuple):
+    """A contact at the end of a step, before slip."""
+
+    pose: Any  # mechanics.Pose
+    displacements: Any  # mechanics.Displacements
+    constants: Any  # law.ContactConstants
+    present: Any  # these with the present stiffnesses
+    valid: bool  # whether the contact radius is
 
 
 class ContactSums(NamedTuple):
@@ -150,26 +175,27 @@ def slipped_pose(displacements, pose, r1, r2, constants, reset):
 
 
 @loop
-def _flag_contact(grains, contacts, c, pose, displacements, constants, present, valid, settings, dt):
+def _flag_contact(grains, contacts, c, reached, step):
     """Only flag a contact beyond a limit; returns its pose, the energies [J] dissipated by slip, and its flag."""
-    exceeded = exceeds_limits(displacements, pose.n, constants) | (not valid)
-    return pose, (0.0, 0.0, 0.0), PENDING_FLAG if exceeded else 0
+    exceeded = exceeds_limits(reached.displacements, reached.pose.n, reached.constants) | (not reached.valid)
+    return reached.pose, (0.0, 0.0, 0.0), PENDING_FLAG if exceeded else 0
 
 
 @loop
-def _slip_contact(grains, contacts, c, pose, displacements, constants, present, valid, settings, dt):
+def _slip_contact(grains, contacts, c, reached, step):
     """As `_flag_contact`, but let a contact beyond a limit slip.
 
     Contacts that break, or whose contact radius is not valid, are only flagged.
     """
+    pose, displacements, constants, present, valid = reached
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     r1, r2 = grains.radius[i], grains.radius[j]
     pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
     needs_event = (displacements.overlap < -constants.break_overlap) | (not valid)
     slips = exceeds_limits(displacements, pose.n, constants) & (not needs_event)
     # both cases are computed and selected from at the end: branches and conditional stores prevent vectorisation
-    start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, dt)
-    slipped = slipped_pose(displacements, pose, r1, r2, constants, settings.reset)
+    start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, step.dt)
+    slipped = slipped_pose(displacements, pose, r1, r2, constants, step.settings.reset)
     body1 = turned_back(load4(grains.orientation, i), slipped.n1)
     body2 = turned_back(load4(grains.orientation, j), slipped.n2)
     n1, n2 = _select(slips, slipped.n1, pose.n1), _select(slips, slipped.n2, pose.n2)
@@ -187,33 +213,23 @@ def _slip_contact(grains, contacts, c, pose, displacements, constants, present, 
 def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) -> Callable:
     """The loop that updates a range of contacts, for a contact law, a rule for limits and a variant of damping.
 
-    The rule is `_flag_contact` or `_slip_contact`, the variant a key of `damping.VARIANTS`.
+    The rule is `_flag_contact` or `_slip_contact`, the variant of `damping`: NONE, DASHPOTS or THERMAL.
     """
     load_constants, radius_root, normal_force = column_loops(law).load, law.fast_radius_root, law.force
-    contact_radius, damp = law.contact_radius, VARIANTS[damping].update
+    contact_radius, damp = law.contact_radius, damping_loops(damping).update
 
     @loop
-    def update_contacts(grains, contacts, first, last, used, column, span, settings, number, dt):
-        """Update twist, loads and flag of the contacts first … last − 1.  The loop has no branches, so it vectorises.
+    def update_contacts(grains, contacts, part, step):
+        """Update twist, loads and flag of a range of contacts.  The loop has no branches, so it vectorises.
 
         Parameters
         ----------
         grains, contacts : GrainArrays, ContactArrays
             Arrays of grains and contacts.
-        first, last : uint64
-            Range of contacts.
-        used : uint64
-            Number of contacts in use.  Columns beyond it may be computed as padding; they are never read.
-        column : uint64
-            Column of the constants of the first contact; those of the others follow.
-        span : Span
-            The box.
-        settings : ContactParameters
-            Settings of the contact model.
-        number : int
-            Number of the step, for the noise of damping.
-        dt : float
-            Time step [s].
+        part : ContactRange
+            The range.
+        step : ContactStep
+            The step.
 
         Returns
         -------
@@ -224,38 +240,33 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
         slid = rolled = twisted = 0.0
         damped1 = damped2 = damped3 = damped4 = 0.0
         deepest = float_bits(0.0)  # the bits of a negative number are below 0
-        for k in range(last - first):
-            c = first + k
+        for k in range(part.last - part.first):
+            c = part.first + k
             i, j = contacts.pair[0, c], contacts.pair[1, c]
-            constants = load_constants(contacts.constants, column + k)
+            constants = load_constants(contacts.constants, part.column + k)
             r1, r2 = grains.radius[i], grains.radius[j]
-            pose = pose_at_step_end(grains, contacts, span, c, dt)
+            pose = pose_at_step_end(grains, contacts, step.span, c, step.dt)
             overlap = r1 + r2 - pose.distance
             y, valid = radius_root(overlap, constants)
-            present = scaled_stiffness(constants, y, settings.follow)
+            present = scaled_stiffness(constants, y, step.settings.follow)
             displacements = displacements_of(pose, overlap, r1, r2, constants)
-            pose, lost, flag = handle_limits(
-                grains, contacts, c, pose, displacements, constants, present, valid, settings, dt
-            )
+            reached = Reached(pose, displacements, constants, present, valid)
+            pose, lost, flag = handle_limits(grains, contacts, c, reached, step)
             normal = normal_force(overlap, y, constants)
             # a flagged contact is damped by events.settle_loop; padding columns hold no grains
-            active = (flag != PENDING_FLAG) & (c < used)
-            loads, dissipated = damp(
-                grains, contacts, c, pose, contact_radius(overlap, y, constants), constants,
-                contact_load(pose, normal, r1, r2, present), active, settings, number, dt
-            )  # fmt: skip
+            active = (flag != PENDING_FLAG) & (c < part.used)
+            radius, springs = contact_radius(overlap, y, constants), contact_load(pose, normal, r1, r2, present)
+            loads, dissipated = damp(grains, contacts, c, Held(pose, radius, constants), springs, active, step)
             damped1 += dissipated[0]
             damped2 += dissipated[1]
             damped3 += dissipated[2]
             damped4 += dissipated[3]
             contacts.twist[c] = pose.twist
-            put(contacts.force, c, loads[0])
-            put(contacts.torque1, c, loads[1])
-            put(contacts.torque2, c, loads[2])
+            store_loads(contacts, c, loads)
             contacts.flag[c] = flag
-            pending += 1 if (flag == PENDING_FLAG) & (c < used) else 0
+            pending += 1 if (flag == PENDING_FLAG) & (c < part.used) else 0
             slipped += 1 if flag == SLIPPED_FLAG else 0
-            deepest = max(deepest, float_bits(overlap_share(overlap, r1, r2) if c < used else 0.0))
+            deepest = max(deepest, float_bits(overlap_share(overlap, r1, r2) if c < part.used else 0.0))
             slid += lost[0]
             rolled += lost[1]
             twisted += lost[2]
@@ -284,8 +295,8 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
     slip_contacts = contact_loop(law, _slip_contact, damping)
 
     @loop
-    def contact_pass(grains, contacts, first, last, span, settings, number, dt):
-        """Update the contacts first … last − 1 (uint64); arguments and result as for `contact_loop`.
+    def contact_pass(grains, contacts, first, last, step):
+        """Update the contacts first … last − 1 (uint64) in a step (`ContactStep`); result as for `contact_loop`.
 
         With stiffnesses that follow a(δ) all contacts beyond a limit stay flagged: the work of the stiffness change
         must be logged before they slip.
@@ -299,15 +310,15 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
             slipped_before = 0.0
             for k in range(end - begin):
                 slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
-            if slipped_before > SLIP_FRACTION * (end - begin) and not settings.follow:
-                part = slip_contacts(grains, contacts, begin, end, end, column, span, settings, number, dt)
+            if slipped_before > SLIP_FRACTION * (end - begin) and not step.settings.follow:
+                part = slip_contacts(grains, contacts, ContactRange(begin, end, end, column), step)
                 slipped += part.slipped
                 slid += part.slid
                 rolled += part.rolled
                 twisted += part.twisted
             else:
                 padded = padded_contact_count(contacts, end)
-                part = flag_contacts(grains, contacts, begin, padded, end, column, span, settings, number, dt)
+                part = flag_contacts(grains, contacts, ContactRange(begin, padded, end, column), step)
             pending += part.pending
             damped1 += part.damped_normal
             damped2 += part.damped_sliding
@@ -366,10 +377,7 @@ def single_contact_loop(law: ContactLaw) -> Callable:
         overlap = r1 + r2 - pose.distance
         y = radius_root(overlap, constants)
         present = scaled_stiffness(constants, y, settings.follow)
-        force, torque1, torque2 = contact_load(pose, normal_force(overlap, y, constants), r1, r2, present)
-        put(contacts.force, c, force)
-        put(contacts.torque1, c, torque1)
-        put(contacts.torque2, c, torque2)
+        store_loads(contacts, c, contact_load(pose, normal_force(overlap, y, constants), r1, r2, present))
 
     return write_loads
 

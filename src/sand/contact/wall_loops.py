@@ -2,8 +2,8 @@
 
 These contacts are few.  They are kept in a table of their own, `ContactArrays` with the grain in pair[0], the wall in
 pair[1], and in `pointer2` the anchor relative to the point of the wall [m], laboratory frame; `torque2` and the lists
-per grain are not used.  One loop does what `update`, `events` and `damping` do for contacts of grains, with the same
-formulas and the same energies.
+per grain are not used.  Forming, slip, breaking, dashpots and losses are those of contacts of grains (`transitions`,
+`mechanics`, `damping`): these loops load what they take, and apply the impulses.
 """
 
 import functools
@@ -14,55 +14,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.box import nearest_image
-from ..basics.state import BREAKING, FORMING, LARGEST_OVERLAP, STEP, STEPS, STIFFNESS, TIME, WALL_CONTACTS
-from ..compiler.jit import loop, rare
+from ..basics.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME, WALL_CONTACTS
+from ..compiler.jit import caller, loop, rare
 from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, scale, sub
 from .constants_table import FASTEST_MODE, column_loops, load_pairing
-from .damping import (
-    FORCE,
-    NO_LOAD,
-    NONE,
-    SPIN,
-    THERMAL,
-    TORQUE,
-    VELOCITY,
-    DampingLoad,
-    Motion,
-    damping_load,
-    damping_losses,
-    dashpots_of,
-    extrapolated,
-    load_rows,
-    loads_on_grains,
-    relative_motion,
-    store_rows,
-    stored_load,
-    thermal_load,
-    unit_deviates,
-)
+from .damping import NONE, Held, Surfaces, damping_loops, relative_motion, store_loads
 from .events import compact_contacts
-from .impact import note_impact
 from .law import ContactLaw, wall_constants
-from .losses import DAMPING_ROW, FORMING_ROW, STIFFNESS_ROW, add_damping_energies, add_slip_energies, add_slip_losses
+from .losses import record_slip, record_stiffness_loss
 from .mechanics import (
-    Displacements,
     after_slip,
-    contact_speed_gain,
     exceeds_limits,
+    release_loss,
     scaled_stiffness,
     slip_losses,
     stiffness_loss,
     stored_energies,
+    time_since,
 )
-from .update import BROKEN_FLAG
+from .transitions import ZERO, Break, Touch, breaking_loop, clear_contact, touch_loop
+from .update import ContactStep
 from .wall_mechanics import WallPose, wall_displacements, wall_load, wall_pointers
 
 FULL = -1
 """Value of `WallLoops.update` if the table of contacts is too small; nothing has changed then."""
-ZERO = (0.0, 0.0, 0.0)
 LAST_ID = np.uint32(0xFFFFFFFF)
 """The walls count down from this number in the keys of random numbers, which grains use from 0 up."""
+
+
+WALL_PARTS = ("grains", "walls", "wall_contacts", "clock", "count", "lost", "span", "settings")
+"""Parts that the loops over contacts with walls use, as attributes of `s`."""
 
 
 class WallNumbers(NamedTuple):
@@ -76,8 +58,8 @@ class WallNumbers(NamedTuple):
 class WallLoops(NamedTuple):
     """Loops over contacts with walls, for one contact law and variant of damping."""
 
-    update: Callable  # walls and contacts at the end of a step: returns FULL or the number of contacts
-    energies: Callable  # adds the energies [J] of the four modes to an array
+    update: Callable  # (s, numbers): walls and contacts at the end of a step; returns FULL or the number of contacts
+    energies: Callable  # (s, out) adds the energies [J] of the four modes to an array
     constants_of: Callable  # ContactConstants of a grain and a wall
 
 
@@ -87,15 +69,15 @@ def wall_height(grains, walls, g, w):
     return dot(sub(load(grains.position, g), load(walls.position, w)), load(walls.normal, w))
 
 
-@loop
-def _wall_pose(grains, walls, contacts, span, c, twist):
+@caller
+def _wall_pose(s, c, twist):
     """Pose of contact c at the present positions, with the given twist [rad]."""
-    g, w = contacts.pair[0, c], contacts.pair[1, c]
-    n = load(walls.normal, w)
-    from_anchor = sub(sub(load(grains.position, g), load(walls.position, w)), load(contacts.pointer2, c))
-    offset = across(nearest_image(from_anchor, span), n)
-    n1 = turned(load4(grains.orientation, g), load(contacts.pointer1, c))
-    return WallPose(n, wall_height(grains, walls, g, w), offset, n1, twist)
+    g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
+    n = load(s.walls.normal, w)
+    from_anchor = sub(sub(load(s.grains.position, g), load(s.walls.position, w)), load(s.wall_contacts.pointer2, c))
+    offset = across(nearest_image(from_anchor, s.span), n)
+    n1 = turned(load4(s.grains.orientation, g), load(s.wall_contacts.pointer1, c))
+    return WallPose(n, wall_height(s.grains, s.walls, g, w), offset, n1, twist)
 
 
 @loop
@@ -117,18 +99,25 @@ def _at_step_start(pose, velocity, spin, twist, dt):
 
 
 @loop
-def _push_apart(grains, walls, numbers, g, w, impulse):
-    """Apply an impulse [N s] along the normal to grain g, and the opposite one to wall w."""
-    n = load(walls.normal, w)
-    accrue(grains.velocity, g, scale(impulse / grains.mass[g], n))
-    accrue(walls.velocity, w, scale(-impulse / numbers.mass[w], n))
-    accrue(walls.impulse, w, scale(-impulse, n))
+def surfaces_at_wall(bodies, contacts, c, pose):
+    """The two sides of contact c, for `bodies` = (grains, walls): `damping.surfaces_of_pair` for r2 → ∞."""
+    grains, walls = bodies
+    g, w = contacts.pair[0, c], contacts.pair[1, c]
+    velocity, spin = _relative_velocity(grains, walls, g, w), load(grains.spin, g)
+    arm = scale(grains.radius[g], pose.n)
+    motion = relative_motion(arm, velocity, spin, spin, ZERO)
+    ids = grains.id[g], LAST_ID - np.uint32(w)
+    return Surfaces((grains.radius[g], 0.0), velocity, arm, ZERO, motion, ids)
 
 
-@loop
-def _relative_motion(radius, n, velocity, spin):
-    """U = v − v_wall − r1 ω×n and Ω = ω: `damping.relative_motion` for r2 → ∞."""
-    return relative_motion(scale(radius, n), velocity, spin, spin, ZERO)
+@caller
+def _push_apart(s, numbers, c, impulse):
+    """Apply an impulse [N s] along the normal to the grain of contact c, and the opposite one to the wall."""
+    g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
+    n = load(s.walls.normal, w)
+    accrue(s.grains.velocity, g, scale(impulse / s.grains.mass[g], n))
+    accrue(s.walls.velocity, w, scale(-impulse / numbers.mass[w], n))
+    accrue(s.walls.impulse, w, scale(-impulse, n))
 
 
 @loop
@@ -200,182 +189,111 @@ def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
     """The loops over contacts with walls, for one contact law and variant of damping."""
     columns, of_materials = column_loops(law), wall_constants(law)
     constants_at, store_constants = columns.at, columns.store
-    radius_root, normal_force, normal_energy = law.radius_root, law.force, law.energy
-    stiffness, contact_radius, at_touch, at_break = law.stiffness, law.contact_radius, law.at_touch, law.at_break
-    damped, thermal = damping != NONE, damping == THERMAL
+    radius_root, normal_force, normal_energy, contact_radius = (
+        law.radius_root,
+        law.force,
+        law.energy,
+        law.contact_radius,
+    )
+    dashpots = damping_loops(damping, surfaces_at_wall)
+    break_contact, touch, damp = breaking_loop(law, dashpots), touch_loop(law, dashpots), dashpots.single
 
     @loop
     def constants_of(grains, numbers, g, w):
         pairing = load_pairing(numbers.pairings, grains.material[g], w)
         return of_materials(pairing, grains.radius[g], grains.mass[g], numbers.mass[w])
 
-    @loop
-    def dashpot_load(grains, walls, contacts, c, pose, constants, settings, number, dt):
-        """Update and store the dashpots of contact c; their loads, and the energies [J] dissipated by the modes."""
-        g, w = contacts.pair[0, c], contacts.pair[1, c]
-        radius, spin = grains.radius[g], load(grains.spin, g)
-        velocity = _relative_velocity(grains, walls, g, w)
-        motion = _relative_motion(radius, pose.n, velocity, spin)
-        before = Motion(load_rows(contacts.damping, VELOCITY, c), load_rows(contacts.damping, SPIN, c))
-        start, overlap = stored_load(contacts, c), radius - pose.height
-        dashpots = dashpots_of(contact_radius(overlap, radius_root(overlap, constants), constants), constants)
-        end = damping_load(extrapolated(before, motion, dt), pose.n, dashpots)
-        if thermal:
-            deviates = unit_deviates(settings.seed, number, grains.id[g], LAST_ID - np.uint32(w))
-            noise = thermal_load(dashpots, pose.n, deviates, settings.bath, dt)
-            end = DampingLoad(add(end.force, noise.force), add(end.torque, noise.torque))
-        store_rows(contacts.damping, VELOCITY, c, motion.velocity)
-        store_rows(contacts.damping, SPIN, c, motion.spin)
-        store_rows(contacts.damping, FORCE, c, end.force)
-        store_rows(contacts.damping, TORQUE, c, end.torque)
-        return end, damping_losses(start, end, pose.n, velocity, motion, ZERO, dt)
-
-    @loop
-    def write_loads(grains, contacts, c, pose, slide, normal, end, present):
-        """Store the loads of contact c with those of its dashpots."""
-        radius = grains.radius[contacts.pair[0, c]]
-        force, torque = wall_load(pose, slide, normal, radius, present)
-        more, more_torque, _ = loads_on_grains(end, scale(radius, pose.n), 1.0, 0.0)
-        put(contacts.force, c, add(force, more))
-        put(contacts.torque1, c, add(torque, more_torque))
-
     @rare
-    def break_contact(grains, walls, contacts, lost, numbers, c, pose, velocity, constants, dt):
-        """As `events.settle_loop`: the energy of a contact that broke within the step, and the impulse since then."""
-        g, w = contacts.pair[0, c], contacts.pair[1, c]
-        opening, radius = dot(velocity, pose.n), grains.radius[g]
-        stretched = pose.height - radius - constants.break_overlap
-        elapsed = min(stretched / opening, dt) if opening > 0.0 else 0.0
-        energy, force = at_break(constants)
-        lost[BREAKING] += energy
-        if damped:
-            start, motion = stored_load(contacts, c), _relative_motion(radius, pose.n, velocity, load(grains.spin, g))
-            losses = damping_losses(start, NO_LOAD, pose.n, velocity, motion, ZERO, dt)
-            normal = dot(start.force, pose.n)
-            add_damping_energies(lost, (-normal * opening * (dt - elapsed), losses[1], losses[2], losses[3]))
-            force += normal
-        _push_apart(grains, walls, numbers, g, w, force * (0.5 * dt - elapsed))
-        contacts.flag[c] = BROKEN_FLAG
-        put(contacts.force, c, ZERO)
-        put(contacts.torque1, c, ZERO)
-
-    @rare
-    def update_contact(grains, walls, contacts, count, lost, span, settings, numbers, c, dt):
+    def update_contact(s, numbers, c, step):
         """Update contact c at the end of a step: slip or break it, and store its loads.  Returns 1 if it broke."""
+        contacts, bodies, dt = s.wall_contacts, (s.grains, s.walls), step.dt
         g, w = contacts.pair[0, c], contacts.pair[1, c]
-        radius, spin, constants = grains.radius[g], load(grains.spin, g), constants_at(contacts, c)
-        velocity = _relative_velocity(grains, walls, g, w)
-        twist = contacts.twist[c]
-        pose = _wall_pose(grains, walls, contacts, span, c, twist + dt * dot(spin, load(walls.normal, w)))
-        found = wall_displacements(pose, radius)
+        constants, twist = constants_at(contacts, c), contacts.twist[c]
+        radius, spin, velocity = s.grains.radius[g], load(s.grains.spin, g), _relative_velocity(s.grains, s.walls, g, w)
+        pose = _wall_pose(s, c, twist + dt * dot(spin, load(s.walls.normal, w)))
+        reached = wall_displacements(pose, radius)
         start = wall_displacements(_at_step_start(pose, velocity, spin, twist, dt), radius)
-        y = radius_root(found.overlap, constants)
-        present = scaled_stiffness(constants, y, settings.follow)
-        if settings.follow:
+        overlap = reached.overlap
+        y = radius_root(overlap, constants)
+        present = scaled_stiffness(constants, y, step.settings.follow)
+        if step.settings.follow:
             earlier = scaled_stiffness(constants, radius_root(start.overlap, constants), True)
-            energy = stiffness_loss(start, found, earlier, present)
-            lost[STIFFNESS] += energy
-            contacts.lost[STIFFNESS_ROW, c] += energy
-        if found.overlap < -constants.break_overlap:
-            slid, rolled, twisted = slip_losses(start, found, Displacements(found.overlap, ZERO, ZERO, 0.0), present)
-            lost[BREAKING] += slid + rolled + twisted
-            break_contact(grains, walls, contacts, lost, numbers, c, pose, velocity, constants, dt)
+            record_stiffness_loss(contacts, s.lost, c, stiffness_loss(start, reached, earlier, present))
+        if overlap < -constants.break_overlap:
+            s.lost[BREAKING] += release_loss(start, reached, present)
+            broken = Break(pose, -constants.break_overlap - overlap, dot(velocity, pose.n), constants)
+            _push_apart(s, numbers, c, break_contact(bodies, contacts, s.lost, c, broken, dt))
             return 1
-        if exceeds_limits(found, pose.n, constants):
-            target = after_slip(found, pose.n, constants, settings.reset)
+        if exceeds_limits(reached, pose.n, constants):
+            target = after_slip(reached, pose.n, constants, step.settings.reset)
             n1, offset = wall_pointers(target.slide, target.roll, pose.n, radius)
-            put(contacts.pointer1, c, turned_back(load4(grains.orientation, g), n1))
+            put(contacts.pointer1, c, turned_back(load4(s.grains.orientation, g), n1))
             accrue(contacts.pointer2, c, sub(pose.offset, offset))
             pose = WallPose(pose.n, pose.height, offset, n1, target.twist)
             left = wall_displacements(pose, radius)
-            slipped = slip_losses(start, found, left, present)
-            add_slip_losses(contacts.lost, c, slipped)
-            add_slip_energies(lost, slipped)
-            found = left
+            record_slip(contacts, s.lost, c, slip_losses(start, reached, left, present))
+            reached = left
         contacts.twist[c] = pose.twist
-        end = NO_LOAD
-        if damped:
-            end, losses = dashpot_load(grains, walls, contacts, c, pose, constants, settings, count[STEPS], dt)
-            contacts.lost[DAMPING_ROW, c] += losses[0] + losses[1] + losses[2] + losses[3]
-            add_damping_energies(lost, losses)
-        write_loads(grains, contacts, c, pose, found.slide, normal_force(found.overlap, y, constants), end, present)
+        normal = normal_force(overlap, y, constants)
+        store_loads(contacts, c, wall_load(pose, reached.slide, normal, radius, present))
+        damp(bodies, contacts, s.lost, c, Held(pose, contact_radius(overlap, y, constants), constants), step)
         return 0
 
     @rare
-    def form_contact(grains, walls, contacts, clock, count, lost, settings, numbers, g, w, dt):
-        """As `events.forming_loops`: a contact that formed within the step, its energy −U(0), and the impulse."""
-        c = count[WALL_CONTACTS]
-        count[WALL_CONTACTS] = c + 1
-        n, radius, constants = load(walls.normal, w), grains.radius[g], constants_of(grains, numbers, g, w)
-        from_point = sub(load(grains.position, g), load(walls.position, w))
-        overlap, velocity = radius - dot(from_point, n), _relative_velocity(grains, walls, g, w)
-        closing = -dot(velocity, n)
-        elapsed = min(overlap / closing, dt) if closing > 0.0 else 0.0
+    def form_contact(s, numbers, g, w, step):
+        """Form the contact of a grain and a wall that began to touch within the step."""
+        contacts, c = s.wall_contacts, s.count[WALL_CONTACTS]
+        s.count[WALL_CONTACTS] = c + 1
         contacts.pair[0, c], contacts.pair[1, c] = g, w
-        put(contacts.pointer1, c, turned_back(load4(grains.orientation, g), scale(-1.0, n)))
+        n, constants = load(s.walls.normal, w), constants_of(s.grains, numbers, g, w)
+        from_point = sub(load(s.grains.position, g), load(s.walls.position, w))
+        overlap = s.grains.radius[g] - dot(from_point, n)
+        closing = -dot(_relative_velocity(s.grains, s.walls, g, w), n)
+        clear_contact(contacts, c, s.clock[TIME] + step.dt - time_since(overlap, closing, step.dt))
+        put(contacts.pointer1, c, turned_back(load4(s.grains.orientation, g), scale(-1.0, n)))
         put(contacts.pointer2, c, across(from_point, n))
-        contacts.twist[c] = 0.0
-        contacts.formed[c] = clock[TIME] + dt - elapsed
-        contacts.flag[c] = contacts.every_step[c] = 0
-        for row in range(contacts.lost.shape[0]):
-            contacts.lost[row, c] = 0.0
         store_constants(contacts.constants, c, constants)
         y = radius_root(overlap, constants)
-        force = normal_force(overlap, y, constants)
-        pose, end, impulse = WallPose(n, radius - overlap, ZERO, scale(-1.0, n), 0.0), NO_LOAD, 0.0
-        if damped:
-            motion = _relative_motion(radius, n, velocity, load(grains.spin, g))
-            store_rows(contacts.damping, VELOCITY, c, motion.velocity)
-            store_rows(contacts.damping, SPIN, c, motion.spin)
-            store_rows(contacts.damping, FORCE, c, ZERO)
-            store_rows(contacts.damping, TORQUE, c, ZERO)
-            end, losses = dashpot_load(grains, walls, contacts, c, pose, constants, settings, count[STEPS], dt)
-            # along n the force acts since first touch, otherwise for half a step in the velocity Verlet kick
-            impulse = dot(end.force, n) * elapsed
-            contacts.lost[DAMPING_ROW, c] += impulse * closing + losses[1] + losses[2] + losses[3]
-            add_damping_energies(lost, (impulse * closing, losses[1], losses[2], losses[3]))
-        write_loads(grains, contacts, c, pose, ZERO, force, end, scaled_stiffness(constants, y, settings.follow))
-        if dt > 0.0:
-            reduced = 1.0 / (1.0 / grains.mass[g] + 1.0 / numbers.mass[w])
-            pairing = load_pairing(numbers.pairings, grains.material[g], w)
-            note_impact(clock, closing, reduced, constants.reduced_radius, pairing.modulus)
-            drop = at_touch(constants) - normal_energy(overlap, y, constants)
-            gain = contact_speed_gain(drop, force, stiffness(overlap, y, constants), closing, reduced, dt)
-            impulse -= reduced * gain + 0.5 * dt * dot(load(contacts.force, c), n)
-        _push_apart(grains, walls, numbers, g, w, impulse)
-        lost[FORMING] -= at_touch(constants)
-        contacts.lost[FORMING_ROW, c] -= at_touch(constants)
+        store_loads(contacts, c, (scale(normal_force(overlap, y, constants), n), ZERO, ZERO))
+        pose = WallPose(n, s.grains.radius[g] - overlap, ZERO, scale(-1.0, n), 0.0)
+        held = Held(pose, contact_radius(overlap, y, constants), constants)
+        pairing = load_pairing(numbers.pairings, s.grains.material[g], w)
+        reduced = 1.0 / (1.0 / s.grains.mass[g] + 1.0 / numbers.mass[w])
+        touched = Touch(n, held, overlap, closing, reduced, pairing.modulus)
+        _push_apart(s, numbers, c, touch((s.grains, s.walls), contacts, s.lost, s.clock, c, touched, step))
 
     @rare
-    def update(grains, walls, contacts, clock, count, lost, span, settings, numbers):
+    def update(s, numbers):
         """Move the walls, and update their contacts at the end of a step; returns FULL or the number of contacts."""
-        dt = clock[STEP]
-        formed = count_new_wall_contacts(grains, walls, contacts, count, numbers, dt)
+        grains, walls, contacts, count = s.grains, s.walls, s.wall_contacts, s.count
+        step = ContactStep(s.span, s.settings, count[STEPS], s.clock[STEP])
+        formed = count_new_wall_contacts(grains, walls, contacts, count, numbers, step.dt)
         if count[WALL_CONTACTS] + formed > contacts.pair.shape[1]:
             return FULL
-        _start_walls(walls, numbers, dt)
+        _start_walls(walls, numbers, step.dt)
         broken = 0
         for c in range(count[WALL_CONTACTS]):
-            broken += update_contact(grains, walls, contacts, count, lost, span, settings, numbers, c, dt)
+            broken += update_contact(s, numbers, c, step)
         for w in range(walls.work.size):
             for g in range(grains.mass.size if formed > 0 else 0):
                 touches = walls.touching[w, g] == 0 and wall_height(grains, walls, g, w) <= grains.radius[g]
                 if touches and count[WALL_CONTACTS] < contacts.pair.shape[1]:
-                    form_contact(grains, walls, contacts, clock, count, lost, settings, numbers, g, w, dt)
-        _finish_walls(walls, contacts, count, numbers, dt)
-        _note_overlaps(grains, walls, contacts, clock, count)
+                    form_contact(s, numbers, g, w, step)
+        _finish_walls(walls, contacts, count, numbers, step.dt)
+        _note_overlaps(grains, walls, contacts, s.clock, count)
         if broken > 0:
             count[WALL_CONTACTS] = compact_contacts(contacts, count[WALL_CONTACTS])
         return count[WALL_CONTACTS]
 
-    @loop
-    def add_energies(grains, walls, contacts, count, span, settings, out):
+    @caller
+    def add_energies(s, out):
         """Add the energies [J] of the four modes of all contacts with walls to `out`."""
-        for c in range(count[WALL_CONTACTS]):
-            constants, radius = constants_at(contacts, c), grains.radius[contacts.pair[0, c]]
-            found = wall_displacements(_wall_pose(grains, walls, contacts, span, c, contacts.twist[c]), radius)
+        contacts = s.wall_contacts
+        for c in range(s.count[WALL_CONTACTS]):
+            constants, radius = constants_at(contacts, c), s.grains.radius[contacts.pair[0, c]]
+            found = wall_displacements(_wall_pose(s, c, contacts.twist[c]), radius)
             y = radius_root(found.overlap, constants)
-            present = scaled_stiffness(constants, y, settings.follow)
+            present = scaled_stiffness(constants, y, s.settings.follow)
             stored = stored_energies(found, normal_energy(found.overlap, y, constants), present)
             for mode in range(4):
                 out[mode] += stored[mode]
@@ -405,20 +323,22 @@ def wall_step_loop(law: ContactLaw) -> Callable:
     constants_of, constants_at = wall_loops(law).constants_of, column_loops(law).at
 
     @rare
-    def wall_step(grains, walls, contacts, count, per_period, numbers, longest, impact, closing_fraction):
+    def wall_step(s, numbers, closing_fraction):
         """Longest step [s] that contacts with walls allow, and that grains approaching a wall allow.
 
         The rules are those of pairs of grains (`integrate.step_control.pair_step`): the fastest mode is resolved by
-        `per_period` steps, an impact by steps of at most `impact` δ_c, and in one step a grain closes at most
-        `closing_fraction` of its gap.
+        `settings.per_period` steps, an impact by steps of at most `criteria.impact` δ_c, and in one step a grain closes
+        at most `closing_fraction` of its gap.
 
         Returns
         -------
         tuple
-            Step of contacts and step of approach [s], at most `longest`, and a grain whose centre is behind a wall
-            that it touches, or −1.
+            Step of contacts and step of approach [s], at most `criteria.longest`, and a grain whose centre is behind a
+            wall that it touches, or −1.
         """
-        bound = approach = longest
+        grains, walls, contacts, count = s.grains, s.walls, s.wall_contacts, s.count
+        impact, per_period = s.criteria.impact, s.settings.per_period
+        bound = approach = s.criteria.longest
         behind = -1
         for w in range(walls.work.size):
             walls.contacts[w] = 0.0

@@ -4,12 +4,12 @@ R = r1 and n2 = n, the normal of the wall towards the grains.  The contact point
 anchor, that is fixed to the wall.  Limits, slip, losses and stored energies are those of `mechanics`.
 """
 
-import math
 from typing import NamedTuple
 
 from ..compiler.jit import formula
-from ..numerics.vec import across, add, axpy, cross, dot, scale, sub
-from .mechanics import Displacements
+from ..numerics.vec import across, axpy, scale, sub
+from . import tangential
+from .mechanics import Displacements, load_on_grain
 
 
 class WallPose(NamedTuple):
@@ -29,12 +29,12 @@ def wall_displacements(pose, radius):
     From `tangential.sliding` with x2 = x1 − D n and A = x2 + r2 n2: ζ = (r1 n1 − r2 n2)_∥ = r1 (n1)_∥ − (A − x1)_∥.
     """
     slide = axpy(radius, across(pose.n1, pose.n), pose.offset)
-    return Displacements(radius - pose.height, slide, scale(radius, add(pose.n1, pose.n)), pose.twist)
+    return Displacements(radius - pose.height, slide, tangential.rolling(pose.n1, pose.n, radius), pose.twist)
 
 
 @formula
 def wall_load(pose, slide, normal, radius, constants):
-    """Force on the grain [N], its opposite on the wall, and torque on the grain [N m].
+    """Force on the grain [N], its opposite on the wall, torque on the grain [N m], and none on the wall.
 
         F = F_n n − k_s ζ
         M = −r1 k_s n1×ζ − r1² k_r n1×n − k_t φ n
@@ -54,10 +54,8 @@ def wall_load(pose, slide, normal, radius, constants):
     constants : ContactConstants
         Constants with the present stiffnesses.
     """
-    force = axpy(normal, pose.n, scale(-constants.slide_stiffness, slide))
-    roll = scale(radius * radius * constants.roll_stiffness, cross(pose.n1, pose.n))
-    torque = axpy(constants.twist_stiffness * pose.twist, pose.n, roll)
-    return force, sub(scale(-radius * constants.slide_stiffness, cross(pose.n1, slide)), torque)
+    force, torque, _ = load_on_grain(pose, pose.n, slide, -constants.slide_stiffness, normal, radius, constants)
+    return force, torque, (0.0, 0.0, 0.0)
 
 
 @formula
@@ -67,4 +65,4 @@ def wall_pointers(slide, roll, n, radius):
     The limit of `tangential.pointers_for`: t1 = ξ/r1, n1 = −n √(1 − t1²) + t1, (x − A)_∥ = ζ − ξ.
     """
     t1 = scale(1.0 / radius, roll)
-    return axpy(-math.sqrt(max(1.0 - dot(t1, t1), 0.0)), n, t1), sub(slide, roll)
+    return tangential.pointer(-1.0, n, t1), sub(slide, roll)

@@ -53,7 +53,7 @@ from ..compiler.program import Program
 from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import THERMAL
-from ..contact.events import forming_loops
+from ..contact.events import InitialContacts, forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies, wall_energies_stage
@@ -612,11 +612,11 @@ class Engine:
         state = self.state
         if state.contacts.pair.shape[1] < len(pair):
             state.grow_contacts(len(pair))
-        given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
-        pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
+        vectors = (np.ascontiguousarray(array.T, dtype=np.float64) for array in (slide, roll, twist))
+        initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
         arrays, settings = (state.grains.arrays, state.contacts, state.count), self.parameters.settings
         with self._held():
-            return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
+            return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, initial)
 
     def losses(self) -> np.ndarray:
         """Losses [J] up to the time of `state`, in the order of `state.state.LOST`.

@@ -16,7 +16,8 @@ import numpy as np
 from ..basics.box import nearest_image
 from ..basics.state import CONTACTS
 from ..compiler.jit import loop
-from ..contact.update import BROKEN_FLAG, padded_contact_count
+from ..contact.transitions import BROKEN_FLAG
+from ..contact.update import padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
 
 CONSTANT_PART_CHANGE = 0.5

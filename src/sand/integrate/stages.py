@@ -19,12 +19,12 @@ from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
-from ..contact.update import contact_pass_loop, contact_step, store_contact_sums
+from ..contact.update import ContactStep, contact_pass_loop, contact_step, store_contact_sums
 from ..contact.wall_loops import FULL as WALLS_FULL
-from ..contact.wall_loops import add_wall_loads, wall_loops, wall_step_loop
+from ..contact.wall_loops import WALL_PARTS, add_wall_loads, wall_loops, wall_step_loop
 from ..forces.gas.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
-from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
+from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
 from .motion import UNBOUNDED, drift_for, gather_and_kick
@@ -105,16 +105,19 @@ def pair_list_stage(law: ContactLaw, celled: bool) -> Stage:
     """Rebuild the pair list of a contact law, with cells or without; returns a `Stop`."""
     build_pair_list = pair_list_loop(law, celled)
 
-    @stage("the list of contact candidates", seconds=1.0)
-    def pair_list_of_law(grains, contacts, pair_list, long_range, count, span, settings, search, criteria):
-        found = build_pair_list(
-            grains, contacts, pair_list, long_range, count, span, criteria.pair_gap, settings, search
-        )
+    @stage(
+        "the list of contact candidates",
+        seconds=1.0,
+        parts=("grains", "contacts", "pair_list", "long_range", "count", "span", "settings", "search", "criteria"),
+    )
+    def pair_list_of_law(s):
+        how = PairSearch(s.span, s.criteria.pair_gap, s.settings, s.search)
+        found = build_pair_list(s.grains, s.contacts, s.pair_list, s.long_range, s.count, how)
         if found == FULL:
             return Stop.PAIRS_FULL.value
         if found == ROW_FULL:
             return Stop.LIST_FULL.value
-        update_safe_speed(pair_list, count)
+        update_safe_speed(s.pair_list, s.count)
         return Stop.NONE.value
 
     return pair_list_of_law
@@ -136,9 +139,8 @@ def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Sta
     def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):
         first = block * CONTACTS_PER_BLOCK
         last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
-        found = contact_pass(
-            grains, contacts, np.uint64(first), np.uint64(last), span, settings, count[STEPS], clock[STEP]
-        )
+        step = ContactStep(span, settings, count[STEPS], clock[STEP])
+        found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), step)
         store_contact_sums(queue.passed, block, found)
         return 0
 
@@ -159,11 +161,13 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     @stage("the slip and breaking of contacts", seconds=2.0)
     def settle_contacts(grains, contacts, pair_list, clock, count, lost, span, settings):
         """Slip or break flagged contacts; returns 1 if any contact broke."""
-        return 1 if settle(grains, contacts, pair_list, count, lost, span, settings, clock[STEP]) else 0
+        step = ContactStep(span, settings, count[STEPS], clock[STEP])
+        return 1 if settle(grains, contacts, pair_list, count, lost, step) else 0
 
     @stage("the forming of contacts", seconds=1.5)
     def form(grains, contacts, pair_list, clock, count, lost, span, settings):
-        form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, clock[STEP])
+        step = ContactStep(span, settings, count[STEPS], clock[STEP])
+        form_contacts(grains, contacts, pair_list, count, lost, clock, step)
         return 0
 
     return {StageNumber.STIFFNESS_WORK: stiffness_work, StageNumber.SETTLE: settle_contacts, StageNumber.FORM: form}
@@ -174,34 +178,23 @@ def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of walls by number, whose parameters are `contact.wall_loops.WallNumbers`: contacts, loads, step."""
     update, find_step = wall_loops(law, damping).update, wall_step_loop(law)
 
-    @stage("the contacts with walls", seconds=4.0)
-    def update_walls(grains, walls, wall_contacts, clock, count, lost, span, settings, parameters):
+    @stage("the contacts with walls", seconds=4.0, parts=WALL_PARTS)
+    def update_walls(s, parameters):
         """Move the walls, and form, slip and break their contacts; returns a `Stop`."""
-        found = update(grains, walls, wall_contacts, clock, count, lost, span, settings, parameters)
-        return Stop.WALL_CONTACTS_FULL.value if found == WALLS_FULL else Stop.NONE.value
+        return Stop.WALL_CONTACTS_FULL.value if update(s, parameters) == WALLS_FULL else Stop.NONE.value
 
     @stage("the forces of walls")
     def wall_loads(grains, wall_contacts, count):
         add_wall_loads(grains, wall_contacts, count)
         return 0
 
-    @stage("the time step of walls")
-    def wall_step(grains, walls, wall_contacts, clock, count, settings, criteria, parameters):
+    @stage("the time step of walls", parts=(*WALL_PARTS, "criteria"))
+    def wall_step(s, parameters):
         """Set the longest step that walls allow; returns a `Stop`."""
-        contact, approach, behind = find_step(
-            grains,
-            walls,
-            wall_contacts,
-            count,
-            settings.per_period,
-            parameters,
-            criteria.longest,
-            criteria.impact,
-            CLOSING_FRACTION,
-        )
-        set_wall_step(clock, count, contact, approach, criteria.longest)
+        contact, approach, behind = find_step(s, parameters, CLOSING_FRACTION)
+        set_wall_step(s.clock, s.count, contact, approach, s.criteria.longest)
         if behind >= 0:
-            count[GRAIN1] = behind
+            s.count[GRAIN1] = behind
             return Stop.OVERCOMPRESSED.value
         return Stop.NONE.value
 
@@ -220,11 +213,11 @@ def bath_work(grains, contacts, clock, count, lost, scratch, span, block):
     return 0
 
 
-@stage("the work of the noise of contacts with walls")
-def bath_wall_work(grains, walls, wall_contacts, clock, count, lost, scratch, parameters, block):
+@stage("the work of the noise of contacts with walls", parts=(*WALL_PARTS, "scratch"))
+def bath_wall_work(s, parameters, block):
     """As `bath_work`, of contacts with walls; `parameters` are their `WallNumbers`."""
-    weight = half_kick_weight(clock[STEP], scratch[DT] if block == NEXT_STEP else 0.0)
-    record_half_kicks_at_walls(grains, walls, wall_contacts, count, lost, parameters, weight)
+    weight = half_kick_weight(s.clock[STEP], s.scratch[DT] if block == NEXT_STEP else 0.0)
+    record_half_kicks_at_walls(s.grains, s.walls, s.wall_contacts, s.count, s.lost, parameters, weight)
     return 0
 
 

@@ -186,14 +186,22 @@ def append_range(long_range, sorted_position, span, limit, s, first, last, used)
     return np.int64(next_entry)
 
 
+class CellRow(NamedTuple):
+    """A row of cells along x, in which a grain has neighbours."""
+
+    x: float  # coordinate of the grain, in units of cells
+    first: int  # first cell
+    squared_half_width: float  # largest squared distance of neighbours along x [m²]
+
+
 @loop
-def append_cell_row(long_range, sorted_position, grid, span, limit, s, x, row, squared_half_width, used):
-    """Append the neighbours of s in the row of cells that begins at cell `row`; returns the new length, or FULL.
+def append_cell_row(long_range, sorted_position, grid, span, limit, s, cells, used):
+    """Append the neighbours of s in a row of cells (`CellRow`); returns the new length, or FULL.
 
     Candidates lie within ±√squared_half_width [m] along x; across a periodic boundary they form a second range.  On a
     periodic axis shorter than three times the reach all grains are candidates.
     """
-    nx = grid.counts[0]
+    (x, row, squared_half_width), nx = cells, grid.counts[0]
     if span.x > 0.0 and nx == grid.subdivision:
         begin, stop = np.uint64(long_range.cell_start[row]), np.uint64(long_range.cell_start[row + nx])
         return append_range(long_range, sorted_position, span, limit, np.uint64(s), begin, stop, used)
@@ -259,10 +267,8 @@ def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
         gap_y, gap_z = gap_on_axis(x[1], cy, dy, grid.width_y), gap_on_axis(x[2], cz, dz, grid.width_z)
         squared_half_width = squared_reach - gap_y * gap_y - gap_z * gap_z
         if ty >= 0 and tz >= 0 and squared_half_width > 0.0:
-            row = (tz * ny + ty) * nx
-            used = append_cell_row(
-                long_range, sorted_position, grid, span, reach * reach, s, x[0], row, squared_half_width, used
-            )
+            cells = CellRow(x[0], (tz * ny + ty) * nx, squared_half_width)
+            used = append_cell_row(long_range, sorted_position, grid, span, reach * reach, s, cells, used)
             if used == FULL:
                 return FULL
     return used

@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,6 +62,15 @@ def no_grid(long_range, sorted_position, anchor, span, reach):
     return NO_GRID
 
 
+class PairSearch(NamedTuple):
+    """How pairs are found."""
+
+    span: Any  # basics.box.Span, the box
+    max_gap: float  # largest gap [m]
+    settings: Any  # integrate.parts.ContactParameters
+    search: Any  # cell_list.Search
+
+
 @functools.cache
 def pair_list_loop(law: ContactLaw, celled: bool) -> Callable:
     """The loop that builds the pair list, for one contact law; `celled`: for searches with cells."""
@@ -68,8 +78,8 @@ def pair_list_loop(law: ContactLaw, celled: bool) -> Callable:
     find_candidates, make_grid = (candidates_from_cells, build_grid) if celled else (candidates, no_grid)
 
     @loop
-    def build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, settings, search):
-        """List the pairs with a gap below `max_gap` [m], selected from the Verlet list, from cells, or from all pairs.
+    def build_pair_list(grains, contacts, pair_list, long_range, count, how):
+        """List the pairs of a `PairSearch`, selected from the Verlet list, from cells, or from all pairs.
 
         Returns
         -------
@@ -77,6 +87,7 @@ def pair_list_loop(law: ContactLaw, celled: bool) -> Callable:
             Number of pairs; FULL if the pair list is too short (the required length is then in count[PAIRS]);
             ROW_FULL if the long-range arrays are too short for the neighbours of one grain.
         """
+        span, max_gap, settings, search = how
         found, pair_type, capacity = 0, NO_PAIR_TYPE, pair_list.pair.shape[1]
         sorted_indices = search.celled or search.listed
         # the anchors, set at the end, serve as buffer for positions in sorted order

@@ -61,6 +61,17 @@ def allocate_workspace(size: int, rows: int = 0) -> Workspace:
     return Workspace(one[0], one[1], np.zeros((STAGES + 1, size)), one[2], one[3], np.zeros((rows, 1 + size)))
 
 
+class Flights(NamedTuple):
+    """Which flights are computed, and their results."""
+
+    strata: np.ndarray  # (K,) uint64: stratum and number of each flight
+    numbers: np.ndarray
+    low: np.ndarray  # (K,) lower and upper limit of b² [m²]
+    high: np.ndarray
+    results: np.ndarray  # (K, 8) RESULTS
+    ends: np.ndarray  # (K, size) states at the end
+
+
 class Limits(NamedTuple):
     """End conditions and accuracy of flights."""
 
@@ -201,23 +212,23 @@ def flight_of(model: Model) -> Callable:
 def flights_of(model: Model) -> Callable:
     """Compile the loop over many flights.
 
-    Its arguments are the seed, strata and numbers (K,), lower and upper limits of b² (K,) [m²], a `Workspace`, the
-    outputs `results` (K, 8) and `ends` (K, size), the `InitialConditions`, the parameters of the pair and the `Limits`.
+    Its arguments are the seed, the `Flights`, a `Workspace`, the `InitialConditions`, the parameters of the pair and
+    the `Limits`.
     """
     fly, draw_pose = flight_of(model), model.draw_pose
 
-    def fly_all(seed, strata, numbers, low, high, work, results, ends, start, parameters, limits):
+    def fly_all(seed, flights, work, start, parameters, limits):
         y = work.y
-        for flight in range(numbers.size):
-            flight_id = (seed, strata[flight], numbers[flight])
-            b = draw_path(y, flight_id, low[flight], high[flight], start)
+        for flight in range(flights.numbers.size):
+            flight_id = (seed, flights.strata[flight], flights.numbers[flight])
+            b = draw_path(y, flight_id, flights.low[flight], flights.high[flight], start)
             draw_pose(y, flight_id, start, parameters)
             speed = norm(vector_at(y, U))
             end, time, steps, closest, drift = fly(work, parameters, limits)
             values = (float(end), b, speed, time, float(steps), closest, norm(vector_at(y, U)), drift)
             for column in range(len(values)):
-                results[flight, column] = values[column]
+                flights.results[flight, column] = values[column]
             for row in range(y.size):
-                ends[flight, row] = y[row]
+                flights.ends[flight, row] = y[row]
 
     return kernel(fly_all)

@@ -14,7 +14,7 @@ from ...basics.grains import Grains
 from ...basics.units import si
 from ...errors import BadInput
 from .encounters import Flight
-from .flight_driver import FLIGHT_RESULTS, HIT, allocate_workspace, flights_of
+from .flight_driver import FLIGHT_RESULTS, HIT, Flights, allocate_workspace, flights_of
 from .initial_conditions import R, U
 from .problem import impact_parameter
 from .sampling import Task
@@ -93,21 +93,16 @@ def _run(
             raise BadInput(f"{name} = {value!r} must be a whole number of at least 0, below 2^64")
     model, parameters = setup.pair()
     work = allocate_workspace(model.size, rows)
-    results, ends = np.zeros((numbers.size, len(FLIGHT_RESULTS))), np.zeros((numbers.size, model.size))
-    flights_of(model)(
-        np.uint64(seed),
+    flights = Flights(
         strata.astype(np.uint64),
         numbers.astype(np.uint64),
         low.astype(float),
         high.astype(float),
-        work,
-        results,
-        ends,
-        setup.start(azimuth),
-        parameters,
-        setup.limits(),
+        np.zeros((numbers.size, len(FLIGHT_RESULTS))),
+        np.zeros((numbers.size, model.size)),
     )
-    return results, ends, work.history
+    flights_of(model)(np.uint64(seed), flights, work, setup.start(azimuth), parameters, setup.limits())
+    return flights.results, flights.ends, work.history
 
 
 @dataclass(frozen=True)

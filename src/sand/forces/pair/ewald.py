@@ -226,7 +226,7 @@ def choose_ewald(
             f"box of {' x '.join(f'{side:.3g}' for side in lengths)} m; give a larger accuracy, or sides more alike"
         )
     _, radius, product, waves = cheapest
-    return _with_whole_shells(lengths, volume, spacing, accuracy, degree, -radius, product, waves, sources)
+    return _with_whole_shells(problem, -radius, product, waves)
 
 
 def _meshes(
@@ -273,21 +273,12 @@ def _with_mesh(
             )
 
 
-def _with_whole_shells(
-    lengths: tuple[float, float, float],
-    volume: float,
-    spacing: float,
-    accuracy: float,
-    degree: int,
-    radius: float,
-    product: float,
-    waves: int,
-    sources: Sources,
-) -> EwaldChoice:
+def _with_whole_shells(problem: _Problem, radius: float, product: float, waves: int) -> EwaldChoice:
     """All vectors up to the smallest length for which the errors are below the accuracy.
 
     The errors of a set of vectors are those beyond the sphere of the same volume.
     """
+    lengths, volume, spacing, accuracy, degree, _, sources = problem
     alpha = product / radius
     beyond = 1.15 * (12.0 * math.pi**2 * waves / volume) ** (1.0 / 3.0) + 4.0 * math.pi / min(lengths)
     lengths_of = np.sqrt(np.sort(_squares(half_of_vectors(lengths, beyond), lengths)))

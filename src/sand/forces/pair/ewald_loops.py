@@ -201,8 +201,9 @@ def wave_loops(dipoles: bool) -> tuple[Callable, Callable]:
         return up, up_i, down, down_i
 
     @loop
-    def add_wave_pair(waves, buffers, b, m, q, weight, up, up_i, down, down_i):
-        """Add the waves n_z = m and −m to V_0, V_1 and V_2."""
+    def add_wave_pair(waves, buffers, b, m, q, weight, factors):
+        """Add the waves n_z = m and −m to V_0, V_1 and V_2; `factors` are those of `structure_factors`."""
+        up, up_i, down, down_i = factors
         even, even_i = weight * (up + down), -weight * (up_i + down_i)
         odd, odd_i = weight * (up - down), -weight * (up_i - down_i)
         even1, even1_i, odd1, odd1_i, q2 = q * even, q * even_i, q * odd, q * odd_i, q * q
@@ -251,8 +252,8 @@ def wave_block_of(dipoles: bool) -> Callable:
             start_potentials(buffers, b, waves.weight[first] * factor, -waves.weight[first] * factor_i)
             for m in range(1, waves.column[2, column]):
                 q = turn * m * span.inverse_z
-                up, up_i, down, down_i = structure_factors(waves, buffers, b, m, q)
-                add_wave_pair(waves, buffers, b, m, q, waves.weight[first + m], up, up_i, down, down_i)
+                factors = structure_factors(waves, buffers, b, m, q)
+                add_wave_pair(waves, buffers, b, m, q, waves.weight[first + m], factors)
             end_column(waves, buffers, b, q_x, q_y)
 
     return wave_block

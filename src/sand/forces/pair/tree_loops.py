@@ -62,6 +62,15 @@ class TreeParameters(NamedTuple):
     scratch: Scratch
 
 
+class Leaf(NamedTuple):
+    """A leaf of the tree."""
+
+    cell: int  # its number
+    level: int
+    first: int  # its grains first … last − 1, in the order of the leaves
+    last: int
+
+
 @loop
 def far_enough(cells, opening, a, b):
     """Whether two cells interact as a whole."""
@@ -131,11 +140,11 @@ def visit(parameters, b, cell, level, levels):
 
 
 @loop
-def add_pairs(source, load_of, position, moment, first, last, count, own, k):
-    """Loads of grains first … last − 1 by the first `count` sources, of which `own` is the grain `first`."""
+def add_pairs(source, load_of, position, moment, leaf, count, own, k):
+    """Loads of the grains of a leaf by the first `count` sources, of which `own` is its first grain."""
     n, remainder = np.uint64(count), np.uint64(MAX_REMAINDER)
-    for q in range(last - first):
-        x, mu = load(position, first + q), load(moment, first + q)
+    for q in range(leaf.last - leaf.first):
+        x, mu = load(position, leaf.first + q), load(moment, leaf.first + q)
         self = np.uint64(own + q)
         force = field = (0.0, 0.0, 0.0)
         for t in range(round_up_to_simd_width(n, remainder)):
@@ -149,23 +158,23 @@ def add_pairs(source, load_of, position, moment, first, last, count, own, k):
 
 
 @loop
-def add_near(scratch, position, moment, b, cell, levels, number, size, first, last, k):
-    """Add the loads of the grains of a leaf by the near leaves, SOURCES grains at a time."""
+def add_near(scratch, position, moment, b, leaf, number, size, k):
+    """Add the loads of the grains of a leaf by the `number` near leaves, SOURCES grains at a time."""
     source, count, own = scratch.source[b], 0, SOURCES
     for m in range(number):
         other = np.int64(scratch.near[b, m])
-        start, end = first_grain(size, other, levels), first_grain(size, other + 1, levels)
+        start, end = first_grain(size, other, leaf.level), first_grain(size, other + 1, leaf.level)
         if count + end - start > SOURCES - SIMD_WIDTH:
-            add_pairs(source, scratch.load[b], position, moment, first, last, count, own, k)
+            add_pairs(source, scratch.load[b], position, moment, leaf, count, own, k)
             count, own = 0, SOURCES
-        own = count if other == cell else own
+        own = count if other == leaf.cell else own
         for s in range(start, end):
             x, mu = load(position, s), load(moment, s)
             for axis in range(3):
                 source[axis, count] = x[axis]
                 source[3 + axis, count] = mu[axis]
             count += 1
-    add_pairs(source, scratch.load[b], position, moment, first, last, count, own, k)
+    add_pairs(source, scratch.load[b], position, moment, leaf, count, own, k)
 
 
 @loop
@@ -225,12 +234,10 @@ def block(grains, long_range, span, parameters, b):
             if new:  # the cell of this level is not that of the previous leaf
                 near = visit(parameters, b, (1 << level) - 1 + (leaf >> (levels - level)), level, levels)
         cell = leaves - 1 + leaf
-        first, last = first_grain(size, cell, levels), first_grain(size, cell + 1, levels)
-        add_far(
-            parameters.tables, parameters.cells, scratch, position, moment, b, cell, levels, first, last, parameters.k
-        )
-        add_near(scratch, position, moment, b, cell, levels, near, size, first, last, parameters.k)
-        store_loads(grains, long_range, parameters, b, first, last)
+        of_leaf = Leaf(cell, levels, first_grain(size, cell, levels), first_grain(size, cell + 1, levels))
+        add_far(parameters, position, moment, b, of_leaf)
+        add_near(scratch, position, moment, b, of_leaf, near, size, parameters.k)
+        store_loads(grains, long_range, parameters, b, of_leaf.first, of_leaf.last)
 
 
 @loop

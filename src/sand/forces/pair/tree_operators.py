@@ -36,9 +36,8 @@ def harmonics_at(tables, harmonic, row, offset):
 
 
 @loop
-def load_grains(cells, position, moment, cell, start, last, sign, offset, spins):
+def load_grains(centre, position, moment, start, last, sign, offset, spins):
     """Vectors from the centre of a cell to LANES grains from `start` on, times `sign`, and their moments; 0 beyond."""
-    centre = load(cells.centre, cell)
     for s in range(LANES):
         real = start + s < last
         i = start + s if real else start
@@ -62,7 +61,7 @@ def sum_moments(tables, cells, scratch, position, moment, size, levels):
                 clear(total)
                 first, last = first_grain(size, cell, level), first_grain(size, cell + 1, level)
                 for start in range(first, last, LANES):
-                    load_grains(cells, position, moment, cell, start, last, -1.0, offset, spins)
+                    load_grains(load(cells.centre, cell), position, moment, start, last, -1.0, offset, spins)
                     harmonics_at(tables, harmonic, row, offset)
                     add_moments(tables, harmonic, spins, total)
                 for c in range(values.size):
@@ -95,18 +94,20 @@ def add_batch(tables, cells, scratch, b, cell, number):
 
 
 @loop
-def add_far(tables, cells, scratch, position, moment, b, cell, level, first, last, k):
+def add_far(parameters, position, moment, b, leaf):
     """Loads of the grains of a leaf by its local expansion: B = −∇φ, F = (μ·∇) B; sets `load`."""
+    tables, scratch, k = parameters.tables, parameters.scratch, parameters.k
+    centre = load(parameters.cells.centre, leaf.cell)
     offset, spins, derivative = scratch.distance[b], scratch.moment[b], scratch.sum[b]
-    for start in range(first, last, LANES):
-        load_grains(cells, position, moment, cell, start, last, 1.0, offset, spins)
+    for start in range(leaf.first, leaf.last, LANES):
+        load_grains(centre, position, moment, start, leaf.last, 1.0, offset, spins)
         harmonics_at(tables, scratch.derivative[b], scratch.row[b], offset)
         for c in range(9):
             for s in range(LANES):
                 derivative[c, s] = 0.0
-        add_derivatives(tables, scratch.derivative[b], scratch.local[b, level], derivative)
+        add_derivatives(tables, scratch.derivative[b], scratch.local[b, leaf.level], derivative)
         for s in range(LANES):
-            i = start - first + s
+            i = start - leaf.first + s
             xx, xy, yy = derivative[4, s], derivative[5, s], derivative[6, s]
             xz, yz = derivative[7, s], derivative[8, s]
             x, y, z = spins[0, s], spins[1, s], spins[2, s]

@@ -163,8 +163,8 @@ def return_to_sphere(seed, number, grain, x, size):
 
 
 @loop
-def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, counter):
-    """Diffuse grains first … last − 1 as a rigid body, without rotation, until it touches the aggregate at the origin.
+def walk_on_spheres(grid, position, grain_set, body, bound, inner, size, counter):
+    """Diffuse the grains of a body, without rotation, until it touches the aggregate at the origin.
 
     Walk on spheres: each step has a random direction and the length of a lower bound of the gap to the aggregate.
 
@@ -176,8 +176,8 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
         (3, N) [m]; those of the body relative to its centre.
     grain_set : GrainSet
         Properties of the grains.
-    first, last : int
-        Range of the grains of the body.
+    body : tuple of int
+        (first, last) for the grains first … last − 1.
     bound : ndarray
         Work array (N,): a lower bound of the gap of each grain [m], so that few gaps are computed per step.
     inner : float
@@ -194,7 +194,7 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
     one, other : int
         Grains of the body and of the aggregate that are about to touch; `other` is EMPTY if the walk did not end.
     """
-    seed, number, grain = counter
+    (seed, number, grain), (first, last) = counter, body
     u, _ = random_direction(seed, number, grain, START)
     x = scale(size, u)
     length, start = math.inf, first
@@ -241,7 +241,7 @@ def grow_diffusing(grid, position, bound, grain_set, seed):
         placed = False
         for number in range(TRIES):
             x, _, neighbour = walk_on_spheres(
-                grid, position, grain_set, b, b + 1, bound, extent, size, (seed, number, b)
+                grid, position, grain_set, (b, b + 1), bound, extent, size, (seed, number, b)
             )
             if neighbour == EMPTY:
                 continue

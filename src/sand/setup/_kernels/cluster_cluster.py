@@ -279,7 +279,7 @@ def join_diffusing(table, position, work, bound, grain_set, joins, seed):
             for i in range(ends[0], ends[1]):
                 insert_grain(grid, i, load(work, i))
             x, one, other = walk_on_spheres(
-                grid, work, grain_set, ends[1], ends[2], bound, inner, inner + outer, counter
+                grid, work, grain_set, (ends[1], ends[2]), bound, inner, inner + outer, counter
             )
             if other == EMPTY:
                 continue

@@ -51,15 +51,15 @@ def nearest_image(position, j, x, side):
 
 
 @loop
-def touches_other_periodic(grid, position, grain_set, b, x, side, count, one, other):
-    """Whether grain b at x touches any grain other than `one` and `other`, periodic images included."""
+def touches_other_periodic(grid, position, grain_set, b, x, side, count, known):
+    """Whether grain b at x touches any grain other than the two `known` ones, periodic images included."""
     for step in range(9):
         j = first_in_cell(grid, periodic_column_key(x[0], x[1], step, grid.width, count))
         while j != EMPTY:
             image = nearest_image(position, j, x, side)
             d = (x[0] - image[0], x[1] - image[1], x[2] - image[2])
             touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
-            if dot(d, d) <= touch * touch and j != one and j != other:
+            if dot(d, d) <= touch * touch and j != known[0] and j != known[1]:
                 return True
             j = grid.next_in_cell[j]
     return False
@@ -97,7 +97,7 @@ def roll_to_second_contact(grid, position, grain_set, b, x, neighbour, side, cou
                     new = axpy(arm, way, origin)
                     nearer = dot(way, own) > best and new[2] >= grain_set.radius[b]
                     if nearer and not touches_other_periodic(
-                        grid, position, grain_set, b, new, side, count, neighbour, k
+                        grid, position, grain_set, b, new, side, count, (neighbour, k)
                     ):
                         best, place, second = dot(way, own), new, k
             k = grid.next_in_cell[k]
@@ -140,7 +140,7 @@ def deposit(grid, position, grain_set, side, count, seed):
             if neighbour != EMPTY:
                 place, second = roll_to_second_contact(grid, position, grain_set, b, place, neighbour, side, count)
             if second != EMPTY or not touches_other_periodic(
-                grid, position, grain_set, b, place, side, count, neighbour, second
+                grid, position, grain_set, b, place, side, count, (neighbour, second)
             ):
                 place = (place[0] % side, place[1] % side, place[2])
                 put(position, b, place)
