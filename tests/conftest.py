@@ -31,7 +31,7 @@ compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 
 from sand.compiler.ahead import share_compilation  # noqa: E402
 
-from .specs import FIXTURES, SPECS, WORKERS  # noqa: E402
+from .specs import FIXTURES, SPECS, STARTS, WORKERS  # noqa: E402
 from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E402
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
@@ -108,6 +108,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = kept
+    if hasattr(config, "workerinput"):
+        items.sort(key=_start)
+
+
+def _start(item: pytest.Item) -> int:
+    """When workers of pytest-xdist start the group of a test."""
+    group = item.get_closest_marker("xdist_group")
+    return STARTS.index(group.args[0]) if group else len(STARTS)
 
 
 def _mark(item: pytest.Item, tier: str | None) -> None:

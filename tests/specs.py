@@ -1,7 +1,9 @@
 """Groups of the default tests by the stages that they compile.
 
 A test that compiles anything names its groups, ``@pytest.mark.compiled("dipoles")``; ``tests/conftest.py`` enforces
-that.  Tests with the same first group share a worker of pytest-xdist, so that workers seldom wait for the same code.
+that.  Tests with the same first group share a worker of pytest-xdist, so that workers seldom wait for the same code;
+what several workers need, each compiles a part of (`sand.compiler.ahead`).  The longest groups start first, and tests
+that compile nothing fill the end.
 """
 
 from __future__ import annotations
@@ -11,5 +13,7 @@ SPECS = ("contacts", "dipoles", "listed", "fields", "flights", "threads", "scatt
 blocks shared by threads; two-body scattering; anything that compiles in a second or two."""
 WORKERS = {"flights": "trajectories", "scattering": "trajectories"}
 """Groups that share a worker, because tests compare one with the other."""
+STARTS = ("dipoles", "contacts", "trajectories", "fields", "listed", "threads", "small")
+"""The groups in the order in which workers start them, the longest first."""
 FIXTURES = {"finished_run": "fields", "run_in_field": "fields"}
 """Fixtures that run a simulation, and the group of its stages."""

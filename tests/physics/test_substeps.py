@@ -52,7 +52,11 @@ def counts(sim, *numbers):
 
 
 @COMPILED
-@pytest.mark.parametrize("dipoles", [sand.Dipoles(), sand.Dipoles(periodic="ewald", accuracy=1e-4)], ids=str)
+@pytest.mark.parametrize(
+    "dipoles",
+    [sand.Dipoles(), pytest.param(sand.Dipoles(periodic="ewald", accuracy=1e-4), marks=pytest.mark.validate)],
+    ids=str,
+)
 def test_substeps_are_of_order_two_and_as_accurate_as_steps_of_all(dipoles):
     """Positions after 0.2 µs, in which two contacts form, against steps of all bodies with an eighth of η.
 

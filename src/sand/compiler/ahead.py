@@ -128,8 +128,7 @@ def _missing(stages: Iterable[tuple[Table, Stage | PythonStage, Any]]) -> list[T
     """Stages that are not compiled: first those that only this process can compile, then the longest."""
     known, found = compile_times(COMPILE_TIMES), list[Task]()
     for table, each, parameters in stages:
-        key = isinstance(each, Stage) and (each, each.key(table, parameters))
-        if not key or key in _looked_at:
+        if not isinstance(each, Stage) or (key := (each, each.key(table, parameters))) in _looked_at:
             continue
         _looked_at.add(key)
         if each.is_cached and not each.is_compiled(table, parameters):
@@ -178,6 +177,8 @@ def _helpers(recipes: list[Any], number: int) -> Iterator[None]:
             each.kill()
         for each in started:
             each.wait()
+            with contextlib.suppress(OSError):  # it has not read all
+                each.stdin.close()  # type: ignore[union-attr]
 
 
 def _start() -> subprocess.Popen:
