@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import sand
+from sand.components.wall_formulas import WallPose, wall_constants, wall_displacements, wall_load, wall_pointers
 from sand.contact.jkr import LAW
-from sand.contact.law import ContactConstants, contact_constants, wall_constants
+from sand.contact.law import ContactConstants, contact_constants
 from sand.contact.mechanics import Pose, contact_load, displacements_of, energies, stored_energies
 from sand.contact.tangential import pointers_for
-from sand.contact.wall_mechanics import WallPose, wall_displacements, wall_load, wall_pointers
 
 R1, MASS = 1e-7, 1e-17
 PAIRING = sand.Contact(damping="critical").pairing(sand.SILICA, sand.ICE)

@@ -225,7 +225,7 @@ class State:
         """Allocate more contacts, at least `minimum`."""
         self.contacts = grown(self.contacts, ("start", "gather_order", *self._uniform_arrays()), minimum)
 
-    def grow_wall_contacts(self) -> None:
+    def grow_further_contacts(self) -> None:
         """Allocate more contacts with walls."""
         self.wall_contacts = grown(self.wall_contacts, ("start", "gather_order"), 0)
 
@@ -237,6 +237,15 @@ class State:
         """Allocate a longer Verlet list; its content is discarded."""
         capacity = int(GROWTH * self.long_range.neighbour.size) + 1
         self.long_range = all_aligned(self.long_range._replace(neighbour=np.zeros(capacity, np.uint32)))
+
+    def all_losses(self) -> tuple[np.ndarray, ...]:
+        """Arrays of losses: of all, and of each contact, also with walls."""
+        return self.lost, self.contacts.lost, self.wall_contacts.lost
+
+    def forget_losses(self) -> None:
+        """Set losses, and impulses on walls, to 0."""
+        for array in (*self.all_losses(), self.walls.impulse):
+            array[:] = 0.0
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of the state by name, for a checkpoint; unused columns are omitted."""
@@ -297,7 +306,7 @@ class State:
             _copy_into(getattr(self.walls, name), saved, f"walls/{name}")
         used = int(self.count[WALL_CONTACTS])
         while self.wall_contacts.flag.size < used:
-            self.grow_wall_contacts()
+            self.grow_further_contacts()
         for name in WALL_CONTACT_ARRAYS if self.walls.work.size else ():
             _copy_into(getattr(self.wall_contacts, name)[..., :used], saved, f"wall_contacts/{name}")
 

@@ -127,7 +127,8 @@ def compiled_form(function: Callable) -> Callable:
 
 _COMPILED = (
     "analysis/projection.py", "basics/arrays.py", "basics/box.py", "basics/grains.py", "basics/state.py", "compiler",
-    "contact", "experiments/scattering", "forces", "integrate", "neighbours", "numerics", "setup/_kernels",
+    "components", "contact", "experiments/scattering", "forces", "integrate", "neighbours", "numerics",
+    "setup/_kernels",
 )  # fmt: skip
 """Packages and files with compiled functions, or with named tuples that compiled functions take."""
 

@@ -18,16 +18,15 @@ from ..basics.ramps import ramps_of
 from ..basics.settings import Direction, Number, Reading, Settings, Vector
 from ..basics.state import WALL_CONTACTS, State
 from ..contact.constants_table import constant_names
-from ..contact.damping import THERMAL
 from ..contact.law import ContactLaw
 from ..contact.model import Contact
-from ..contact.wall_loops import WallNumbers
 from ..engine.component import Component, Setup
 from ..errors import BadInput, shown
 from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
-from ..integrate.stages import StageNumber, bath_wall_work, wall_stages
 from ..setup.checks import most_overlap
+from .wall_loops import WallNumbers
+from .wall_stages import wall_stages
 
 LOST = "lost_walls"
 """Column of the ledger: energy [J] that moving walls took from grains and contacts."""
@@ -164,7 +163,7 @@ class Walls(Component):
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
         """Contacts, loads, the limit of the step, and the work of a bath."""
-        contact, variant = setup.forces.contact, variant_of(settings)
+        contact = setup.forces.contact
         assert contact is not None
         table = [
             [contact.pairing(material, wall.material) for wall in self.items] for material in setup.grains.materials
@@ -174,8 +173,7 @@ class Walls(Component):
             np.array([math.inf if wall.mass is None else wall.mass for wall in self.items]),
             np.array([wall.force or 0.0 for wall in self.items]),
         )
-        of_bath = {StageNumber.BATH_WALL_WORK: bath_wall_work} if variant == THERMAL else {}
-        return {number: (each, numbers) for number, each in (wall_stages(law, variant) | of_bath).items()}
+        return wall_stages(law, variant_of(settings), numbers)
 
     def place(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state its walls, and memory for their contacts."""

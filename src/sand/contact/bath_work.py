@@ -13,17 +13,15 @@ The sum of kicks is then exact: K changes by the recorded work of all forces, fo
 """
 
 from ..basics.box import nearest_image
-from ..basics.state import CONTACTS, WALL_CONTACTS
+from ..basics.state import CONTACTS
 from ..compiler.jit import formula, loop
 from ..numerics.vec import dot, load, scale, sub
 from .damping import relative_motion, stored_load, surface_rotation
 from .losses import DAMPING_ROW, add_damping_energies
 
-ZERO = (0.0, 0.0, 0.0)
-
 
 @loop
-def _record(contacts, lost, c, n, change, weight):
+def record_half_kick(contacts, lost, c, n, change, weight):
     """Record the work `weight` (f·A + τ·Ω̇) of contact c as negative losses of the four modes; `change` is A and Ω̇."""
     found = stored_load(contacts, c)
     normal = dot(found.force, n) * dot(change.velocity, n)
@@ -35,7 +33,7 @@ def _record(contacts, lost, c, n, change, weight):
 
 
 @loop
-def _accelerations(grains, i):
+def accelerations(grains, i):
     """Acceleration [m/s²] and rate of the spin [1/s²] of grain i; 0 while it is held."""
     return scale(1.0 / grains.mass[i], load(grains.force, i)), scale(1.0 / grains.inertia[i], load(grains.torque, i))
 
@@ -52,21 +50,8 @@ def record_half_kicks(grains, contacts, count, lost, span, weight):
     for c in range(count[CONTACTS]):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        first, turn1 = _accelerations(grains, i)
-        second, turn2 = _accelerations(grains, j)
+        first, turn1 = accelerations(grains, i)
+        second, turn2 = accelerations(grains, j)
         rolling = surface_rotation(turn1, turn2, grains.radius[i], grains.radius[j])
         change = relative_motion(apart, sub(first, second), rolling, turn1, turn2)
-        _record(contacts, lost, c, scale(1.0 / dot(apart, apart) ** 0.5, apart), change, weight)
-
-
-@loop
-def record_half_kicks_at_walls(grains, walls, contacts, count, lost, numbers, weight):
-    """As `record_half_kicks`, in contacts with walls; a wall with a mass is accelerated along its normal."""
-    for c in range(count[WALL_CONTACTS]):
-        g, w = contacts.pair[0, c], contacts.pair[1, c]
-        n = load(walls.normal, w)
-        of_grain, turn = _accelerations(grains, g)
-        of_wall = (dot(load(walls.force, w), n) + numbers.push[w]) / numbers.mass[w]
-        arm = scale(grains.radius[g], n)
-        change = relative_motion(arm, sub(of_grain, scale(of_wall, n)), turn, turn, ZERO)
-        _record(contacts, lost, c, n, change, weight)
+        record_half_kick(contacts, lost, c, scale(1.0 / dot(apart, apart) ** 0.5, apart), change, weight)

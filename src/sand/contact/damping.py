@@ -262,7 +262,7 @@ def surfaces_of_pair(grains, contacts, c, pose):
 class Held(NamedTuple):
     """A contact at the end of a step, as far as its dashpots depend on it."""
 
-    pose: Any  # mechanics.Pose, or wall_mechanics.WallPose
+    pose: Any  # mechanics.Pose, or that of a grain at a wall
     radius: float  # of the contact [m]
     constants: Any  # law.ContactConstants
 

@@ -121,7 +121,7 @@ def contact_constants(law: ContactLaw) -> Callable:
 
     Radii in m, masses in kg.
     """
-    constants_of = _reduced_constants(law)
+    constants_of = reduced_constants(law)
 
     @formula
     def constants_of_pair(pairing, r1, r2, m1, m2):
@@ -132,23 +132,7 @@ def contact_constants(law: ContactLaw) -> Callable:
 
 
 @functools.cache
-def wall_constants(law: ContactLaw) -> Callable:
-    """The formula `(pairing, radius, mass, wall_mass)` → `ContactConstants` of a grain and a plane wall.
-
-    The limit r2 → ∞ of `contact_constants`: R = r1 and 1/I2 = 0.  `wall_mass` is infinite if the motion of the wall is
-    given.
-    """
-    constants_of = _reduced_constants(law)
-
-    @formula
-    def constants_at_wall(pairing, radius, mass, wall_mass):
-        return constants_of(pairing, radius, 1.0 / mass + 1.0 / wall_mass, 2.5 / (mass * radius * radius))
-
-    return constants_at_wall
-
-
-@functools.cache
-def _reduced_constants(law: ContactLaw) -> Callable:
+def reduced_constants(law: ContactLaw) -> Callable:
     """The formula `(pairing, reduced, inverse_mass, inverse_inertia)` → `ContactConstants` of a law.
 
     The arguments are R [m], 1/m1 + 1/m2 [1/kg] and 1/I1 + 1/I2 [1/(kg m²)].  `max_squared_frequency` is that of the

@@ -12,7 +12,6 @@ from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
 from .settling import list_cluster, rigid_motion
 from .update import pose_at
-from .wall_loops import WALL_PARTS, wall_loops
 
 ENERGIES = ("normal", "sliding", "rolling", "twisting")
 """Energies [J] of contacts that `measure_energies` computes."""
@@ -42,20 +41,6 @@ def energies_stage(law: ContactLaw) -> Stage:
         return 0
 
     return measure_energies
-
-
-@factory
-def wall_energies_stage(law: ContactLaw) -> Stage:
-    """The stage that measures energies of contacts with walls, for one contact law."""
-    add_energies = wall_loops(law).energies
-
-    @stage("the energies of contacts with walls", parts=WALL_PARTS)
-    def measure_wall_energies(s, parameters):
-        """Add the energies [J] listed in ENERGIES to the array parameters[0]."""
-        add_energies(s, parameters[0])
-        return 0
-
-    return measure_wall_energies
 
 
 BODY_ROWS = 5

@@ -1,7 +1,7 @@
 """What happens to one contact of a grain with another grain or with a wall: it forms, slips and breaks.
 
-The loops over pairs (`events`) and over walls (`wall_loops`) load what these functions take from grains and walls, and
-apply the impulses that they return.
+The loops over pairs (`events`) and over walls (`components.wall_loops`) load what these functions take from grains and
+walls, and apply the impulses that they return.
 """
 
 import functools
@@ -38,7 +38,7 @@ class Touch(NamedTuple):
 class Break(NamedTuple):
     """A contact that broke within a step."""
 
-    pose: Any  # mechanics.Pose or wall_mechanics.WallPose, at the end of the step
+    pose: Any  # mechanics.Pose, or that of a grain at a wall, at the end of the step
     stretched: float  # −δ − δ_c at the end of the step [m]
     opening: float  # opening speed [m/s]
     constants: Any  # law.ContactConstants

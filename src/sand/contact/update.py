@@ -66,10 +66,10 @@ class ContactStep(NamedTuple):
 class ContactRange(NamedTuple):
     """A range of contacts, all uint64."""
 
-    first: int  # contacts first … last − 1
-    last: int
-    used: int  # contacts in use; columns beyond it may be computed as padding, and are never read
-    column: int  # column of the constants of the first contact; those of the others follow
+    first: Any  # contacts first … last − 1
+    last: Any
+    used: Any  # contacts in use; columns beyond it may be computed as padding, and are never read
+    column: Any  # column of the constants of the first contact; those of the others follow
 
 
 class Reached(NamedTuple):

@@ -44,7 +44,6 @@ from ..basics.state import (
     STEPS,
     SUBSTEPS,
     TIME,
-    WALL_CONTACTS,
     State,
 )
 from ..basics.threads import cores, threads
@@ -56,7 +55,7 @@ from ..contact.damping import THERMAL
 from ..contact.events import InitialContacts, forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
-from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies, wall_energies_stage
+from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies
 from ..contact.model import Contact
 from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
@@ -572,8 +571,8 @@ class Engine:
             stop = self._call_driver(driver, until, last, shorten)
             if stop is Stop.CONTACTS_FULL:
                 state.grow_contacts()
-            elif stop is Stop.WALL_CONTACTS_FULL:
-                state.grow_wall_contacts()
+            elif stop is Stop.FURTHER_CONTACTS_FULL:
+                state.grow_further_contacts()
             elif stop is Stop.PAIRS_FULL:
                 found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
                 state.grow_pairs(int(OVER_ALLOCATION * found))
@@ -626,7 +625,7 @@ class Engine:
         state = self.state
         if variant_of(self.parameters.settings) != THERMAL:
             return state.lost
-        arrays = state.lost, state.contacts.lost, state.wall_contacts.lost
+        arrays = state.all_losses()
         kept = [array.copy() for array in arrays]
         self._record_bath_work(state)
         found = state.lost.copy()
@@ -638,7 +637,7 @@ class Engine:
         """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
         with self._held(state):
             bath_work.run(self.table_of(state), (), NO_STEP)
-            if (further := self.components.further.get(StageNumber.BATH_WALL_WORK)) is not None:
+            if (further := self.components.further.get(StageNumber.FURTHER_BATH_WORK)) is not None:
                 stage, numbers = further
                 stage.run(self.table_of(state), numbers, NO_STEP)
 
@@ -663,9 +662,7 @@ class Engine:
         self.drive(-math.inf, 1)
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)
-        state.lost[:] = 0.0
-        state.contacts.lost[:] = state.wall_contacts.lost[:] = 0.0
-        state.walls.impulse[:] = 0.0
+        state.forget_losses()
         self.taken.begin(self)
 
     def refresh_loads(self) -> None:
@@ -758,8 +755,8 @@ class Engine:
         found[:] = 0.0
         if state.count[CONTACTS]:
             energies_stage(self.law).run(self.table_of(state), self._of_contacts)
-        if state.count[WALL_CONTACTS]:
-            wall_energies_stage(self.law).run(self.table_of(state), self._of_contacts)
+        if (further := self.components.further.get(StageNumber.FURTHER_ENERGIES)) is not None:
+            further[0].run(self.table_of(state), self._of_contacts)
         return found.tolist()
 
     def body_motion(self) -> BodyMotion:

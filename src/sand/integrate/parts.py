@@ -51,7 +51,7 @@ class Stop(IntEnum):
     SPINS_TOO_FAST = 8
     LIST_FULL = 9
     CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
-    WALL_CONTACTS_FULL = 11
+    FURTHER_CONTACTS_FULL = 11  # contacts of components, such as those with walls
     TOUCH_AHEAD = 12  # bodies may touch within the next step: they have to wake
     AWAKE_STEPS = 13  # awake clusters have to take their contact steps
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep

@@ -57,7 +57,7 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
         StageNumber.DRIFT: stages.drift_stage(given.magnetic, given.wide),
         StageNumber.EXPLAIN: stages.explain_stop,
     }
-    if given.pair_forces or given.external_forces or StageNumber.WALL_LOADS in given.further:
+    if given.pair_forces or given.external_forces or StageNumber.FURTHER_LOADS in given.further:
         found[StageNumber.GATHER] = stages.gather_stage(given.wide)
     else:
         found[StageNumber.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)

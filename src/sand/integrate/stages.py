@@ -13,15 +13,13 @@ from ..basics.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, 
 from ..compiler.jit import loop
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
-from ..contact.bath_work import half_kick_weight, record_half_kicks, record_half_kicks_at_walls
+from ..contact.bath_work import half_kick_weight, record_half_kicks
 from ..contact.events import compact_contacts, forming_loops, settle_loop
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import ContactStep, contact_pass_loop, contact_step, store_contact_sums
-from ..contact.wall_loops import FULL as WALLS_FULL
-from ..contact.wall_loops import WALL_PARTS, add_wall_loads, wall_loops, wall_step_loop
 from ..forces.gas.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
@@ -29,7 +27,7 @@ from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
 from .motion import UNBOUNDED, drift_for, gather_and_kick
 from .parts import DT, Stop
-from .step_control import CLOSING_FRACTION, find_limiting_grains, first_not_finite, set_wall_step
+from .step_control import find_limiting_grains, first_not_finite
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
 
@@ -61,12 +59,13 @@ class StageNumber(IntEnum):
     EXPLAIN = 18
     SETTLE_CLUSTERS = 19
     DRIVE = 20
-    WALL_CONTACTS = 21
-    WALL_LOADS = 22
-    WALL_STEP = 23
+    FURTHER_CONTACTS = 21  # of components: contacts other than those between grains,
+    FURTHER_LOADS = 22  # their loads on grains,
+    FURTHER_STEP = 23  # and the longest step that they allow
     BATH_WORK = 24
-    BATH_WALL_WORK = 25
-    FIRST_FORCE = 26  # from here on the stages of forces, see `force_stages`
+    FURTHER_BATH_WORK = 25  # the work of the bath in further contacts
+    FURTHER_ENERGIES = 26  # adds the energies stored in further contacts to an array
+    FIRST_FORCE = 27  # from here on the stages of forces, see `force_stages`
 
 
 NEXT_STEP, NO_STEP = range(2)
@@ -173,51 +172,11 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     return {StageNumber.STIFFNESS_WORK: stiffness_work, StageNumber.SETTLE: settle_contacts, StageNumber.FORM: form}
 
 
-@factory
-def wall_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
-    """Stages of walls by number, whose parameters are `contact.wall_loops.WallNumbers`: contacts, loads, step."""
-    update, find_step = wall_loops(law, damping).update, wall_step_loop(law)
-
-    @stage("the contacts with walls", seconds=4.0, parts=WALL_PARTS)
-    def update_walls(s, parameters):
-        """Move the walls, and form, slip and break their contacts; returns a `Stop`."""
-        return Stop.WALL_CONTACTS_FULL.value if update(s, parameters) == WALLS_FULL else Stop.NONE.value
-
-    @stage("the forces of walls")
-    def wall_loads(grains, wall_contacts, count):
-        add_wall_loads(grains, wall_contacts, count)
-        return 0
-
-    @stage("the time step of walls", parts=(*WALL_PARTS, "criteria"))
-    def wall_step(s, parameters):
-        """Set the longest step that walls allow; returns a `Stop`."""
-        contact, approach, behind = find_step(s, parameters, CLOSING_FRACTION)
-        set_wall_step(s.clock, s.count, contact, approach, s.criteria.longest)
-        if behind >= 0:
-            s.count[GRAIN1] = behind
-            return Stop.OVERCOMPRESSED.value
-        return Stop.NONE.value
-
-    return {
-        StageNumber.WALL_CONTACTS: update_walls,
-        StageNumber.WALL_LOADS: wall_loads,
-        StageNumber.WALL_STEP: wall_step,
-    }
-
-
 @stage("the work of the noise of contacts")
 def bath_work(grains, contacts, clock, count, lost, scratch, span, block):
     """Record the work of the half kick that ended the last step, and take back that of the next one."""
     weight = half_kick_weight(clock[STEP], scratch[DT] if block == NEXT_STEP else 0.0)
     record_half_kicks(grains, contacts, count, lost, span, weight)
-    return 0
-
-
-@stage("the work of the noise of contacts with walls", parts=(*WALL_PARTS, "scratch"))
-def bath_wall_work(s, parameters, block):
-    """As `bath_work`, of contacts with walls; `parameters` are their `WallNumbers`."""
-    weight = half_kick_weight(s.clock[STEP], s.scratch[DT] if block == NEXT_STEP else 0.0)
-    record_half_kicks_at_walls(s.grains, s.walls, s.wall_contacts, s.count, s.lost, parameters, weight)
     return 0
 
 

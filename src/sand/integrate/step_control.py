@@ -3,8 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ..basics.box import nearest_image
 from ..basics.state import (
     CALM,
@@ -239,22 +237,6 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
         return criteria.fixed
     chosen_step = min(clock[LEVEL], clock[CONTACT_STEP])
     return min(chosen_step, clock[WALL_STEP]) if clock[WALL_STEP] > 0.0 else chosen_step
-
-
-@loop
-def set_wall_step(clock, count, contact, approach, longest):
-    """Set the longest step that walls allow [s], from those of their contacts and of grains approaching them.
-
-    The step of approach is rounded down to a power of two of a second.  The result falls at once and rises at every
-    HOLD_STEPS-th step only, so that it does not follow the phase of oscillations.
-    """
-    step = longest
-    if contact < longest:
-        step = np.float64(np.float32(contact))  # as in contact.update.contact_step
-    if approach < step:
-        step = quantise_step(1.0, approach, True)
-    if clock[WALL_STEP] == 0.0 or step < clock[WALL_STEP] or count[STEPS] % HOLD_STEPS == 0:
-        clock[WALL_STEP] = step
 
 
 @formula

@@ -82,12 +82,12 @@ def to_lammps_dump(one: Exported) -> str:
     different in each frame, see `_numbers`.
     """
     frame = one.frame
-    walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
+    boundary = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     head = (
         f"ITEM: TIMESTEP\n{one.number}\n"
         f"ITEM: NUMBER OF ATOMS # {listed(one.materials)}\n{len(frame)}\n"
-        f"ITEM: BOX BOUNDS {walls}\n{box}"
+        f"ITEM: BOX BOUNDS {boundary}\n{box}"
         "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz mass q ix iy iz v_time"
         f"{''.join(f' d_{name}' for name in frame.own)} element c_cluster\n"
     )
@@ -110,9 +110,9 @@ def to_lammps_data(one: Exported) -> str:
     )
     density = np.asarray(frame.mass, np.float64) / (4.0 / 3.0 * np.pi * frame.radius**3)
     atoms = [one.material + 1, frame.position, 2.0 * frame.radius, density, frame.charge, frame.moment, frame.image]
-    walls = " ".join("p" if v is not None else "f" for v in frame.box.lengths)
+    boundary = " ".join("p" if v is not None else "f" for v in frame.box.lengths)
     return (
-        f"SAND, step {frame.step}, {frame.time!r} s, units si, boundary {walls}\n\n{len(frame)} atoms\n"
+        f"SAND, step {frame.step}, {frame.time!r} s, units si, boundary {boundary}\n\n{len(frame)} atoms\n"
         f"{len(one.materials)} atom types # {listed(one.materials)}\n\n"
         f"{box}\nAtoms # hybrid sphere dipole\n\n{_table(frame.id, atoms)}\n"
         f"Velocities\n\n{_table(frame.id, [frame.velocity, frame.spin])}"

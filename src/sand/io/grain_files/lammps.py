@@ -103,8 +103,8 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
         raise BadInput(f"{path}: the bounds of its box, such as 'xlo xhi', must be two numbers each") from None
     if len(bounds) == 3:
         low, high = np.array([bounds[axis] for axis in "xyz"]).T
-        walls = re.search(r"\bboundary\s+([pfsm]{1,2})\s+([pfsm]{1,2})\s+([pfsm]{1,2})", lines[0])
-        x, y, z = (walls is not None and walls[k + 1].startswith("p") for k in range(3))
+        found = re.search(r"\bboundary\s+([pfsm]{1,2})\s+([pfsm]{1,2})\s+([pfsm]{1,2})", lines[0])
+        x, y, z = (found is not None and found[k + 1].startswith("p") for k in range(3))
         data.box = FileBox(low, high, (x, y, z))
     return GrainFile("LAMMPS data", 1, lambda _number: data)
 
@@ -220,8 +220,8 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
         raise BadInput(
             f"{path}, line {first + 1}: the snapshot lacks some of its {count} atoms, or their columns' names"
         )
-    walls = [word for word in (bounds or "").split()[2:] if word[:1] in "pfsm" and word not in ("xy", "xz", "yz")]
-    x, y, z = (k < len(walls) and walls[k].startswith("p") for k in range(3))
+    boundary = [word for word in (bounds or "").split()[2:] if word[:1] in "pfsm" and word not in ("xy", "xz", "yz")]
+    x, y, z = (k < len(boundary) and boundary[k].startswith("p") for k in range(3))
     if "xy" in (bounds or "") and any((x, y, z)):
         raise BadInput(f"{path}, line {items[bounds or ''] + 1}: SAND has boxes with edges along x, y and z only")
     rows = [(k + 1, lines[k].split(), "") for k in range(begin, begin + count)]

@@ -16,26 +16,25 @@ import numpy as np
 from ..basics.box import nearest_image
 from ..basics.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME, WALL_CONTACTS
 from ..compiler.jit import caller, loop, rare
-from ..numerics.quaternion import turned, turned_back, turned_by
-from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, scale, sub
-from .constants_table import FASTEST_MODE, column_loops, load_pairing
-from .damping import NONE, Held, Surfaces, damping_loops, relative_motion, store_loads
-from .events import compact_contacts
-from .law import ContactLaw, wall_constants
-from .losses import record_slip, record_stiffness_loss
-from .mechanics import (
+from ..contact.constants_table import column_loops, load_pairing
+from ..contact.damping import Held, Surfaces, damping_loops, relative_motion, store_loads
+from ..contact.events import compact_contacts
+from ..contact.law import ContactLaw
+from ..contact.losses import record_slip, record_stiffness_loss
+from ..contact.mechanics import (
     after_slip,
     exceeds_limits,
     release_loss,
     scaled_stiffness,
     slip_losses,
     stiffness_loss,
-    stored_energies,
     time_since,
 )
-from .transitions import ZERO, Break, Touch, breaking_loop, clear_contact, touch_loop
-from .update import ContactStep
-from .wall_mechanics import WallPose, wall_displacements, wall_load, wall_pointers
+from ..contact.transitions import ZERO, Break, Touch, breaking_loop, clear_contact, touch_loop
+from ..contact.update import ContactStep
+from ..numerics.quaternion import turned, turned_back, turned_by
+from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, scale, sub
+from .wall_formulas import WallPose, wall_constants, wall_displacements, wall_load, wall_pointers
 
 FULL = -1
 """Value of `WallLoops.update` if the table of contacts is too small; nothing has changed then."""
@@ -55,14 +54,6 @@ class WallNumbers(NamedTuple):
     push: Any  # (W,) force on the wall along its normal [N], for a wall with a mass
 
 
-class WallLoops(NamedTuple):
-    """Loops over contacts with walls, for one contact law and variant of damping."""
-
-    update: Callable  # (s, numbers): walls and contacts at the end of a step; returns FULL or the number of contacts
-    energies: Callable  # (s, out) adds the energies [J] of the four modes to an array
-    constants_of: Callable  # ContactConstants of a grain and a wall
-
-
 @loop
 def wall_height(grains, walls, g, w):
     """Distance [m] of the centre of grain g from the plane of wall w; negative behind the wall."""
@@ -70,7 +61,7 @@ def wall_height(grains, walls, g, w):
 
 
 @caller
-def _wall_pose(s, c, twist):
+def wall_pose(s, c, twist):
     """Pose of contact c at the present positions, with the given twist [rad]."""
     g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
     n = load(s.walls.normal, w)
@@ -81,7 +72,7 @@ def _wall_pose(s, c, twist):
 
 
 @loop
-def _relative_velocity(grains, walls, g, w):
+def relative_velocity(grains, walls, g, w):
     """Velocity [m/s] of the centre of grain g relative to wall w."""
     return sub(load(grains.velocity, g), load(walls.velocity, w))
 
@@ -103,7 +94,7 @@ def surfaces_at_wall(bodies, contacts, c, pose):
     """The two sides of contact c, for `bodies` = (grains, walls): `damping.surfaces_of_pair` for r2 → ∞."""
     grains, walls = bodies
     g, w = contacts.pair[0, c], contacts.pair[1, c]
-    velocity, spin = _relative_velocity(grains, walls, g, w), load(grains.spin, g)
+    velocity, spin = relative_velocity(grains, walls, g, w), load(grains.spin, g)
     arm = scale(grains.radius[g], pose.n)
     motion = relative_motion(arm, velocity, spin, spin, ZERO)
     ids = grains.id[g], LAST_ID - np.uint32(w)
@@ -185,23 +176,25 @@ def _note_overlaps(grains, walls, contacts, clock, count):
 
 
 @functools.cache
-def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
-    """The loops over contacts with walls, for one contact law and variant of damping."""
-    columns, of_materials = column_loops(law), wall_constants(law)
-    constants_at, store_constants = columns.at, columns.store
-    radius_root, normal_force, normal_energy, contact_radius = (
-        law.radius_root,
-        law.force,
-        law.energy,
-        law.contact_radius,
-    )
-    dashpots = damping_loops(damping, surfaces_at_wall)
-    break_contact, touch, damp = breaking_loop(law, dashpots), touch_loop(law, dashpots), dashpots.single
+def constants_loop(law: ContactLaw) -> Callable:
+    """The function (grains, numbers, g, w) → `ContactConstants` of a grain and a wall, for one contact law."""
+    of_materials = wall_constants(law)
 
     @loop
     def constants_of(grains, numbers, g, w):
         pairing = load_pairing(numbers.pairings, grains.material[g], w)
         return of_materials(pairing, grains.radius[g], grains.mass[g], numbers.mass[w])
+
+    return constants_of
+
+
+@functools.cache
+def wall_loop(law: ContactLaw, damping: str) -> Callable:
+    """The function (s, numbers) that moves walls and updates their contacts, for a law and a variant of damping."""
+    constants_at, store_constants, constants_of = column_loops(law).at, column_loops(law).store, constants_loop(law)
+    radius_root, normal_force, contact_radius = law.radius_root, law.force, law.contact_radius
+    dashpots = damping_loops(damping, surfaces_at_wall)
+    break_contact, touch, damp = breaking_loop(law, dashpots), touch_loop(law, dashpots), dashpots.single
 
     @rare
     def update_contact(s, numbers, c, step):
@@ -209,8 +202,8 @@ def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
         contacts, bodies, dt = s.wall_contacts, (s.grains, s.walls), step.dt
         g, w = contacts.pair[0, c], contacts.pair[1, c]
         constants, twist = constants_at(contacts, c), contacts.twist[c]
-        radius, spin, velocity = s.grains.radius[g], load(s.grains.spin, g), _relative_velocity(s.grains, s.walls, g, w)
-        pose = _wall_pose(s, c, twist + dt * dot(spin, load(s.walls.normal, w)))
+        radius, spin, velocity = s.grains.radius[g], load(s.grains.spin, g), relative_velocity(s.grains, s.walls, g, w)
+        pose = wall_pose(s, c, twist + dt * dot(spin, load(s.walls.normal, w)))
         reached = wall_displacements(pose, radius)
         start = wall_displacements(_at_step_start(pose, velocity, spin, twist, dt), radius)
         overlap = reached.overlap
@@ -248,7 +241,7 @@ def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
         n, constants = load(s.walls.normal, w), constants_of(s.grains, numbers, g, w)
         from_point = sub(load(s.grains.position, g), load(s.walls.position, w))
         overlap = s.grains.radius[g] - dot(from_point, n)
-        closing = -dot(_relative_velocity(s.grains, s.walls, g, w), n)
+        closing = -dot(relative_velocity(s.grains, s.walls, g, w), n)
         clear_contact(contacts, c, s.clock[TIME] + step.dt - time_since(overlap, closing, step.dt))
         put(contacts.pointer1, c, turned_back(load4(s.grains.orientation, g), scale(-1.0, n)))
         put(contacts.pointer2, c, across(from_point, n))
@@ -285,86 +278,4 @@ def wall_loops(law: ContactLaw, damping: str = NONE) -> WallLoops:
             count[WALL_CONTACTS] = compact_contacts(contacts, count[WALL_CONTACTS])
         return count[WALL_CONTACTS]
 
-    @caller
-    def add_energies(s, out):
-        """Add the energies [J] of the four modes of all contacts with walls to `out`."""
-        contacts = s.wall_contacts
-        for c in range(s.count[WALL_CONTACTS]):
-            constants, radius = constants_at(contacts, c), s.grains.radius[contacts.pair[0, c]]
-            found = wall_displacements(_wall_pose(s, c, contacts.twist[c]), radius)
-            y = radius_root(found.overlap, constants)
-            present = scaled_stiffness(constants, y, s.settings.follow)
-            stored = stored_energies(found, normal_energy(found.overlap, y, constants), present)
-            for mode in range(4):
-                out[mode] += stored[mode]
-
-    return WallLoops(update, add_energies, constants_of)
-
-
-@loop
-def add_wall_loads(grains, contacts, count):
-    """Add the loads of contacts with walls to the loads of the grains."""
-    for c in range(count[WALL_CONTACTS]):
-        g = contacts.pair[0, c]
-        accrue(grains.force, g, load(contacts.force, c))
-        accrue(grains.torque, g, load(contacts.torque1, c))
-
-
-@loop
-def _fastest(walls, contacts, count, numbers, grains, c):
-    """Largest squared frequency [1/s²] of contact c: all contacts of a wall with a mass M share it, z m/M times."""
-    g, w = contacts.pair[0, c], contacts.pair[1, c]
-    return contacts.constants[FASTEST_MODE, c] * (1.0 + walls.contacts[w] * grains.mass[g] / numbers.mass[w])
-
-
-@functools.cache
-def wall_step_loop(law: ContactLaw) -> Callable:
-    """The loop that finds the longest step that walls allow, for one contact law."""
-    constants_of, constants_at = wall_loops(law).constants_of, column_loops(law).at
-
-    @rare
-    def wall_step(s, numbers, closing_fraction):
-        """Longest step [s] that contacts with walls allow, and that grains approaching a wall allow.
-
-        The rules are those of pairs of grains (`integrate.step_control.pair_step`): the fastest mode is resolved by
-        `settings.per_period` steps, an impact by steps of at most `criteria.impact` δ_c, and in one step a grain closes
-        at most `closing_fraction` of its gap.
-
-        Returns
-        -------
-        tuple
-            Step of contacts and step of approach [s], at most `criteria.longest`, and a grain whose centre is behind a
-            wall that it touches, or −1.
-        """
-        grains, walls, contacts, count = s.grains, s.walls, s.wall_contacts, s.count
-        impact, per_period = s.criteria.impact, s.settings.per_period
-        bound = approach = s.criteria.longest
-        behind = -1
-        for w in range(walls.work.size):
-            walls.contacts[w] = 0.0
-        for c in range(count[WALL_CONTACTS]):
-            walls.contacts[contacts.pair[1, c]] += 1.0
-        for c in range(count[WALL_CONTACTS]):
-            g, w = contacts.pair[0, c], contacts.pair[1, c]
-            speed = abs(dot(_relative_velocity(grains, walls, g, w), load(walls.normal, w)))
-            required = 2.0 * math.pi / math.sqrt(_fastest(walls, contacts, count, numbers, grains, c)) / per_period
-            bound = min(bound, required)
-            overlap = constants_at(contacts, c).break_overlap
-            if overlap > 0.0 and speed * required > impact * overlap:
-                approach = min(approach, impact * overlap / speed)
-            if wall_height(grains, walls, g, w) < 0.0:
-                behind = g
-        for w in range(walls.work.size):
-            n = load(walls.normal, w)
-            for g in range(grains.mass.size):
-                gap = wall_height(grains, walls, g, w) - grains.radius[g]
-                closing = -dot(_relative_velocity(grains, walls, g, w), n)
-                if gap > 0.0 and closing * approach > closing_fraction * gap:
-                    constants = constants_of(grains, numbers, g, w)
-                    required = 2.0 * math.pi / math.sqrt(constants.max_squared_frequency) / per_period
-                    if constants.break_overlap > 0.0 and closing * required > impact * constants.break_overlap:
-                        required = impact * constants.break_overlap / closing
-                    approach = min(approach, max(required, closing_fraction * gap / closing))
-        return bound, approach, behind
-
-    return wall_step
+    return update

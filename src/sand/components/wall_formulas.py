@@ -4,12 +4,15 @@ R = r1 and n2 = n, the normal of the wall towards the grains.  The contact point
 anchor, that is fixed to the wall.  Limits, slip, losses and stored energies are those of `mechanics`.
 """
 
+import functools
+from collections.abc import Callable
 from typing import NamedTuple
 
 from ..compiler.jit import formula
+from ..contact import tangential
+from ..contact.law import ContactLaw, reduced_constants
+from ..contact.mechanics import Displacements, load_on_grain
 from ..numerics.vec import across, axpy, scale, sub
-from . import tangential
-from .mechanics import Displacements, load_on_grain
 
 
 class WallPose(NamedTuple):
@@ -66,3 +69,19 @@ def wall_pointers(slide, roll, n, radius):
     """
     t1 = scale(1.0 / radius, roll)
     return tangential.pointer(-1.0, n, t1), sub(slide, roll)
+
+
+@functools.cache
+def wall_constants(law: ContactLaw) -> Callable:
+    """The formula `(pairing, radius, mass, wall_mass)` → `ContactConstants` of a grain and a plane wall.
+
+    The limit r2 → ∞ of `contact_constants`: R = r1 and 1/I2 = 0.  `wall_mass` is infinite if the motion of the wall is
+    given.
+    """
+    constants_of = reduced_constants(law)
+
+    @formula
+    def constants_at_wall(pairing, radius, mass, wall_mass):
+        return constants_of(pairing, radius, 1.0 / mass + 1.0 / wall_mass, 2.5 / (mass * radius * radius))
+
+    return constants_at_wall
