@@ -8,8 +8,9 @@ import pytest
 
 import sand
 from sand.cli.main import main
+from sand.io.read_grains import SINGLE_PRECISION
 from sand.io.trajectory import read_frames
-from sand.setup.from_frame import SINGLE, restore_overlaps
+from sand.setup.from_frame import restore_overlaps
 
 RADIUS = 1e-8
 STIFFNESS = 100.0
@@ -65,7 +66,7 @@ def test_every_frame_starts_a_run_with_its_contacts(collision_run):
         assert table["twist"] == pytest.approx(frame.twist, rel=1e-6, abs=1e-12)
         rounding = STIFFNESS * 64 * 2.3e-16 * 16 * RADIUS
         assert table["force"] == pytest.approx(frame.force, rel=0, abs=2e-6 * np.abs(frame.force).max() + rounding)
-        assert np.abs(sim.grains.position - frame.position).max() < 16 * SINGLE * RADIUS * 4
+        assert np.abs(sim.grains.position - frame.position).max() < 16 * SINGLE_PRECISION * RADIUS * 4
         assert sim.ledger["made"][-1] == sim.ledger["broken"][-1] == 0
 
 
@@ -133,7 +134,7 @@ def test_position_correction_of_random_packings():
         assert radius[in_contact].sum(axis=1) - apart == pytest.approx(
             overlap[kept], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
         )
-        assert np.abs(box.nearest(found - rounded)).max() < 12 * SINGLE * RADIUS * 10
+        assert np.abs(box.nearest(found - rounded)).max() < 12 * SINGLE_PRECISION * RADIUS * 10
         assert kept.sum() > 400
 
 
@@ -151,7 +152,7 @@ def test_position_correction_of_a_rigid_packing():
         found = restore_overlaps(rounded, np.full(32, RADIUS), sand.Box.open(), none, np.zeros(0))
         pairs = sand.Box.open().close_pairs(found, 2.5 * RADIUS)
         assert np.linalg.norm(found[pairs[:, 0]] - found[pairs[:, 1]], axis=1).min() > 2.0 * RADIUS
-        assert np.abs(found - rounded).max() < 1e-3 * RADIUS + 64 * SINGLE * away
+        assert np.abs(found - rounded).max() < 1e-3 * RADIUS + 64 * SINGLE_PRECISION * away
 
 
 @pytest.mark.compiled("dipoles")
@@ -235,7 +236,7 @@ def test_the_command(collision_run, tmp_path, monkeypatch, capsys):
         (["other.toml", "--from", "RUN"], ["box", "400 nm", "300 nm", "leave [box] out"]),
         (["bare.toml", "--from", "RUN"], ["contacts are given", "Contact"]),
         (["soft.toml", "--from", "RUN", "--frame", "STRETCHED"], ["soft.toml", "beyond its break"]),
-        (["both.toml"], ["number", "remove it"]),
+        (["both.toml"], ["number", "leave it out"]),
         (["fileless.toml"], ["file is missing"]),
         (["foreign.toml"], ["foreign.gsd", "not a trajectory"]),
     ],
