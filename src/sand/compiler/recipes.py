@@ -95,7 +95,7 @@ def made_from(recipe: Any) -> Any:
     if "tuple" in recipe:
         kind, members = made_from(recipe["tuple"]), map(made_from, recipe["members"])
         return tuple(members) if kind is tuple else kind(*members)
-    module, _, name = recipe.get("name", recipe.get("factory", "")).partition(":")
+    module, _, name = (recipe["name"] if "name" in recipe else recipe["factory"]).partition(":")
     found = attrgetter(name)(import_module(module))
     if "factory" in recipe:
         named = {key: made_from(each) for key, each in recipe["named"].items()}
