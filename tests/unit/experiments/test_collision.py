@@ -1,0 +1,232 @@
+"""Collisions: known outcomes, many seeds, case files and the command."""
+
+import json
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.experiments.collision import approach, collide, collide_many
+from sand.experiments.collision_case import read_collision
+from sand.experiments.collision_job import CollisionJob
+from sand.experiments.collision_outcome import collision_title
+from sand.setup import bpca, chain, grain
+from sand.theory import contact
+
+from ...bodies import read_body
+
+R = 1e-7
+
+
+def two(seed):
+    """Grains that do not depend on the seed."""
+    return grain(radius=R, material="silica"), grain(radius=R, material="silica")
+
+
+@pytest.mark.compiled("contacts")
+def test_two_grains_stick_or_bounce():
+    """Below v_s one body remains; above it two that separate at √(v² − v_s²) (1 %), and E_cycle is dissipated."""
+    numbers = contact("silica", R)
+    slow, _ = collide(*two(0), speed=0.9 * numbers.sticking_speed)
+    assert (slow.outcome, slow.fragments, slow.largest_remnant) == ("stick", (2,), 1.0)
+    fast, _ = collide(*two(0), speed=2 * numbers.sticking_speed)
+    assert (fast.outcome, fast.fragments) == ("bounce", (1, 1))
+    assert fast.rebound == pytest.approx(numbers.rebound_speed(2 * numbers.sticking_speed), rel=0.01, abs=0.0)
+    assert sum(fast.lost.values()) == pytest.approx(numbers.cycle_energy, rel=1e-3, abs=0.0)
+    assert fast.impact_energy == pytest.approx(4 * numbers.cycle_energy, rel=1e-3, abs=0.0)
+    assert (fast.made, fast.broken, fast.contacts_before, fast.contacts_after) == (1, 1, 0, 0)
+    assert fast.quiet
+
+
+@pytest.mark.compiled("contacts")
+def test_a_fast_grain_breaks_a_chain():
+    """100 m/s against 7 grains of 0.2 µm: more than two fragments, every grain accounted for."""
+    result, sim = collide(
+        chain(7, radius=R, material="silica"), grain(radius=R, material="silica"), speed=100.0, along="y"
+    )
+    assert result.outcome == "fragment"
+    assert sum(result.fragments) == 8
+    assert result.contacts_before == 6
+    assert result.gyration_before[1] == 0.0
+    chain_gyration = np.sqrt((sim.start.position[:7, 0] ** 2).mean())
+    assert result.gyration_before[0] == pytest.approx(chain_gyration, rel=1e-6, abs=0.0)
+
+
+@pytest.mark.compiled("contacts")
+def test_a_miss():
+    """An impact parameter beyond the sum of radii: two bodies, no loss."""
+    result, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b")
+    assert (result.outcome, result.made, result.rebound) == ("miss", 0, pytest.approx(1.0, rel=1e-6, abs=0.0))
+    assert sum(result.lost.values()) == 0.0
+
+
+def aggregates(seed):
+    """Two small aggregates for a seed."""
+    return tuple(bpca(8, radius=R, material="silica", seed=2 * seed + k) for k in range(2))
+
+
+@pytest.mark.compiled("contacts", "small")
+def test_any_executor_gives_the_same_numbers():
+    """In this process, in threads and in processes: the same results in the order of the seeds."""
+    here = collide_many(aggregates, [3, 1, 2], speed=2.0)
+    assert [r.seed for r in here] == [3, 1, 2]
+    assert here[0] != here[1]
+    with ThreadPoolExecutor(2) as pool:
+        assert collide_many(aggregates, [3, 1, 2], pool, speed=2.0) == here
+
+
+CASE = """
+[target]
+kind = "bpca"
+grains = 8
+radius = "0.1 um"
+[projectile]
+kind = "grain"
+radius = "0.1 um"
+[impact]
+speed = "2 m/s"
+seeds = [1, 2]
+[forces.contact]
+"""
+
+
+@pytest.mark.compiled("contacts", "small")
+def test_a_case_in_processes(tmp_path):
+    """Worker processes read the case themselves and give the results of the parent."""
+    path = tmp_path / "hit.toml"
+    path.write_text(CASE)
+    here = CollisionJob(path, tmp_path / "here").run()["collisions"]
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert CollisionJob(path, tmp_path / "there").run(pool)["collisions"] == here
+
+
+@pytest.mark.compiled("contacts", "small")
+def test_the_command(tmp_path, capsys, monkeypatch):
+    """Many seeds: collision.json and a figure; one seed: a run folder; an existing folder is refused."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hit.toml").write_text(CASE)
+    assert main(["collide", "hit.toml", "--json"]) == 0
+    message = json.loads(capsys.readouterr().out)
+    assert len(message["collisions"]) == 2
+    assert sum(message["counts"].values()) == 2
+    assert (tmp_path / "hit" / "figure.png").stat().st_size > 0
+    assert json.loads((tmp_path / "hit" / "collision.json").read_text()) == message
+    assert main(["collide", "hit.toml"]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one"]) == 0
+    assert "seed 2" in capsys.readouterr().out
+    monkeypatch.setattr("sand.cli.report.LINE_AT_LEAST", 0.0)
+    assert main(["collide", "hit.toml", "--overwrite"]) == 0
+    assert {"1 of 2 collisions", "2 of 2 collisions"} <= {
+        part for line in capsys.readouterr().err.splitlines() for part in line.split(", ")
+    }
+    monkeypatch.setattr("sand.cli.report.LINE_EVERY", 0.0)
+    assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one", "--overwrite"]) == 0
+    assert " ns, " in (err := capsys.readouterr().err) and "clusters, S = " in err
+    assert (tmp_path / "one" / "trajectory.gsd").exists()
+    assert json.loads((tmp_path / "one" / "collision.json").read_text())["collisions"][0] == message["collisions"][1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('kind = "bpca"\ngrains = 8', 'kind = "chain"\ngrains = 0', "target.grains = 0"),
+        ('kind = "bpca"\ngrains = 8', 'kind = "chain"', "target: grains is missing: how many does the chain have?"),
+        ('kind = "bpca"', 'kind = "blob"', "target.kind = 'blob'; allowed: grain, chain"),
+        ('"2 m/s"', '"2 m"', "impact.speed = '2 m' is not a quantity in m/s"),
+        ('"2 m/s"', '"0 m/s"', "above 0"),
+        ("seeds = [1, 2]", "sedes = [1, 2]", "impact.sedes: there is no such key; did you mean 'seeds'?"),
+        ("[forces.contact]", '[forces.contact]\nslip = "clmp"', "did you mean 'clamp'"),
+        (
+            'radius = "0.1 um"\n[impact]',
+            'radius = "0.1 um"\nmaterial = "silicon"\n[impact]',
+            "unknown material 'silicon'",
+        ),
+    ],
+)
+def test_bad_cases(tmp_path, old, new, message):
+    """One line each, with file and key."""
+    path = tmp_path / "bad.toml"
+    assert old in CASE
+    path.write_text(CASE.replace(old, new))
+    with pytest.raises(sand.BadInput, match=message) as caught:
+        read_collision(path)
+    assert all(problem.startswith(str(path)) for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("seeds", ["x", "3-", "5-1", "1,,2", "-1"])
+def test_bad_seeds(tmp_path, capsys, seeds):
+    """One line, exit 2."""
+    path = tmp_path / "hit.toml"
+    path.write_text(CASE)
+    assert main(["collide", str(path), f"--seeds={seeds}", "--out", str(tmp_path / "out")]) == 2
+    assert "--seeds" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.compiled("contacts", "small")
+def test_bodies_from_files(tmp_path):
+    """Text columns in nanometres and the last frame of a trajectory collide like built bodies."""
+    built = bpca(8, radius=R, material="silica", seed=3)
+    lines = "\n".join(" ".join(f"{1e9 * x:.17g}" for x in row) for row in built.position)
+    (tmp_path / "body.txt").write_text(f"# x y z in nm\n\n{lines}\n")
+    body = read_body(tmp_path / "body.txt", sand.SILICA, R, "1 nm")
+    assert body.position == pytest.approx(built.position, abs=1e-18)
+    sim = sand.Simulation(built, [sand.Contact()], out=tmp_path / "run")
+    sim.run(steps=10)
+    again = read_body(tmp_path / "run" / "trajectory.gsd", sand.SILICA)
+    assert again.position == pytest.approx(built.position, abs=1e-6 * R)
+    assert again.radius == pytest.approx(built.radius, rel=1e-6, abs=0.0)
+    path = tmp_path / "hit.toml"
+    old = 'kind = "bpca"\ngrains = 8\nradius = "0.1 um"'
+    path.write_text(
+        CASE.replace(old, f'kind = "file"\nfile = "{tmp_path}/body.txt"\nlength = "1 nm"\nradius = "0.1 um"')
+    )
+    outcome, _ = read_collision(path).run(1)
+    assert outcome.contacts_before == 7
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 2\n", r"line 1: '1 2' is not x y z"),
+        ("1 2 3\n1 2 3 4\n", r"line 2: "),
+        ("1 2 nan\n", r"line 1: '1 2 nan'"),
+        ("# nothing\n", "holds no grain"),
+        ("1 2 3\n", "has no radii"),
+        ("a b c\n" * 20, "line 10"),
+    ],
+)
+def test_bad_bodies(tmp_path, text, message):
+    """File, line and what is allowed; ten lines at most."""
+    path = tmp_path / "body.txt"
+    path.write_text(text)
+    with pytest.raises(sand.BadInput, match=message) as caught:
+        read_body(path, sand.SILICA)
+    assert len(caught.value.problems) <= 10
+
+
+def test_a_negative_seed_of_the_orientations_is_refused():
+    """`collide(seed=-1)` raises BadInput that names the seed, before anything runs."""
+    with pytest.raises(sand.BadInput, match="seed = -1"):
+        collide(*two(0), speed=1.0, seed=-1)
+
+
+def test_the_title_of_a_figure():
+    """Bodies, speed, impact parameter and outcome of one collision; numbers and ranges of several."""
+    bodies = [sand.setup.chain(n, radius="0.1 um", material=m) for n, m in ((3, "silica"), (1, "iron"), (2, "silica"))]
+    one = [{"impact_parameter": 2e-6, "speed": 1.5, "outcome": "fragment"}]
+    two = [*one, {"impact_parameter": 1e-6, "speed": 1.5, "outcome": "stick"}]
+    given = {"speed": 1.5, "impact_parameter": "0.15 um", "along": "y", "seed": None}
+    start = approach(bodies[0], bodies[1], **given)
+    assert start.impact_parameter == pytest.approx(1.5e-7, rel=1e-12, abs=0.0)
+    assert start.bodies() == "3 grains of silica + 1 grain of iron"
+    assert approach(bodies[0], bodies[2], **given).bodies() == "3 + 2 grains of silica"
+    text = "at 1.5 m/s, impact parameter"
+    assert collision_title(one, "X") == f"Collision of X {text} 2 µm: they break up"
+    assert collision_title(two, "X") == f"2 collisions of X {text} 1 µm to 2 µm"
+    head_on = [one[0] | {"impact_parameter": 1e-25, "outcome": "stick"}]
+    assert collision_title(head_on, "X") == "Collision of X at 1.5 m/s, head-on: they stick"

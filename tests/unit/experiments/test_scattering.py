@@ -1,0 +1,372 @@
+"""Cross-sections: replay, executors, interruptions, the command, errors."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.experiments.executors import executor_for
+from sand.experiments.scattering import cross_sections as scattering
+from sand.experiments.scattering.flights import COLUMNS, fly, replay
+from sand.experiments.scattering.maps import probability_map
+from sand.experiments.scattering.sampling import Task
+
+from ...systems import KILL, stops_others
+
+GRAINS = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg", "temperature": "100 K"}
+CASE = """
+[projectile]
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+
+[flight]
+temperature = "100 K"
+speed = [1, 2]
+speed_unit = "thermal"
+start = "4 b_max"
+
+[measure]
+relative_error = 0.05
+seed = 3
+"""
+
+
+class ReversingExecutor(Executor):
+    """Runs tasks when results are requested, the last first."""
+
+    def __init__(self):
+        self.waiting = []
+
+    def submit(self, function, /, *args, **options):
+        future = Future()
+        self.waiting.append((future, function, args))
+        if len(self.waiting) >= 1:
+            for one, work, given in reversed(self.waiting):
+                if not one.done():
+                    one.set_result(work(*given))
+        return future
+
+
+def numbers(found):
+    """Everything that does not depend on wall time."""
+    output = found.to_dict()
+    output.pop("seconds")
+    return json.dumps({k: np.asarray(v).tolist() for k, v in output.items()})
+
+
+@pytest.fixture
+def here():
+    return scattering.cross_section(
+        **GRAINS, speed=1, speed_unit="thermal", start="4 b_max", relative_error=0.05, seed=3
+    )
+
+
+@pytest.mark.compiled("scattering")
+def test_replay_of_one_trajectory(here):
+    """A row of a batch of 200 and its replay: the same end, time and distance, to the bit."""
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
+    width = float(here.profile[0, 1])
+    rows = fly(pair, [Task(5, 100, 300)], width, seed=9)
+    for k in (0, 77, 199):
+        alone = replay(pair, 5, 100 + k, width, seed=9)
+        row = dict(zip(COLUMNS, rows[k], strict=True))
+        assert alone.time[-1] == row["time"]
+        assert alone.time.size == row["steps"] + 1
+        assert alone.impact_parameter == row["impact_parameter"]
+        assert ("hit", "miss").index(alone.end) == row["end"]
+
+
+@pytest.mark.compiled("scattering")
+def test_any_split_gives_the_same_numbers(here, monkeypatch):
+    """Batches of 64 in two processes, or in reverse order here: the bits of one process."""
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    monkeypatch.setattr(scattering, "MOST", 64)
+    again = scattering.measure(pair, relative_error=0.05, seed=3, executor=ReversingExecutor())
+    assert numbers(again) == numbers(here)
+    with executor_for(2) as pool:
+        assert numbers(scattering.measure(pair, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
+    other = scattering.measure(pair, relative_error=0.05, seed=4)
+    assert numbers(other) != numbers(here)
+
+
+@pytest.mark.validate
+def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
+    """dask.distributed with two workers, one killed after the first batch: the same numbers."""
+    distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
+    monkeypatch.setattr(scattering, "MOST", 32)
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        victim = next(iter(cluster.workers.values()))
+        killed = []
+
+        def kill(rows):
+            if not killed:
+                killed.append(victim.pid)
+                os.kill(victim.pid, KILL)
+
+        with executor_for(scheduler=cluster.scheduler_address) as executor:
+            found = scattering.measure(pair, relative_error=0.05, seed=3, executor=executor, keep=kill)
+        assert killed
+    assert numbers(found) == numbers(here)
+
+
+@pytest.mark.compiled("scattering")
+def test_resume_computes_missing_trajectories_only(here):
+    """With the rows of half the trajectories the other half is computed; the same result."""
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    rows, later = [], []
+    undisturbed = scattering.measure(pair, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
+    again = scattering.measure(
+        pair, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
+    )
+    assert numbers(again) == numbers(undisturbed) == numbers(here)
+    assert len(later) == len(rows) - len(rows[::2])
+
+
+@pytest.mark.compiled("scattering")
+def test_hit_map():
+    """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all trajectories are listed."""
+    trajectories = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
+    found = probability_map(trajectories, cells=6, per_cell=16)
+    assert (found.flights == 16).all()
+    assert (found.probability[:, 0] == 1.0).all()
+    assert (found.probability[:, 5] == 0.0).all()
+    low, high = found.interval()
+    assert (low <= found.probability).all() and (found.probability <= high).all()
+    assert len(found.to_rows()) == 12
+    assert found.edges[:, -1] == pytest.approx(1.2 * found.capture, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.compiled("scattering")
+def test_the_command(tmp_path, capsys):
+    """Two speeds: files, figure, JSON; the folder is not overwritten; resuming computes no trajectory."""
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE)
+    assert main(["scatter", str(case), "--out", str(out), "--json"]) == 0
+    output = json.loads(capsys.readouterr().out)
+    assert [round(one["c"], 1) for one in output["cross_sections"]] == [1.0, 1.0]
+    assert output["versions"]["numba"] and output["seed"] == 3
+    assert {p.name for p in out.iterdir()} == {
+        ".lock",
+        "case.toml",
+        "flights.csv",
+        "results.csv",
+        "scattering.json",
+        "figure.png",
+    }
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    assert main(["scatter", str(case), "--out", str(out)]) == 2
+    assert "sand resume" in capsys.readouterr().err
+    assert main(["scatter", str(case), "--out", str(out), "--resume", "--workers", "2"]) == 0
+    assert "sigma = " in capsys.readouterr().out
+    for name in ("flights.csv", "results.csv", "figure.png"):
+        assert (out / name).read_bytes() == before[name]
+    for path, expected in ((case, "scattering case"), (out, "results.csv"), (out / "scattering.json", "sigma = ")):
+        assert main(["info", str(path)]) == 0
+        assert expected in capsys.readouterr().out
+    case.write_text(CASE.replace("seed = 3", "seed = 4"))
+    assert main(["scatter", str(case), "--out", str(out), "--resume"]) == 2
+    assert "another case" in capsys.readouterr().err
+
+
+@pytest.mark.validate
+def test_killed_job_is_resumed(tmp_path):
+    """Killed, with an incomplete last line: resumed, its files equal those of an undisturbed job."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace("[1, 2]", "[1, 1.5, 2]").replace("0.05", "0.01").replace('"4 b_max"', '"20 b_max"'))
+    undisturbed, cut = tmp_path / "whole", tmp_path / "cut"
+    assert main(["scatter", str(case), "--out", str(undisturbed), "--quiet"]) == 0
+    job = subprocess.Popen([sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(cut), "--quiet"])
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and job.poll() is None:
+        if (cut / "flights.csv").exists() and (cut / "flights.csv").stat().st_size > 2e4:
+            break
+        time.sleep(0.005)
+    job.kill()
+    job.wait()
+    assert (cut / "flights.csv").stat().st_size < 0.9 * (undisturbed / "flights.csv").stat().st_size
+    assert not (cut / "scattering.json").exists()
+    with open(cut / "flights.csv", "a") as file:
+        file.write("0,3,77,1,3.3e-")
+    assert main(["resume", str(cut), "--quiet"]) == 0
+    for name in ("flights.csv", "results.csv"):
+        assert (cut / name).read_bytes() == (undisturbed / name).read_bytes()
+
+
+@pytest.mark.compiled("scattering")
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"speed": 0}, "speed = 0"),
+        ({"speed": "3 m"}, "speed = '3 m'"),
+        ({"speed": None}, "speed is missing"),
+        ({"start": "15 nm"}, r"is inside r1 \+ r2"),
+        ({"start": "0.01 b_max"}, r"is inside r1 \+ r2"),
+        ({"start": "1e b_max"}, "start in b_max = '1e'"),
+        ({"start": "-5 b_max"}, "start in b_max"),
+        ({"start": "1e999 b_max"}, "start in b_max"),
+        ({"start": "1e26 m"}, "and at most 1e"),
+        ({"start": "10 b_max", "moment": 0.0}, "without moments"),
+        ({"escape": "1 nm"}, "must exceed r1"),
+        ({"target_velocity": [0.2, 0, 0]}, "never collide"),
+        ({"projectile": "iron"}, "projectile = 'iron'"),
+        ({"projectile": sand.setup.grain(radius=1e-8, material="iron")}, "leave them out"),
+        ({"orientation": [1]}, "orientation"),
+        ({"seed": -1}, "seed = -1"),
+        ({"seed": 2**64}, "seed"),
+        ({"seed": 1.5}, "seed = 1.5"),
+        ({"speed": 1e-30}, "cannot be computed"),
+        ({"start": "10 bmax"}, "start = '10 bmax' must be"),
+        ({"start": "1 R_m", "temperature": 0}, "needs a temperature"),
+        ({"spin": "kT"}, "spin = 'kT'"),
+        ({"spin": "kT/2", "temperature": 0}, "needs a temperature"),
+        ({"speed_unit": "thermal", "temperature": "0 K"}, "needs a temperature"),
+        ({"speed_unit": "km"}, "speed_unit"),
+        ({"orientation": "aligne"}, "did you mean 'aligned'"),
+        ({"start_shape": "cube"}, "start_shape"),
+        ({"field": [1, 2]}, "field"),
+        ({"target_velocity": "fast"}, "target_velocity"),
+        ({"escape": "-1 m"}, "escape"),
+        ({"tolerance": 0.1}, "tolerance"),
+        ({"outcome": "stuck"}, "outcome"),
+        ({"radius": "-1 nm"}, "radius"),
+        ({"material": "irn"}, "irn"),
+        ({"relative_error": 0.9}, "relative_error"),
+    ],
+)
+def test_wrong_arguments_are_refused(options, expected):
+    """One line each, with the given value."""
+    given = GRAINS | {"speed": 0.2} | options
+    with pytest.raises(sand.BadInput, match=expected) as caught:
+        scattering.cross_section(**given)
+    assert len(caught.value.problems) == 1
+
+
+def test_all_errors_are_reported_together():
+    """Three at a time."""
+    with pytest.raises(sand.BadInput) as caught:
+        scattering.flight(**(GRAINS | {"temperature": "3 m"}), speed=-1, spin="none", start_shape="cube")
+    assert len(caught.value.problems) == 3
+
+
+def test_impossible_impact_parameters():
+    """Negative, in b_max without moments, outside the sphere of starts."""
+    pair = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
+    plain = scattering.flight(radius="10 nm", material="iron", speed=0.2)
+    for one, b, expected in (
+        (pair, "-1 nm", "at least 0"),
+        (plain, "1 b_max", "without moments"),
+        (pair, "2 um", "below"),
+    ):
+        with pytest.raises(sand.BadInput, match=expected):
+            scattering.trajectory(one, b)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (("speed = [1, 2]", "speed = 0"), "speed = 0"),
+        (("speed = [1, 2]", "sped = 1"), "did you mean 'speed'"),
+        (("seed = 3", 'job = "mapp"'), "measure.job"),
+        (("seed = 3", 'job = "trajectories"'), "a single speed"),
+        (
+            ("seed = 3", 'spins = ["none"]'),
+            "spins = ['none'] is not used by job = 'cross-section'; leave it out, or give job = 'trajectories'",
+        ),
+        (("seed = 3", "seed = 18446744073709551616"), "seed"),
+        (("relative_error = 0.05", "relative_error = 5"), "relative_error"),
+        (('start = "4 b_max"', 'start = "12 nm"'), "is inside r1"),
+        (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
+    ],
+)
+def test_wrong_cases_write_nothing(tmp_path, capsys, change, expected):
+    """Exit code 2, one line with the file's name, no folder."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace(*change))
+    assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and expected in lines[0] and "case.toml" in lines[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("address", "expected"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")]
+)
+def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, expected):
+    """One line, exit code 2, nothing written."""
+    from sand.experiments import executors
+
+    monkeypatch.setattr(executors, "ANSWER", 0.5)
+    case = tmp_path / "case.toml"
+    case.write_text(CASE)
+    assert main(["scatter", str(case), "--out", str(tmp_path / "out"), "--scheduler", address]) == 2
+    lines = [line for line in capsys.readouterr().err.strip().splitlines() if line.startswith("sand:")]
+    assert len(lines) == 1 and expected in lines[0]
+    assert not (tmp_path / "out").exists()
+
+
+class Done(Future):
+    """A future that has its result."""
+
+    def __init__(self):
+        super().__init__()
+        self.set_result(None)
+
+
+@pytest.mark.compiled("scattering")
+def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
+    """One line with the command to continue, exit code 2; then the rest is computed."""
+    from concurrent.futures import process
+
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE)
+
+    def submit(_pool, _in_worker, work, *_given):
+        if work is not int:  # the task by which processes are started
+            raise process.BrokenProcessPool("a process was killed")
+        return Done()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(process.ProcessPoolExecutor, "submit", submit)
+        assert main(["scatter", str(case), "--out", str(out), "--workers", "2"]) == 2
+    output = capsys.readouterr().err
+    assert "a worker process died" in output
+    assert "sand resume" in output
+    assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
+
+
+@stops_others
+@pytest.mark.compiled("scattering")
+def test_sigterm_tells_how_to_resume(tmp_path):
+    """SIGTERM during the job: exit code 130 and one line with --resume."""
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE.replace("0.05", "0.001").replace('"4 b_max"', '"4 b_max"\nspin = "equipartition"'))
+    words = [sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(out)]
+    job = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    deadline, table = time.monotonic() + 60, out / "flights.csv"
+    while time.monotonic() < deadline and not (table.exists() and table.stat().st_size > 9000):
+        time.sleep(0.02)
+    job.terminate()
+    output = job.communicate(timeout=30)[1]
+    assert job.returncode == 130
+    assert output.count("sand:") == 1
+    assert "sand resume" in output
+
+
+def test_a_map_needs_speeds_that_differ(tmp_path, capsys):
+    """One line; speeds in any order give the same map."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace("[1, 2]", "[1, 1]").replace("relative_error = 0.05", 'job = "map"'))
+    assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
+    assert "speeds that differ" in capsys.readouterr().err

@@ -1,0 +1,157 @@
+"""Checkpoints with a valid checksum and impossible numbers are refused before compiled code reads them."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sand
+from sand.basics.arrays import SAVED_BODIES, SAVED_WALLS, body_arrays
+from sand.basics.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS, WALL_CONTACTS
+from sand.cli.main import main
+from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
+
+REFERENCE = Path(__file__).parents[2] / "reference"
+ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))
+META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
+ONE_WALL = {
+    **{f"walls/{name}": np.zeros((3, 1)) for name in SAVED_WALLS},
+    "walls/work": np.zeros(1),
+    "wall_contacts/pair": np.zeros((2, 1), np.uint32),
+    **{f"wall_contacts/{name}": np.zeros((3, 1)) for name in ("pointer1", "pointer2", "force", "torque1")},
+    **{f"wall_contacts/{name}": np.zeros(1) for name in ("twist", "formed")},
+    "wall_contacts/constants": np.ones((5, 1)),
+    "wall_contacts/lost": np.zeros((4, 1)),
+    "wall_contacts/damping": np.zeros((12, 1)),
+    "wall_contacts/flag": np.zeros(1, np.uint8),
+}
+"""A wall with one contact."""
+BODIES = {f"bodies/{name}": array for name, array in body_arrays(4)._asdict().items() if name in SAVED_BODIES}
+BODIES["bodies/first"][:] = np.arange(4)
+CROSSINGS = {"grains/image": np.zeros((3, 4), np.int32)}
+WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES, **CROSSINGS}
+WITH_ORDER["count"] = ARRAYS["count"].copy()
+WITH_ORDER["count"][WALL_CONTACTS] = 1
+FAR = 2**31 - 1
+"""An index out of range."""
+
+
+def error_of(folder, arrays, meta=META):
+    """The error message for a checkpoint written with a valid checksum."""
+    path = write_checkpoint(folder, arrays, dict(meta))
+    with pytest.raises(sand.BadInput) as error:
+        newest_checkpoint(folder)
+    message, last = error.value.problems
+    assert message.startswith(f"{path} cannot be resumed: ") and "no checkpoint to continue from" in last
+    assert path.exists()
+    return message
+
+
+def test_the_reference_state_is_valid():
+    """The reference checkpoint has no errors."""
+    check_state(*read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz"))))
+
+
+def test_every_array_of_a_checkpoint_is_in_the_table():
+    """A new array needs a line in the table."""
+    assert set(WITH_ORDER) == set(STORED)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(STORED))
+def test_wrong_types_shapes_and_values(tmp_path, name):
+    """Each array: other type, one column less or more, one axis less, NaN, an index out of range."""
+    good = WITH_ORDER[name]
+    changed = {
+        "type": good.astype({"f": np.float32, "u": np.int64, "i": np.float64}[good.dtype.kind]),
+        "axis": good[None],
+        "number": np.array(1, good.dtype),
+    }
+    if good.shape[-1] > 1 or name not in ("contacts/constants", "pair_list/step", "pair_list/break_overlap"):
+        changed["shape"] = np.concatenate([good, good], axis=-1) if good.size else np.zeros((3, 1))
+    if good.size and good.dtype.kind == "f":
+        changed["not a number"] = np.full_like(good, np.nan)
+    if good.size and name.split("/")[-1] in ("pair", "side", "start", "order", "id", "first"):
+        changed["beyond"] = good.copy()
+        changed["beyond"].flat[-1] = FAR
+    if name in ("grains/radius", "grains/mass", "grains/inertia"):
+        changed["zero"], changed["below 0"] = 0.0 * good, -good
+    if name in ("contacts/every_step", "pair_list/in_contact", "bodies/asleep"):
+        changed["neither"] = np.full_like(good, 2)
+    for what, array in changed.items():
+        message = error_of(tmp_path, {**WITH_ORDER, name: array})
+        sizing = what == "shape" and name in (
+            "grains/radius",
+            "contacts/pair",
+            "pair_list/pair",
+            "walls/work",
+            "wall_contacts/pair",
+        )  # then other arrays are inconsistent
+        assert sizing or f"'{name}'" in message, (what, message)
+    if STORED[name].required:
+        without = {other: array for other, array in WITH_ORDER.items() if other != name}
+        assert re.search(f"there is no array '{name}'", error_of(tmp_path, without))
+
+
+def changed_entry(name, index, value):
+    array = WITH_ORDER[name].copy()
+    array[index] = value
+    return {**WITH_ORDER, name: array}
+
+
+@pytest.mark.parametrize(
+    ("index", "value"),
+    [(CONTACTS, 2), (CONTACTS, 10**15), (CONTACTS, -1), (PAIRS, 4), (STAGE, 1), (STEPS, 61), (GRAIN1, FAR)],
+)
+def test_inconsistent_counters(tmp_path, index, value):
+    """Numbers of contacts and pairs against the arrays, the step against meta.json, an invalid grain index."""
+    assert f"{COUNT[index]} = {value}" in error_of(tmp_path, changed_entry("count", index, value))
+
+
+def test_inconsistent_lists(tmp_path):
+    """A pair of one grain, a contact in the wrong row, decreasing row starts, a grain twice in the order."""
+    for name, index, value, words in (
+        ("contacts/pair", (0, 0), ARRAYS["contacts/pair"][1, 0], "the same grain twice"),
+        ("pair_list/pair", (1, 0), ARRAYS["pair_list/pair"][0, 0], "the same grain twice"),
+        ("contacts/start", 1, 5, "'contacts/start'"),
+        ("order", 0, 1, "once"),
+        ("grains/id", 0, 1, "each once"),
+    ):
+        assert words in error_of(tmp_path, changed_entry(name, index, value))
+    turned = ARRAYS["contacts/side"][::-1].copy()
+    assert "contacts of each grain" in error_of(tmp_path, {**ARRAYS, "contacts/side": turned})
+
+
+@pytest.mark.parametrize("name", [*NUMBERS, *PLANNED_END, "choices", "case", "ledger"])
+def test_invalid_metadata(name):
+    """Text, a list, NaN, infinite, negative or missing: one line that names the entry."""
+    strange = ["", 3] if name in ("choices", "case", "ledger") else ["", [1], -1, np.nan, np.inf, 10**400, True]
+    for value in strange:
+        with pytest.raises(sand.BadInput, match=f"meta.json has {name} = "):
+            check_state(ARRAYS, {**META, "version": VERSION, name: value})
+    if name in (*NUMBERS, *PLANNED_END):
+        with pytest.raises(sand.BadInput, match=f"meta.json has {name} = None"):
+            check_state(ARRAYS, {key: value for key, value in META.items() if key != name} | {"version": VERSION})
+
+
+@pytest.mark.slow
+def test_commands_refuse_invalid_checkpoints(tmp_path, capsys):
+    """`sand resume` and `sand info`: exit code 2 and one line; also materials that the case lacks."""
+    for arrays in (
+        changed_entry("contacts/pair", (1, 2), FAR),
+        changed_entry("pair_list/pair", (1, 2), FAR),
+        changed_entry("grains/material", slice(None), 1),
+    ):
+        folder = tmp_path / "run"
+        shutil.copytree(REFERENCE / f"run-v{VERSION}", folder)
+        path = write_checkpoint(folder, arrays, dict(META))
+        assert main(["resume", str(folder)]) == 2
+        message = capsys.readouterr().err.strip().splitlines()
+        assert str(folder) in message[0] and not [line for line in message if "internal" in line]
+        if arrays["grains/material"][0] == 0:
+            assert f"names grain {FAR}, but the grains are 0 to 3" in message[0]
+            assert main(["info", str(path)]) == 2
+        shutil.rmtree(folder)

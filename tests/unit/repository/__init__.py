@@ -1,0 +1,1 @@
+"""Tests of the repository: docs, builds, figures that pages quote."""
