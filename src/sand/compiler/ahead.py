@@ -34,7 +34,8 @@ from .table import Table, structure_of
 __all__ = ["compile_ahead", "compile_free", "kernel_from", "number_of_helpers", "share_compilation"]
 
 WORTH_HELPERS = 6.0
-"""Expected time [s] of compilation from which on helpers save time."""
+"""Expected time [s] of compilation from which on a helper saves 2 s: it needs 0.5 s to start, and 1 s more for its
+first stage (measured), and what a run may never call is compiled, too."""
 HELPER_BYTES = 5e8
 """Memory that a helper needs (measured)."""
 LOOK = 0.05
