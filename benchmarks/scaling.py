@@ -51,7 +51,7 @@ def tree(count: int, accuracy: float = 1e-3) -> Tree:
     grains = sand.Grains(place, 1e-8, sand.IRON, moment=moment)
     sim = sand.Simulation(grains, [sand.Dipoles(open="tree", accuracy=accuracy)], stepping=sand.Verlet(step="1 fs"))
     sim.run(steps=1)
-    (_, parameters) = sim._engine.components.pair_forces[0]
+    (_, parameters) = sim._engine.content.pair_forces[0]
     memory = sum(array.nbytes for group in (parameters.cells, parameters.scratch) for array in group)
     return Tree(min(per_step(sim, max(100_000 // count, 1)) for _ in range(PIECES)) / count, memory)
 

@@ -124,6 +124,35 @@ def listed(folder: Path) -> dict[str, Any]:
 
 
 @golden
+def walls(folder: Path) -> dict[str, Any]:
+    """Grains between a wall at rest and one with a mass that is pressed on them, with dashpots and the noise of a bath."""
+    position = [[2.5e-7 * x, 2.5e-7 * y, 1.05e-7 + 2.2e-7 * z] for x in range(3) for y in range(2) for z in range(2)]
+    grains = sand.Grains(position, "0.1 um", "silica", velocity=[0.3, 0.1, -2.0], spin=[1e6, 2e5, 0.0])
+    lid = sand.Wall([0, 0, "0.5 um"], [0, 0, -1], "ice", mass="1e-15 kg", force="1 nN")
+    numbers = {}
+    for bath in (None, "300 K"):
+        contact = sand.Contact(damping="critical", bath_temperature=bath)
+        sim = sand.Simulation(grains, contact, walls=[sand.Wall([0, 0, 0], [0, 0, 1], "silica"), lid], seed=1)
+        sim.run(until="40 ns")
+        numbers |= {f"{bath} {name}": value for name, value in end_of(sim).items()}
+    return numbers
+
+
+@golden
+def rigid(folder: Path) -> dict[str, Any]:
+    """Rigid clusters in a box with dipoles, and with substeps in a gas."""
+    contact = sand.Contact(damping="critical", settling_time="5 ns")
+    dense = sand.Simulation(
+        gas(60, "0.5 um"), [contact, sand.Dipoles(cutoff="0.12 um")], box="0.5 um", stepping=sand.RigidClusters()
+    )
+    dense.run(until="60 ns")
+    forces = [contact, sand.Dipoles(cutoff="0.3 um"), sand.Gas("300 K", pressure="1 bar")]
+    thin = sand.Simulation(gas(60, "1 um"), forces, box="1 um", seed=1, stepping=sand.RigidClusters())
+    thin.run(until="0.2 us")
+    return end_of(dense) | {f"gas {name}": value for name, value in end_of(thin).items()}
+
+
+@golden
 def external(folder: Path) -> dict[str, Any]:
     """Gravity, an electric field, a rotating magnetic field and Newtonian attraction, open space."""
     forces = [

@@ -140,10 +140,10 @@ def test_a_folder_removed_during_a_run(undisturbed_run, tmp_path):
     script = (
         "import shutil, sys, sand; from sand.cli.main import main; from sand.simulation.ledger import Ledger\n"
         "plain, seen = Ledger.add, []\n"
-        "def add(self, row):\n"
+        "def add(self, row, with_frame=False):\n"
         "    seen.append(row)\n"
         "    if len(seen) == 5: shutil.rmtree(sys.argv[2])\n"
-        "    return plain(self, row)\n"
+        "    return plain(self, row, with_frame)\n"
         "Ledger.add = add\n"
         "sys.exit(main(['run', sys.argv[1], '--out', sys.argv[2], '--quiet']))\n"
     )

@@ -221,7 +221,7 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
     sim = two_chains(longest_step="0.2 ns")
     sim.run(steps=2)
     engine, state = sim._engine, sim.regular_state
-    steps = engine.taken
+    steps = engine.stepper
     assert not state.bodies.asleep.any()
     before, arrays = state.copy(), state.grains.arrays
     steps.sort_members(state)

@@ -77,7 +77,7 @@ def test_the_number_of_threads_changes_no_bit(cutoff, size):
         sand.set_threads(number)
         sim = vibrating_lattice(cutoff, size)
         assert sim._engine._workers is not None
-        assert bool(sim._engine.components.pair_forces) is (cutoff != "bare")
+        assert bool(sim._engine.content.pair_forces) is (cutoff != "bare")
         sim.run(steps=25)
         sim.run(steps=35)
         ends.append(state(sim))

@@ -1,4 +1,4 @@
-"""Arrays of contacts, candidate pairs and long-range forces that stages read and write, and their allocation."""
+"""Arrays of contacts, candidate pairs, long-range forces, clusters, walls and bodies, and their allocation."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class ContactArrays(NamedTuple):
     force: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) uint8: 0 within all limits, else one of the flags of contact.update
+    flag: np.ndarray  # (C,) uint8: 0 within all limits, else one of the flags of contact.transitions
     every_step: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts in every step
     side: np.ndarray  # (2C,) uint32: 2 × contact, plus 1 for grain 2; sorted by grain
     start: np.ndarray  # (N+1,) uint32: first entry of each grain in `side`
@@ -53,7 +53,7 @@ class PairList(NamedTuple):
     anchor: np.ndarray  # (3, N) positions when the list was built [m]; a buffer while it is built from cells
     # (P/8,) uint32: inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
     inner: np.ndarray
-    skin: np.ndarray  # (7,) remaining skins, largest speeds: indices in state.state, explained in neighbours.skin
+    skin: np.ndarray  # (7,) remaining skins, largest speeds: indices in basics.state, explained in neighbours.skin
 
 
 class LongRangeArrays(NamedTuple):
@@ -141,12 +141,12 @@ class BodyArrays(NamedTuple):
     force: np.ndarray  # (3, N) of all other grains and external forces on a body [N]
     torque: np.ndarray  # (3, N) likewise, about its centre of mass [N m]
     decay: np.ndarray  # (6, N) rates of the modes of friction of a body in a gas [1/s]; (6, 0) without gas
-    mode: np.ndarray  # (36, N) these modes, one after the other, see integrate.body_friction; (36, 0) likewise
+    mode: np.ndarray  # (36, N) these modes, one after the other, see rigid.body_friction; (36, 0) likewise
     load: np.ndarray  # (N,) bound of the change of the loads of the contacts of a body, in units of their limits
-    near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `integrate.rigid_driver`
+    near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `rigid.body_touches`
     rate: np.ndarray  # (N,) square of the largest rate that limits the step of a body [1/s²]
-    quick: np.ndarray  # (N,) uint8: whether a body takes substeps within the present step, see `integrate.substeps`
-    excluded_force: np.ndarray  # (3, N) force on a grain that does not kick its body, see `integrate.substeps` [N]
+    quick: np.ndarray  # (N,) uint8: whether a body takes substeps within the present step, see `rigid.substeps`
+    excluded_force: np.ndarray  # (3, N) force on a grain that does not kick its body, see `rigid.substeps` [N]
     excluded_torque: np.ndarray  # (3, N) likewise [N m]
 
 

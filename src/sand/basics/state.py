@@ -225,7 +225,7 @@ class State:
         """Allocate more contacts, at least `minimum`."""
         self.contacts = grown(self.contacts, ("start", "gather_order", *self._uniform_arrays()), minimum)
 
-    def grow_further_contacts(self) -> None:
+    def grow_component_contacts(self) -> None:
         """Allocate more contacts with walls."""
         self.wall_contacts = grown(self.wall_contacts, ("start", "gather_order"), 0)
 
@@ -306,7 +306,7 @@ class State:
             _copy_into(getattr(self.walls, name), saved, f"walls/{name}")
         used = int(self.count[WALL_CONTACTS])
         while self.wall_contacts.flag.size < used:
-            self.grow_further_contacts()
+            self.grow_component_contacts()
         for name in WALL_CONTACT_ARRAYS if self.walls.work.size else ():
             _copy_into(getattr(self.wall_contacts, name)[..., :used], saved, f"wall_contacts/{name}")
 

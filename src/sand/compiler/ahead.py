@@ -203,6 +203,6 @@ def _start() -> subprocess.Popen:
 
 def _send(pipe: Any, text: bytes) -> None:
     """Send the recipes; the pipe stays open, for its end tells a helper that this process has ended."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, ValueError):  # the helper has ended, or the pipe is closed after Ctrl-C
         pipe.write(text)
         pipe.flush()

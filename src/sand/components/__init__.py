@@ -1,4 +1,4 @@
-"""Components of a simulation, such as walls and driven grains: one file and one line here each."""
+"""Components of a simulation, such as walls and driven grains; each has a line in `READERS`."""
 
 from __future__ import annotations
 

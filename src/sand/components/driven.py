@@ -115,7 +115,7 @@ class DrivenGrains(Component):
         left = [(each, [now[i] for i in each.grains if i in now]) for each in self.items]
         return DrivenGrains([replace(each, grains=index) for each, index in left if index])
 
-    def problems_of_change(self, grains: Grains, *, rebuilt: bool) -> list[str]:
+    def problems_of_motion(self, grains: Grains) -> list[str]:
         """Driven grains with another velocity or spin than the prescribed one."""
         return [
             f"{name} of grain {i} is prescribed by sand.Driven and cannot change"

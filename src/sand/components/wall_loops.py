@@ -1,4 +1,4 @@
-"""Loops over the contacts of grains with walls: form, slip, break, loads, energies, and the step that they need.
+"""Loops over the contacts of grains with walls: form, slip, break, loads, and the motion of walls.
 
 These contacts are few.  They are kept in a table of their own, `ContactArrays` with the grain in pair[0], the wall in
 pair[1], and in `pointer2` the anchor relative to the point of the wall [m], laboratory frame; `torque2` and the lists
@@ -37,7 +37,7 @@ from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, sca
 from .wall_formulas import WallPose, wall_constants, wall_displacements, wall_load, wall_pointers
 
 FULL = -1
-"""Value of `WallLoops.update` if the table of contacts is too small; nothing has changed then."""
+"""Value of the loop of `wall_loop` if the table of contacts is too small; nothing has changed then."""
 LAST_ID = np.uint32(0xFFFFFFFF)
 """The walls count down from this number in the keys of random numbers, which grains use from 0 up."""
 

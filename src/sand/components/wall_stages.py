@@ -160,11 +160,14 @@ def bath_wall_work(s, parameters, block):
 def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> dict[int, tuple[Stage, Any]]:
     """All stages by number, with their parameters."""
     noisy = damping == THERMAL
-    of_bath: dict[int, tuple[Stage, Any]] = {StageNumber.FURTHER_BATH_WORK: (bath_wall_work, numbers)} if noisy else {}
+    of_bath: dict[int, tuple[Stage, Any]] = (
+        {StageNumber.COMPONENT_BATH_WORK: (bath_wall_work, numbers)} if noisy else {}
+    )
     return {
-        StageNumber.FURTHER_CONTACTS: (contacts_stage(law, damping), numbers),
-        StageNumber.FURTHER_LOADS: (wall_loads, ()),
-        StageNumber.FURTHER_STEP: (step_stage(law), numbers),
-        StageNumber.FURTHER_ENERGIES: (energies_stage(law), (np.zeros(len(ENERGIES)),)),
+        StageNumber.COMPONENT_CONTACTS: (contacts_stage(law, damping), numbers),
+        StageNumber.COMPONENT_LOADS: (wall_loads, ()),
+        StageNumber.COMPONENT_STEP: (step_stage(law), numbers),
+        # called by the engine for rows of the ledger, with an array of its own; here it is compiled with the others
+        StageNumber.COMPONENT_ENERGIES: (energies_stage(law), (np.zeros(len(ENERGIES)),)),
         **of_bath,
     }

@@ -1,4 +1,8 @@
-"""Walls: planes to which grains stick, at rest, moving with a given velocity, or with a mass and a given force."""
+"""Walls: planes to which grains stick, at rest, moving with a given velocity, or with a mass and a given force.
+
+Their energies reach the ledger in two ways: what their contacts store is added to the columns of contacts (`normal`, …)
+by the stage COMPONENT_ENERGIES, and what moving walls took from grains and contacts is `lost_walls`, in `Walls.row`.
+"""
 
 from __future__ import annotations
 
@@ -175,7 +179,7 @@ class Walls(Component):
         )
         return wall_stages(law, variant_of(settings), numbers)
 
-    def place(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
+    def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state its walls, and memory for their contacts."""
         channels = state.contacts.lost.shape[0]
         arrays = wall_arrays(len(self.items), len(state.grains))
@@ -187,10 +191,8 @@ class Walls(Component):
         state.wall_contacts = empty_contact_arrays(0, 0, columns, channels=channels, damped=settings.damped)
         state.__post_init__()  # aligns the arrays
 
-    def problems_of_change(self, grains: Grains, *, rebuilt: bool) -> list[str]:
-        """As `Component.problems_of_change`."""
-        if not rebuilt:
-            return []
+    def problems_of_arrays(self) -> list[str]:
+        """As `Component.problems_of_arrays`."""
         return [
             "walls: with walls a change cannot add or remove grains, set or scale the box, or leave out a force; start "
             "a new simulation from a frame"

@@ -35,6 +35,7 @@ def wall_errors(walls: Any, known: Collection[str]) -> list[str]:
             if wall.material not in known:
                 hint = did_you_mean(wall.material, list(known))
                 problems.append(f"walls.{k}.material: unknown material '{wall.material}'; {hint}")
+            # any valid material will do: its name was checked above
             wall.model_copy(update={"material": "iron"}).build({})
         except ValidationError:
             continue  # reported by the validation of the whole file
@@ -48,6 +49,7 @@ def wall_columns(walls: Any) -> list[str]:
     try:
         sections = [WallSection.model_validate(one) for one in walls or ()]
         walls = read_walls([one.model_copy(update={"material": "iron"}).build({}) for one in sections])
-        return Walls(walls).columns() if walls else []
+        built = Walls(walls)
+        return [*built.columns(), *built.losses()] if walls else []
     except (ValidationError, BadInput, TypeError):
         return []

@@ -54,7 +54,7 @@ def mark_separated(pair_list, count, i, j):
 
 
 @functools.cache
-def settle_loop(law: ContactLaw, damping: str) -> Callable:
+def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
     """The loop that breaks or slips flagged contacts, for one contact law and variant of damping."""
     constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
     write_loads, dashpots = single_contact_loop(law), damping_loops(damping)

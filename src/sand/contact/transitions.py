@@ -18,8 +18,8 @@ from .losses import FORMING_ROW
 from .mechanics import contact_speed_gain, time_since
 
 PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG = 1, 2, 3
-"""Flags of contacts beyond a limit: to be handled by `events.settle_loop`; broken in this step; slipped in this step in
-the pass over contacts.
+"""Flags of contacts beyond a limit: to be handled by `events.slip_and_break_loop`; broken in this step; slipped in this
+step in the pass over contacts.
 """
 ZERO = (0.0, 0.0, 0.0)
 

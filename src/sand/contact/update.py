@@ -6,9 +6,10 @@ vectorises.  The gather pass over grains (`gather`) then sums the stored forces 
 grain in a fixed order.
 
 The update (`contact_loop`) exists in two variants that give the same results.  `_flag_contact` only flags contacts
-beyond a limit, which `events.settle_loop` then handles one by one.  In strongly excited aggregates most contacts slip
-in every step: blocks in which more than 10 % of the contacts were flagged in the last step use `_slip_contact`, which
-computes slip for every contact and selects the result where a limit is exceeded.  Both are free of branches.
+beyond a limit, which `events.slip_and_break_loop` then handles one by one.  In strongly excited aggregates most
+contacts slip in every step: blocks in which more than 10 % of the contacts were flagged in the last step use
+`_slip_contact`, which computes slip for every contact and selects the result where a limit is exceeded.  Both are free
+of branches.
 """
 
 import functools
@@ -253,7 +254,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
             reached = Reached(pose, displacements, constants, present, valid)
             pose, lost, flag = handle_limits(grains, contacts, c, reached, step)
             normal = normal_force(overlap, y, constants)
-            # a flagged contact is damped by events.settle_loop; padding columns hold no grains
+            # a flagged contact is damped by events.slip_and_break_loop; padding columns hold no grains
             active = (flag != PENDING_FLAG) & (c < part.used)
             radius, springs = contact_radius(overlap, y, constants), contact_load(pose, normal, r1, r2, present)
             loads, dissipated = damp(grains, contacts, c, Held(pose, radius, constants), springs, active, step)

@@ -1,4 +1,4 @@
-"""Assembly of the engine: forces, box and settings become the components of a program, step parameters and state."""
+"""Assembly of the engine: forces, box and settings become the content of a program, step parameters and state."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from ..integrate.parts import (
     RespaSettings,
     StepParameters,
 )
-from ..integrate.stage_list import Components
+from ..integrate.stage_list import ProgramContent
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
 from ..limits.solid_limits import torn_clusters
@@ -44,10 +44,13 @@ from .component import Component, Setup, check
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 from .input_checks import check_system
-from .kinds import ForcesByType, kind_of
+from .kinds import ForcesByType, Kind
 from .new_state import new_state
 from .ramped import RampedForces
+from .rigid.assembly import BodiesKind
 
+KINDS: dict[str, type[Kind]] = {each.integrator: each for each in (BodiesKind,)}
+"""Kinds of engines that are not those of grains, by the name of their integrator."""
 WIDE_FROM = 64
 """Fewest grains for the widest SIMD vectors; with fewer, most lanes of the last vector would be idle."""
 IDLE = 1e5
@@ -93,7 +96,7 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    kind, nouns = kind_of(stepping), [each.noun for each in extra]
+    kind, nouns = KINDS.get(stepping.name, Kind)(), [each.noun for each in extra]
     warnings = check_system(grains, forces, box, fresh=fresh) + kind.check(forces, nouns, neighbours)
     by_type = _forces_by_type(forces, grains)
     setup = Setup(grains, by_type, box, stepping, neighbours, fresh)
@@ -127,7 +130,7 @@ def build_engine(
         force, sums, _ = long_range[follower.index]
         long_range[follower.index] = force, sums, follower.force.numbers_at(cutoffs[follower.index])
     verlet, uniform = stepping.contact_stepping, not any(each.own_columns for each in extra)
-    control = _step_control(grains, verlet, kind.limiting_steps(by_type), pair_gap)
+    control = _step_control(grains, verlet, kind.limiting_forces(by_type), pair_gap)
     stepping = stepping.resolved(grains, control)
     parameters = StepParameters(
         box.span,
@@ -142,8 +145,13 @@ def build_engine(
     )
     parameters = parameters._replace(flight_limits=kind.flight_limits(parameters, by_type, grains))
     law = (by_type.contact or Contact()).contact_law
-    further = {n: own for each in extra for n, own in each.stages(setup, law, parameters.settings).items()}
-    components = Components(
+    of_components: dict[int, tuple[Any, Any]] = {}
+    for each in extra:
+        stages = each.stages(setup, law, parameters.settings)
+        if stages.keys() & of_components.keys():  # the driver calls one stage of each number
+            raise BadInput(f"{each.name}: {each.noun} cannot be used together with another component; leave one out")
+        of_components |= stages
+    content = ProgramContent(
         law,
         [(sums, numbers) for _, sums, numbers in long_range],
         [(force.formula, force.numbers()) for force in by_type.external],
@@ -151,14 +159,14 @@ def build_engine(
         bool(by_type.gas),
         bool(grains.body_moment.any()),
         len(grains) >= WIDE_FROM,
-        further,
+        of_components,
         np.array([i for each in extra for i in each.heavy()], np.int64),
     )
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
-    state = new_state(wrapped, box, parameters, components, capacity, over_all_pairs=over_all_pairs)
+    state = new_state(wrapped, box, parameters, content, capacity, over_all_pairs=over_all_pairs)
     for each in extra:
-        each.place(state, law, parameters.settings)
+        each.add_arrays(state, law, parameters.settings)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
@@ -166,7 +174,7 @@ def build_engine(
     state.count[COMPARED] = -1 if follower is None else 0
     if follower is not None:
         state.cutoff[:] = follower.values
-    parts = (state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower)
+    parts = (state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, content, follower)
     engine = Engine(*parts)
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:

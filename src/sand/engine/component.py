@@ -1,4 +1,4 @@
-"""Components: features of a simulation that are no formula, such as walls.  Each is a folder of `sand.components`."""
+"""Components: features of a simulation that are no formula, such as walls.  They are listed in `sand.components`."""
 
 from __future__ import annotations
 
@@ -32,6 +32,12 @@ class Setup(NamedTuple):
 
 class Component:
     """A feature of a simulation that is no formula; what a class does not define is nothing.
+
+    At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
+    `stages` and `heavy`, `add_arrays`.  The ledger has its `columns` and `losses`, with the values of `row` (energies
+    stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change asks
+    `problems_of_motion` and `problems_of_arrays`, and continues with what is `kept`; case.toml has `parameters` and
+    `materials`.
 
     Attributes
     ----------
@@ -73,15 +79,19 @@ class Component:
         """Grains whose mass counts as infinite in contacts."""
         return []
 
-    def place(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
+    def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the arrays that it needs."""
 
     def kept(self, kept: np.ndarray) -> Component:
         """What is left of it after a change; `kept` (K,) are the earlier indices of grains 0 … K − 1."""
         return self
 
-    def problems_of_change(self, grains: Grains, *, rebuilt: bool) -> list[str]:
-        """Why it does not allow a change to these grains, after which arrays are others (`rebuilt`), or the box is."""
+    def problems_of_motion(self, grains: Grains) -> list[str]:
+        """Why it does not allow a change of the motion of grains to that of these."""
+        return []
+
+    def problems_of_arrays(self) -> list[str]:
+        """Why it does not allow a change after which there are other grains, another box, or other arrays."""
         return []
 
     def columns(self) -> list[str]:
@@ -109,7 +119,7 @@ class Component:
         return [each.parameters() for each in self.items]
 
 
-def present(components: Mapping[str, Component]) -> list[Component]:
+def in_use(components: Mapping[str, Component]) -> list[Component]:
     """The components that a simulation has."""
     return [each for each in components.values() if each.items]
 

@@ -66,7 +66,7 @@ from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.integrator import Integrator
 from ..integrate.parts import HEAVY, PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.respa import clear_long_range_loads
-from ..integrate.stage_list import Components, build_program, variant_of
+from ..integrate.stage_list import ProgramContent, build_program, variant_of
 from ..integrate.stages import NO_STEP, StageNumber, bath_work
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
@@ -102,7 +102,7 @@ def _set_arrays(table: Table, present: tuple) -> None:
 
 
 class GrainSteps:
-    """Steps of all grains by the driver, and what a class provides that takes other steps (`rigid.body_steps`).
+    """Steps of all grains by the compiled driver; base class of other ways to take steps (`rigid.body_steps`).
 
     Attributes
     ----------
@@ -128,15 +128,19 @@ class GrainSteps:
         """Take steps up to a time [s] or a step; returns why no more were taken."""
         return engine.run_driver(advance, until, last, shorten)
 
+    def summary(self, state: State) -> dict[str, Any]:
+        """What the summary of a run says of bodies; nothing without any."""
+        return {}
+
     def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The arrays of a saved state, with those that it may lack."""
         return saved
 
     def loaded(self, engine: Engine) -> None:
-        """Follow a state that was loaded."""
+        """Called after a state was loaded."""
 
     def begin(self, engine: Engine) -> None:
-        """Follow a state whose loads were summed at a start, or after a change by the user."""
+        """Called when the loads were summed at a start, or after a change by the user."""
 
 
 @dataclass
@@ -165,7 +169,7 @@ class Engine:
         The cut-off that follows the clusters, if there is one.
     ramped : RampedForces or None
         The forces, if any of them has ramps.
-    taken : GrainSteps
+    stepper : GrainSteps
         How steps are taken.
     """
 
@@ -177,15 +181,16 @@ class Engine:
     search: str
     stepping: Integrator
     neighbours: Neighbours
-    components: Components
+    content: ProgramContent
     cutoff: ClusterCutoff | None = None
     ramped: RampedForces | None = None
-    taken: GrainSteps = field(default_factory=GrainSteps)
+    stepper: GrainSteps = field(default_factory=GrainSteps)
     _intervals: Sequence[tuple[int, int]] = ()  # of the ramps, for which the parameters are set
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
+    _compiles_ahead: bool = field(init=False, default=True)  # before the first step; not in engines of parts
     _present: tuple = field(init=False, default=(None,))  # arrays of the state that the table has
     _copy_table: Table = field(init=False)  # the table of the copy that is stepped to times of output
     _copy_present: tuple = field(init=False, default=(None,))  # arrays of the state that it has
@@ -216,8 +221,8 @@ class Engine:
 
     def for_state(self, state: State) -> Self:
         """An engine with the settings of this one, for another state, with a table of its own and no other threads."""
-        made = self.changed(_state=state, taken=self.taken.for_part())
-        made._workers = None
+        made = self.changed(_state=state, stepper=self.stepper.for_part())
+        made._workers, made._compiles_ahead = None, False
         return made
 
     def share_threads(self, other: Engine) -> None:
@@ -225,7 +230,10 @@ class Engine:
         self._workers = other._workers
 
     def changed(self, **changes: Any) -> Self:
-        """An engine with the settings of this one but for these, and a table of its own."""
+        """An engine with the settings of this one but for these, and a table of its own.
+
+        What does not change, such as the list of warnings, is shared.
+        """
         return type(self)(**{each.name: getattr(self, each.name) for each in fields(self) if each.init} | changes)
 
     @property
@@ -305,7 +313,7 @@ class Engine:
     @property
     def law(self) -> ContactLaw:
         """The contact law."""
-        return self.components.law
+        return self.content.law
 
     @property
     def time(self) -> float:
@@ -331,7 +339,7 @@ class Engine:
     def awake_work(self) -> tuple[int, int, float]:
         """Contact steps and substeps within steps of bodies, and the processor time [s] of all work on these."""
         count = self._state.count
-        return int(count[CONTACT_STEPS]), int(count[SUBSTEPS]), self.taken.seconds
+        return int(count[CONTACT_STEPS]), int(count[SUBSTEPS]), self.stepper.seconds
 
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
@@ -384,7 +392,7 @@ class Engine:
         """Take steps up to a time [s] or a step, in the present order of the arrays."""
         last = min(last, 2**62)
         while True:
-            stop = self.taken.call(self, until, last, shorten)
+            stop = self.stepper.call(self, until, last, shorten)
             if stop is not Stop.CLUSTERS_CHANGED:
                 return stop
             self._compare_clusters()
@@ -411,7 +419,7 @@ class Engine:
         force, sums, _ = changed[k]
         changed[k] = force, sums, force.numbers_at(radius)
         self.long_range = changed
-        self.components = self.components._replace(pair_forces=[own[1:] for own in self.long_range])
+        self.content = self.content._replace(pair_forces=[own[1:] for own in self.long_range])
         search = search._replace(reach=max(search.reach, radius + search.margin))
         self.parameters = self.parameters._replace(search=search)
         self._table.set("search", search)
@@ -438,7 +446,7 @@ class Engine:
             (force, sums, numbers._replace(own=now[force.name].constants()) if force.name in now else numbers)
             for force, sums, numbers in self.long_range
         ]
-        self.components = self.components._replace(
+        self.content = self.content._replace(
             pair_forces=[own[1:] for own in self.long_range],
             external_forces=[(force.formula, force.numbers()) for force in self.external],
         )
@@ -477,7 +485,7 @@ class Engine:
         (_, sums, numbers), own = self.long_range[k], self._state.long_range
         kept = own.force.copy(), own.torque.copy()
         clear_long_range_loads(own)
-        stage = pair_force_stages(sums, self.components.wide)[SUM]
+        stage = pair_force_stages(sums, self.content.wide)[SUM]
         stage.run(self.table_of(self._state), numbers, WHOLE)
         found = np.array([own.force, own.torque])
         own.force[...], own.torque[...] = kept
@@ -493,7 +501,7 @@ class Engine:
     def _add_energies(self, table: Table, sums: LongRangeSums, numbers: Any, shares: np.ndarray) -> None:
         """Add the energies [J] of a long-range force to those of the grains."""
         if sums.energies_need_rounds:
-            run_rounds(sums, self.components.wide, table, numbers)
+            run_rounds(sums, self.content.wide, table, numbers)
         long_range_energies_for(sums).run(table, (numbers, shares))
 
     def table_of(self, state: State) -> Table:
@@ -542,7 +550,7 @@ class Engine:
     def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
         """All stages that a run may call, each with a table of parts, by default this one, and its parameters."""
         shares = np.zeros(len(self._state.grains))
-        stages: list[tuple[Any, Any]] = [*self.taken.drivers(), *self._program_for(table).stages.values()]
+        stages: list[tuple[Any, Any]] = [*self.stepper.drivers(), *self._program_for(table).stages.values()]
         if self.parameters.settings.on:
             stages.append((energies_stage(self.law), (np.zeros(len(ENERGIES)),)))
             stages.append((contacts_stage(self.law), (np.zeros((1, 1)),)))
@@ -551,12 +559,12 @@ class Engine:
         stages += [
             (external_energies_for(outer.formula), (outer.numbers(), self.time, shares)) for outer in self.external
         ]
-        return [*((table, *each) for each in stages), *self.taken.stages_within(self, table)]
+        return [*((table, *each) for each in stages), *self.stepper.stages_within(self, table)]
 
     def _program_for(self, table: Table) -> Program:
         """The program, made for the present parameters if there is none."""
         if self._program is None:
-            self._program = build_program(self.components, self.parameters, table)
+            self._program = build_program(self.content, self.parameters, table)
         for each in (self._table, table):
             each.set("program", self._program)
         return self._program
@@ -572,7 +580,7 @@ class Engine:
             if stop is Stop.CONTACTS_FULL:
                 state.grow_contacts()
             elif stop is Stop.FURTHER_CONTACTS_FULL:
-                state.grow_further_contacts()
+                state.grow_component_contacts()
             elif stop is Stop.PAIRS_FULL:
                 found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
                 state.grow_pairs(int(OVER_ALLOCATION * found))
@@ -586,13 +594,14 @@ class Engine:
         state = self._state
         table, queue = self._call_table(until, last, shorten)
         try:
-            if self._program is None:
+            if self._compiles_ahead:
+                self._compiles_ahead = False
                 compile_ahead(self.stages(table), min(cores(), threads()))
             alone = shorten and len(state.grains) < ALONE  # threads start later than one step ends
             if (
                 not alone
                 and self._workers is not None
-                and benefits_from_workers(len(self.components.pair_forces), int(state.count[CONTACTS]))
+                and benefits_from_workers(len(self.content.pair_forces), int(state.count[CONTACTS]))
             ):
                 self._workers.start(table)
             return Stop(self._program_for(table).run(driver, table))
@@ -618,7 +627,7 @@ class Engine:
             return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, initial)
 
     def losses(self) -> np.ndarray:
-        """Losses [J] up to the time of `state`, in the order of `state.state.LOST`.
+        """Losses [J] up to the time of `state`, in the order of `basics.state.LOST`.
 
         With a bath they include the work in the half kick at the end of the last step (`contact.bath_work`).
         """
@@ -637,14 +646,14 @@ class Engine:
         """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
         with self._held(state):
             bath_work.run(self.table_of(state), (), NO_STEP)
-            if (further := self.components.further.get(StageNumber.FURTHER_BATH_WORK)) is not None:
-                stage, numbers = further
+            if (added := self.content.of_components.get(StageNumber.COMPONENT_BATH_WORK)) is not None:
+                stage, numbers = added
                 stage.run(self.table_of(state), numbers, NO_STEP)
 
     @contextlib.contextmanager
     def _held(self, state: State | None = None) -> Iterator[None]:
         """While constants of contacts are computed, some grains have a mass that counts as infinite."""
-        index, arrays = self.components.heavy, (state or self._state).grains.arrays
+        index, arrays = self.content.heavy, (state or self._state).grains.arrays
         for quantity in (arrays.mass, arrays.inertia):
             quantity[index] *= HEAVY
         try:
@@ -663,13 +672,13 @@ class Engine:
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)
         state.forget_losses()
-        self.taken.begin(self)
+        self.stepper.begin(self)
 
     def refresh_loads(self) -> None:
         """Sum the loads anew by the second half of a step of 0 s, after the user has changed grains or forces."""
         self.restore_user_order()
         self._refresh_loads()
-        self.taken.begin(self)
+        self.stepper.begin(self)
 
     def _refresh_loads(self) -> None:
         """As `refresh_loads`, in the present order of the arrays."""
@@ -685,7 +694,7 @@ class Engine:
     def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
         """Restore the regular state of a checkpoint, with `state` at a time of output [s]; sum loads, rebuild lists."""
         state, self._output_time = self.regular_state, output_time
-        state.from_arrays(self.taken.with_missing(self, saved))
+        state.from_arrays(self.stepper.with_missing(self, saved))
         if self.cutoff is None:
             state.count[COMPARED] = -1
         if state.order.size:  # the order of the lists depends on it
@@ -698,7 +707,7 @@ class Engine:
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
         self._rebuild_list()
-        self.taken.loaded(self)
+        self.stepper.loaded(self)
 
     def _rebuild_list(self) -> None:
         """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
@@ -755,8 +764,8 @@ class Engine:
         found[:] = 0.0
         if state.count[CONTACTS]:
             energies_stage(self.law).run(self.table_of(state), self._of_contacts)
-        if (further := self.components.further.get(StageNumber.FURTHER_ENERGIES)) is not None:
-            further[0].run(self.table_of(state), self._of_contacts)
+        if (added := self.content.of_components.get(StageNumber.COMPONENT_ENERGIES)) is not None:
+            added[0].run(self.table_of(state), self._of_contacts)
         return found.tolist()
 
     def body_motion(self) -> BodyMotion:

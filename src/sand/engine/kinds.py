@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from ..basics.box import Box
 from ..basics.grains import Grains
 from ..contact.model import Contact
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas.model import Gas
-from ..integrate.integrator import Integrator
 from ..integrate.parts import StepParameters
 from ..neighbours.search import Neighbours
 from .engine import Engine
-
-KINDS = {"rigid-clusters": "rigid.assembly"}
-"""Modules of the integrators, by name, whose engines are not those of grains; each has a class `Kind`."""
 
 Build = Callable[[Sequence[Force], Neighbours], Engine]
 """Builds an engine of the same grains with other forces, whose grains take contact steps."""
@@ -33,8 +28,15 @@ class ForcesByType(NamedTuple):
 
 
 class Kind:
-    """An engine of grains."""
+    """An engine of grains.
 
+    Attributes
+    ----------
+    integrator : str
+        Name of the integrator that needs a kind of its own.
+    """
+
+    integrator: ClassVar[str] = ""
     keeps_order = False
     """Whether grains keep the order in which they were given."""
 
@@ -49,7 +51,7 @@ class Kind:
         """Largest gap [m] of pairs whose approach limits the step."""
         return float(grains.radius.min())
 
-    def limiting_steps(self, forces: ForcesByType) -> ForcesByType:
+    def limiting_forces(self, forces: ForcesByType) -> ForcesByType:
         """The forces that limit the step."""
         return forces
 
@@ -59,11 +61,3 @@ class Kind:
 
     def complete(self, engine: Engine, forces: Sequence[Force], build: Build) -> None:
         """Give an engine what such engines need besides those of grains."""
-
-
-def kind_of(stepping: Integrator) -> Kind:
-    """The kind of engine of an integrator."""
-    if stepping.name not in KINDS:
-        return Kind()
-    found: Kind = importlib.import_module(f".{KINDS[stepping.name]}", __package__).Kind()
-    return found

@@ -23,7 +23,7 @@ from ..basics.state import RECORDED, State
 from ..contact.constants_table import constant_names
 from ..forces.pair.long_range_loops import all_blocks
 from ..integrate.parts import StepParameters
-from ..integrate.stage_list import Components
+from ..integrate.stage_list import ProgramContent
 
 NEIGHBOURS_PER_GRAIN = 4
 """Initial capacity of the Verlet list per grain; it grows on overflow."""
@@ -35,7 +35,7 @@ def new_state(
     grains: Grains,
     box: Box,
     parameters: StepParameters,
-    components: Components,
+    content: ProgramContent,
     capacity: int,
     *,
     over_all_pairs: bool,
@@ -47,19 +47,19 @@ def new_state(
     count, search, settings = len(grains), parameters.search, parameters.settings
     uniform_contacts = settings.uniform_contacts
     channels = len(RECORDED) if settings.damped or settings.follow else ALWAYS_RECORDED
-    pair_forces = [sums for sums, _ in components.pair_forces]
+    pair_forces = [sums for sums, _ in content.pair_forces]
     needed = set(LIST_ARRAYS if search.listed else CELL_ARRAYS if search.celled else ())
     needed |= set(RESPA_ARRAYS if parameters.respa.impulse else ())
     needed |= set(RATE_ARRAYS if parameters.respa.taylor else ())
     needed |= {name for sums in pair_forces for name in sums.arrays}
-    needed |= set(FORCE_ARRAYS if pair_forces or components.flight else ())
+    needed |= set(FORCE_ARRAYS if pair_forces or content.flight else ())
     return State(
         grains,
         box,
         empty_contact_arrays(
             count,
             capacity,
-            len(constant_names(components.law)),
+            len(constant_names(content.law)),
             uniform_contacts=uniform_contacts,
             channels=channels,
             damped=settings.damped,

@@ -89,8 +89,10 @@ class Part:
         return Part(copy.deepcopy(self.prototype, memo), self.steps_are, self.has_bodies)
 
     def anew(self) -> Part:
-        """A part like this for other grains, without threads."""
-        return Part(self.prototype.for_state(self.prototype.regular_state), self.steps_are, self.has_bodies)
+        """A part like this for other grains; it shares the threads of this one, as the two never step at once."""
+        prototype = self.prototype.for_state(self.prototype.regular_state)
+        prototype.share_threads(self.prototype)
+        return Part(prototype, self.steps_are, self.has_bodies)
 
     @property
     def state(self) -> State:
@@ -146,10 +148,10 @@ class Part:
         changed = bool(own.count[MADE] + own.count[BROKEN])
         self.columns = self._changed_contacts(state, own) if changed else self._same_contacts(state, own)
         if self.has_bodies:
-            own.bodies.first[:] = self.index[own.bodies.first]
             for name in BODY_COLUMNS:
                 if getattr(state.bodies, name).size:
                     getattr(state.bodies, name)[..., self.index] = getattr(own.bodies, name)
+            state.bodies.first[self.index] = self.index[own.bodies.first]
         self._count(state, own)
         return changed
 
@@ -163,7 +165,7 @@ class Part:
         """An engine for these grains, which is kept for others of the same number; there are at most `MOST_ENGINES`."""
         given, count = self.prototype, len(self.index)
         grains, capacity = subset(state.grains, self.index), len(self.columns)
-        made = new_state(grains, state.box, given.parameters, given.components, capacity, over_all_pairs=True)
+        made = new_state(grains, state.box, given.parameters, given.content, capacity, over_all_pairs=True)
         made.uniform_contacts = state.uniform_contacts
         if self.has_bodies:
             made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
@@ -224,7 +226,7 @@ class Part:
         return np.arange(first, end)
 
     def _count(self, state: State, own: State) -> None:
-        """Add what the part has counted and lost to the numbers of all grains; the part counts anew."""
+        """Add what the part has counted and lost to the numbers of all grains."""
         for number in EVENTS:
             state.count[number] += own.count[number]
         state.count[CONTACT_STEPS] = own.count[CONTACT_STEPS]
@@ -236,5 +238,3 @@ class Part:
         state.clock[CORRECTED] += own.clock[CORRECTED]
         state.clock[LARGEST_LOAD] = max(state.clock[LARGEST_LOAD], own.clock[LARGEST_LOAD])
         state.take_extremes(own)
-        own.lost[:] = 0.0
-        own.count[list(EVENTS)] = 0

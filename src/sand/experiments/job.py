@@ -115,7 +115,7 @@ class Job:
             content = self.compute(executor, observers, progress)
             write_json(self.folder / self.RESULTS, content)
             if self.KEPT:  # its content is in the results
-                (self.folder / self.KEPT).unlink()
+                (self.folder / self.KEPT).unlink(missing_ok=True)
         return content
 
     def describe(self, name: str) -> None:
@@ -134,7 +134,7 @@ class Job:
 
         def show() -> None:
             done, total = len(kept.found.keys() & set(tasks)), len(set(tasks))
-            progress(f"{done} of {total} {self.PARTS}", done / total)
+            progress(f"{done} of {total} {self.PARTS}", done / max(total, 1))
 
         show()
         left = [task for task in dict.fromkeys(tasks) if task not in kept.found]

@@ -121,8 +121,8 @@ def drift_with_work(s, dt):
     if s.clock[STEP] != dt:
         if has_stage(s, StageNumber.BATH_WORK):
             call_stage(s, StageNumber.BATH_WORK, NEXT_STEP)
-        if has_stage(s, StageNumber.FURTHER_BATH_WORK):
-            call_stage(s, StageNumber.FURTHER_BATH_WORK, NEXT_STEP)
+        if has_stage(s, StageNumber.COMPONENT_BATH_WORK):
+            call_stage(s, StageNumber.COMPONENT_BATH_WORK, NEXT_STEP)
     for_each_block(s, StageNumber.DRIFT, blocks)
     if drives:
         call_stage(s, StageNumber.DRIVE, RELEASE)
@@ -153,8 +153,8 @@ def sum_loads(s, due, elapsed):
     Long-range loads are summed if `due`; within a cycle their constant part or extrapolation replaces them.
     """
     for_each_block(s, StageNumber.GATHER, blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK))
-    if has_stage(s, StageNumber.FURTHER_LOADS):
-        call_stage(s, StageNumber.FURTHER_LOADS)
+    if has_stage(s, StageNumber.COMPONENT_LOADS):
+        call_stage(s, StageNumber.COMPONENT_LOADS)
     add_external_loads(s, s.clock[TIME] + s.clock[STEP])
     if s.forces.pair == 0:
         s.count[LONG_RANGE_SUMS] += 1
@@ -211,7 +211,7 @@ def first_half(s):
 
     A cycle that would pass `until` [s] is not begun, or, with `shorten`, ends at this time.
     """
-    further = call_stage(s, StageNumber.FURTHER_STEP) if has_stage(s, StageNumber.FURTHER_STEP) else Stop.NONE.value
+    further = call_stage(s, StageNumber.COMPONENT_STEP) if has_stage(s, StageNumber.COMPONENT_STEP) else Stop.NONE.value
     grain = s.count[GRAIN1]
     dt, stop = possible_step(s.grains, s.contacts, s.pair_list, s.long_range, s.clock, s.count, s.span, s.criteria)
     if stop == Stop.NONE.value and further != Stop.NONE.value:
@@ -276,7 +276,7 @@ def update_contacts(s):
             log_contact_sums(s.count, s.lost, passed)
     if s.settings.follow:
         call_stage(s, StageNumber.STIFFNESS_WORK)
-    return pending and call_stage(s, StageNumber.SETTLE) == 1
+    return pending and call_stage(s, StageNumber.SLIP_AND_BREAK) == 1
 
 
 @caller
@@ -291,8 +291,8 @@ def second_half(s):
     drives = has_stage(s, StageNumber.DRIVE)
     if drives:
         call_stage(s, StageNumber.DRIVE, HOLD_IN_EVENTS)
-    if has_stage(s, StageNumber.FURTHER_CONTACTS):
-        stop = call_stage(s, StageNumber.FURTHER_CONTACTS)
+    if has_stage(s, StageNumber.COMPONENT_CONTACTS):
+        stop = call_stage(s, StageNumber.COMPONENT_CONTACTS)
         if stop != Stop.NONE.value:
             if drives:
                 call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)

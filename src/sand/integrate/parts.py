@@ -52,7 +52,7 @@ class Stop(IntEnum):
     LIST_FULL = 9
     CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
     FURTHER_CONTACTS_FULL = 11  # contacts of components, such as those with walls
-    TOUCH_AHEAD = 12  # bodies may touch within the next step: they have to wake
+    HAS_TO_WAKE = 12  # bodies may touch within the next step, or the loads of their contacts are near a limit
     AWAKE_STEPS = 13  # awake clusters have to take their contact steps
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep
     SUBSTEPS = 15  # some bodies have to take substeps within the step of all bodies
@@ -94,7 +94,7 @@ class GasSettings(NamedTuple):
 
     period: float  # target interval between two kicks [s]
     seed: int
-    gas: Any  # forces.gas.loops.GasParameters
+    gas: Any  # forces.gas.gas_loops.GasParameters
 
 
 class ForceNumbers(NamedTuple):

@@ -36,7 +36,7 @@ from .stages import StageNumber
 NO_GRAINS = np.zeros(0, np.int64)
 
 
-class Components(NamedTuple):
+class ProgramContent(NamedTuple):
     """What the program of a simulation is made of."""
 
     law: ContactLaw
@@ -46,18 +46,20 @@ class Components(NamedTuple):
     gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
-    further: Mapping[int, tuple[Stage, Any]] = MappingProxyType({})  # stages of components by number, with parameters
+    of_components: Mapping[int, tuple[Stage, Any]] = MappingProxyType(
+        {}
+    )  # stages of components by number, with parameters
     heavy: np.ndarray = NO_GRAINS  # grains whose mass counts as infinite in contacts
 
 
-def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
+def stages_of(given: ProgramContent, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
     """The stages that a simulation calls, by number, with their own parameters."""
     respa, work = parameters.respa, parameters.external_work
     found: dict[int, Stage] = {
         StageNumber.DRIFT: stages.drift_stage(given.magnetic, given.wide),
         StageNumber.EXPLAIN: stages.explain_stop,
     }
-    if given.pair_forces or given.external_forces or StageNumber.FURTHER_LOADS in given.further:
+    if given.pair_forces or given.external_forces or StageNumber.COMPONENT_LOADS in given.of_components:
         found[StageNumber.GATHER] = stages.gather_stage(given.wide)
     else:
         found[StageNumber.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
@@ -74,7 +76,7 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     if given.flight is not None:
         found[StageNumber.FLIGHT] = given.flight
     program: dict[int, tuple[Stage | PythonStage, Any]] = {number: (each, ()) for number, each in found.items()}
-    program |= given.further
+    program |= given.of_components
     number: int = StageNumber.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:
@@ -97,7 +99,7 @@ def variant_of(settings: ContactParameters) -> str:
     return THERMAL if settings.bath > 0.0 else DASHPOTS
 
 
-def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, Stage]:
+def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[int, Stage]:
     """The stages of contacts by number."""
     damping = variant_of(parameters.settings)
     events = stages.contact_event_stages(given.law, damping)
@@ -105,7 +107,7 @@ def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, 
         StageNumber.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
         StageNumber.INNER_LIST: stages.inner_list,
         StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, damping, given.wide),
-        StageNumber.SETTLE: events[StageNumber.SETTLE],
+        StageNumber.SLIP_AND_BREAK: events[StageNumber.SLIP_AND_BREAK],
         StageNumber.FORM: events[StageNumber.FORM],
         StageNumber.SORT: resort_contacts_by_grain,
         StageNumber.CONTACT_STEP: stages.set_contact_step,
@@ -120,7 +122,7 @@ def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, 
     return found
 
 
-def build_program(given: Components, parameters: StepParameters, table: Table) -> Program:
+def build_program(given: ProgramContent, parameters: StepParameters, table: Table) -> Program:
     """The program of a simulation, for the parts in a table; stages are compiled when they are first called."""
     size = StageNumber.FIRST_FORCE + PAIR_STAGES * len(given.pair_forces) + EXTERNAL_STAGES * len(given.external_forces)
     return Program(table, stages_of(given, parameters), size)

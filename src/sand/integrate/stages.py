@@ -1,7 +1,7 @@
 """The stages of a step: parts of velocity Verlet that the driver calls by address, block by block or for all grains.
 
-Their numbers are the entries of the program of a simulation (`program.build_program`).  Some depend on the contact law
-and are compiled once for each; those of forces are in `force_stages`.
+Their numbers are the entries of the program of a simulation (`stage_list.build_program`).  Some depend on the contact
+law and are compiled once for each; those of forces are in `force_stages`.
 """
 
 import math
@@ -14,7 +14,7 @@ from ..compiler.jit import loop
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import half_kick_weight, record_half_kicks
-from ..contact.events import compact_contacts, forming_loops, settle_loop
+from ..contact.events import compact_contacts, forming_loops, slip_and_break_loop
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
@@ -36,35 +36,35 @@ HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)
 
 
 class StageNumber(IntEnum):
-    """Entries of the program of a simulation."""
+    """Entries of the program of a simulation (`stage_list.build_program`), and where each is."""
 
-    DRIFT = 0
-    VERLET_LIST = 1
-    PAIR_LIST = 2
-    INNER_LIST = 3
-    CONTACT_PASS = 4
-    STIFFNESS_WORK = 5
-    SETTLE = 6
-    FORM = 7
-    SORT = 8
-    CONTACT_STEP = 9
-    REMOVE_BROKEN = 10
-    GATHER = 11
-    GATHER_AND_KICK = 12
-    PREPARE_RATES = 13
-    STORE_POSITIONS = 14
-    EXTRAPOLATE = 15
-    GAS_KICK = 16
-    FLIGHT = 17
-    EXPLAIN = 18
-    SETTLE_CLUSTERS = 19
-    DRIVE = 20
-    FURTHER_CONTACTS = 21  # of components: contacts other than those between grains,
-    FURTHER_LOADS = 22  # their loads on grains,
-    FURTHER_STEP = 23  # and the longest step that they allow
-    BATH_WORK = 24
-    FURTHER_BATH_WORK = 25  # the work of the bath in further contacts
-    FURTHER_ENERGIES = 26  # adds the energies stored in further contacts to an array
+    DRIFT = 0  # motion: drift
+    VERLET_LIST = 1  # neighbours.cell_list
+    PAIR_LIST = 2  # neighbours.pair_list: candidates for contact
+    INNER_LIST = 3  # the nearest candidates
+    CONTACT_PASS = 4  # contact.update: all contacts of a step
+    STIFFNESS_WORK = 5  # contact.stiffness_work
+    SLIP_AND_BREAK = 6  # contact.events: contacts beyond a limit
+    FORM = 7  # contact.events: new contacts
+    SORT = 8  # contact.gather: contacts of each grain
+    CONTACT_STEP = 9  # the step that contacts allow
+    REMOVE_BROKEN = 10  # contact.events
+    GATHER = 11  # contact.gather: loads of contacts on grains, if there are other loads
+    GATHER_AND_KICK = 12  # motion.gather_and_kick: the same, and the kick, with loads of contacts alone
+    PREPARE_RATES = 13  # taylor
+    STORE_POSITIONS = 14  # taylor
+    EXTRAPOLATE = 15  # taylor
+    GAS_KICK = 16  # forces.gas.gas_loops
+    FLIGHT = 17  # of an integrator of the user
+    EXPLAIN = 18  # step_control: which grains caused a stop
+    SETTLE_CLUSTERS = 19  # contact.settling: damping of clusters
+    DRIVE = 20  # components.driven_stage
+    COMPONENT_CONTACTS = 21  # of components: contacts other than those between grains,
+    COMPONENT_LOADS = 22  # their loads on grains,
+    COMPONENT_STEP = 23  # and the longest step that they allow
+    BATH_WORK = 24  # contact.bath_work
+    COMPONENT_BATH_WORK = 25  # the work of the bath in further contacts
+    COMPONENT_ENERGIES = 26  # adds the energies stored in further contacts to an array
     FIRST_FORCE = 27  # from here on the stages of forces, see `force_stages`
 
 
@@ -149,7 +149,7 @@ def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Sta
 @factory
 def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     """Stages of contact events by number: work of stiffnesses, slip and breaking, forming."""
-    settle, form_contacts = settle_loop(law, damping), forming_loops(law, damping).form
+    slip_and_break, form_contacts = slip_and_break_loop(law, damping), forming_loops(law, damping).form
     log_stiffness_work = stiffness_work_loop(law)
 
     @stage("the work of changing stiffnesses")
@@ -158,10 +158,10 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
         return 0
 
     @stage("the slip and breaking of contacts", seconds=2.0)
-    def settle_contacts(grains, contacts, pair_list, clock, count, lost, span, settings):
+    def slip_and_break_contacts(grains, contacts, pair_list, clock, count, lost, span, settings):
         """Slip or break flagged contacts; returns 1 if any contact broke."""
         step = ContactStep(span, settings, count[STEPS], clock[STEP])
-        return 1 if settle(grains, contacts, pair_list, count, lost, step) else 0
+        return 1 if slip_and_break(grains, contacts, pair_list, count, lost, step) else 0
 
     @stage("the forming of contacts", seconds=1.5)
     def form(grains, contacts, pair_list, clock, count, lost, span, settings):
@@ -169,7 +169,11 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
         form_contacts(grains, contacts, pair_list, count, lost, clock, step)
         return 0
 
-    return {StageNumber.STIFFNESS_WORK: stiffness_work, StageNumber.SETTLE: settle_contacts, StageNumber.FORM: form}
+    return {
+        StageNumber.STIFFNESS_WORK: stiffness_work,
+        StageNumber.SLIP_AND_BREAK: slip_and_break_contacts,
+        StageNumber.FORM: form,
+    }
 
 
 @stage("the work of the noise of contacts")

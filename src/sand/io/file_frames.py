@@ -28,7 +28,7 @@ def open_frames(path: str | Path, radius: Any = None, length: str | None = None,
     path : str or Path
         The file; its content tells the format.
     radius, length, material : optional
-        As for `io.bodies.read_grains`, for files that lack them.
+        As for `io.read_grains.read_grains`, for files that lack them.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class FileFrames(FrameSequence):
     Raises
     ------
     BadInput
-        As `io.bodies.read_grains`.
+        As `io.read_grains.read_grains`.
     """
 
     incomplete = generation = 0

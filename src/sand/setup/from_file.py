@@ -47,7 +47,7 @@ def is_own_trajectory(path: str | Path) -> bool:
 
 
 def body_from_file(path: str | Path, *arguments: Any, **named: Any) -> Grains:
-    """Read a body that is in one piece; parameters as for `io.bodies.read_grains`.
+    """Read a body that is in one piece; parameters as for `io.read_grains.read_grains`.
 
     A body that the periodic box of its file cuts is made whole. Contacts of rounded coordinates are put at rest, with a
     note. The centre of mass is at the origin and at rest; velocities relative to it, and spins, are those of the file.
@@ -88,7 +88,7 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
         The box of the simulation; None for the one that the file states. In another box, clusters that the faces of the
         file's box cut are made whole.
     arguments, named
-        Further parameters of `io.bodies.read_grains`.
+        Further parameters of `io.read_grains.read_grains`.
 
     Returns
     -------

@@ -39,8 +39,7 @@ from ..basics.units import has_unit_within, si
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
-from ..engine.component import Component
-from ..engine.component import present as present_ones
+from ..engine.component import Component, in_use
 from ..engine.engine import Engine
 from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
@@ -407,8 +406,8 @@ def changed_engine(
     if forces is not None and grains is not None:
         errors.take(change.refuse_overlaps, grains, forces)
     if grains is not None:
-        for each in present_ones(extra):
-            errors.problems += each.problems_of_change(grains, rebuilt=False)
+        for each in in_use(extra):
+            errors.problems += each.problems_of_motion(grains)
     errors.done()
     regroups = change.regroups
     cutoff = None if change.box != state.box or state.cutoff[CUT_RADIUS] == 0.0 else state.cutoff.copy()
@@ -416,7 +415,7 @@ def changed_engine(
     same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
     forces = fitting_forces(forces, engine.stepping)
     parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed)
-    new = build_engine(*parts, fresh=False, cutoff=cutoff, extra=present_ones(extra))
+    new = build_engine(*parts, fresh=False, cutoff=cutoff, extra=in_use(extra))
     without = [name for name in new.columns() if name not in columns]
     if without:
         raise BadInput(
@@ -426,8 +425,8 @@ def changed_engine(
     grains.arrays.material[...] = same.arrays.material  # materials are numbered anew
     rebuilt = regroups or any(len(set(shapes)) > 1 for shapes in _long_range_shapes(state, new.state))
     if rebuilt or change.box != state.box:
-        for each in present_ones(extra):
-            errors.problems += each.problems_of_change(grains, rebuilt=True)
+        for each in in_use(extra):
+            errors.problems += each.problems_of_arrays()
         errors.done()
     if rebuilt:
         arrays = regrouped_arrays(state, change._kept, grains, new.state)

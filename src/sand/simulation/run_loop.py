@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic
 from typing import Any, NamedTuple
 
@@ -51,15 +51,15 @@ class Continuation:
 
     chosen: Chosen | None = None
     met: tuple[Any, int] | None = None
-    owed: tuple[int, list[int]] = (-1, [])
+    owed: tuple[int, list[int]] = field(default_factory=lambda: (-1, []))
     failure: str = ""
 
 
 class Callback(NamedTuple):
     """What is done in a run, and when.
 
-    `act` returns why the run ends, or None.  It is called after each call of the engine, which ends at the next moment
-    of `schedules` at the latest: at the step, or before the first step that would pass the time.
+    `act` returns why the run ends, or None.  It is called after each call of the engine, which ends at the next step of
+    `schedules` at the latest.  Times of frames, rows, checkpoints and updaters end a call as well: `_take_steps`.
     """
 
     act: Callable[[], Outcome | None]
@@ -89,6 +89,7 @@ class RunLoop:
         self._stop, self._reached = Stop.NONE, simulation.time
         self._ends: Outcome | None = None  # why the run ends after the output at this step
         self._ended_by = ""  # the updater that ends the run
+        self._is_unsound = False  # whether the energy error is above its limit
         self._has_output = False  # whether there was output at this step
         self._estimate = RunTimeEstimate(self._end, self._last_step, simulation._warnings.show)
         self._plan()
@@ -113,7 +114,7 @@ class RunLoop:
         self._checks = Schedule(None if self._condition is None else Cadence("steps", every), *now)
         self._energy_checks = Schedule(Cadence("steps", ENERGY_CHECK_EVERY), *now)
         self.updates = UpdateSchedule(simulation)
-        self._callbacks = (
+        self._callbacks: tuple[Callback, ...] = (
             Callback(self._find_fault, (self._energy_checks,)),
             Callback(self._update),
             Callback(self._check_condition, (self._checks,)),
@@ -133,9 +134,12 @@ class RunLoop:
                 return Outcome.CONDITION_MET
         self._ended_by = self.updates.act_again()
         outcome = Outcome.CONDITION_MET if self._ended_by else None
-        while outcome is None:
-            self._take_steps()
-            outcome = next((found for each in self._callbacks if (found := each.act())), None)
+        try:
+            while outcome is None:
+                self._take_steps()
+                outcome = next((found for each in self._callbacks if (found := each.act())), None)
+        finally:
+            self._callbacks = ()  # they refer to this object, which would keep the simulation in memory
         return outcome
 
     def _take_steps(self) -> None:
@@ -150,6 +154,8 @@ class RunLoop:
             stop = simulation._engine.advance(goal, most_steps)
         while stop is Stop.NONE and simulation.time < simulation.ledger.last_time:  # an event ended the step before it
             stop = simulation._engine.advance(goal, 1)
+        is_due = self._energy_checks.take(simulation.time, simulation.steps)
+        self._is_unsound = is_due and not simulation.is_sound  # of the regular state, before one at a time of output
         self._reached = simulation.time
         if stop is Stop.TIME_REACHED and simulation.steps < step:  # before the first step that would pass this time
             self._reached = goal
@@ -173,8 +179,7 @@ class RunLoop:
         simulation._warnings.take(simulation._engine)
         if self._stop in OUTCOME_OF_STOP:
             return OUTCOME_OF_STOP[self._stop]
-        is_due = self._energy_checks.take(simulation.time, simulation.steps)
-        return Outcome.RUNAWAY if is_due and not simulation.is_sound else None
+        return Outcome.RUNAWAY if self._is_unsound else None
 
     def _update(self) -> None:
         """Call the updaters that are due."""

@@ -14,21 +14,14 @@ import numpy as np
 
 from ..basics.paths import user_path
 from ..basics.state import (
-    BODIES,
     CLOCK,
     CONTACT_STEPS,
     COUNT,
     CUTOFF,
     GRAINS_AWAKE,
-    LARGEST_LOAD,
     LARGEST_OVERLAP,
-    LATE,
     LOST,
-    RESTED,
-    SOME_AWAKE,
     STAGE,
-    SUBSTEPS,
-    WOKEN,
 )
 from ..basics.version import __version__
 from ..compiler.jit import cache_folder
@@ -337,25 +330,11 @@ def is_mostly_awake(simulation: Simulation) -> bool:
 
 
 def rigid_clusters(simulation: Simulation, ledger: Ledger) -> dict[str, Any]:
-    """What rigid clusters did: time awake, steps of each level, energy removed at rest, largest load; or nothing."""
-    state = simulation.regular_state
-    if not state.count[BODIES]:
-        return {}
-    count, clock, time = state.count, state.clock, max(state.time, np.finfo(float).tiny)
+    """What rigid clusters did, and the energy removed at rest; or nothing."""
+    found = simulation._engine.stepper.summary(simulation.regular_state)
     dissipated = ledger.dissipated
-    found = {
-        "time_awake": float(clock[SOME_AWAKE]) / time,
-        "grains_awake": float(clock[GRAINS_AWAKE]) / time,
-        "steps_of_bodies": state.steps,
-        "substeps_of_bodies": int(count[SUBSTEPS]),
-        "contact_steps": int(count[CONTACT_STEPS]),
-        "woken": int(count[WOKEN]),
-        "came_to_rest": int(count[RESTED]),
-        "touches_seen_late": int(count[LATE]),
-        "quieting_per_dissipated": ledger.rows[-1]["lost_quieting"] / dissipated if dissipated else 0.0,
-        "largest_load_at_rest": float(clock[LARGEST_LOAD]),
-    }
-    return {"rigid_clusters": found}
+    removed = {"quieting_per_dissipated": ledger.rows[-1]["lost_quieting"] / dissipated if dissipated else 0.0}
+    return {"rigid_clusters": found | removed} if found else {}
 
 
 def versions() -> dict[str, str]:

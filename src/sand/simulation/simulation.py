@@ -22,7 +22,7 @@ from ..components.driven import Driven
 from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
-from ..engine.component import Component, present
+from ..engine.component import Component, in_use
 from ..errors import BadInput, FilesFailed
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
@@ -172,7 +172,7 @@ class Simulation(ReadOnlySettings):
         self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         forces = fitting_forces(forces, integrator)
-        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), present(extra))
+        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), in_use(extra))
         arrays, meta = ({}, {}) if restart is None else restart
         is_new = restart is None
         self._engine = engine = build_engine(*parts, fresh=is_new, contacts=contacts, cutoff=arrays.get("cutoff"))
@@ -180,7 +180,7 @@ class Simulation(ReadOnlySettings):
         self._system = System(grains.copy(), forces, box, *fitted, seed, extra, meta.get("next_id", len(grains)))
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
-        self.ledger = Ledger(engine.columns(), present(extra), awake=engine.state.at_rest is not None)
+        self.ledger = Ledger(engine.columns(), in_use(extra), awake=engine.state.at_rest is not None)
         self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
         self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None

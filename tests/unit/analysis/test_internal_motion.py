@@ -109,7 +109,7 @@ def test_damping_is_advised_with_its_cost_and_only_where_aggregates_have_grown()
     assert notes([row(largest=1), row(1e6 * share, broken=1, largest=2)]) == {}  # a rebound, or a pair
     assert notes([row(largest=1), row(1e6 * share, largest=2), row(share, largest=9)]) == {}
     text = notes([row(largest=1), row(1e6 * share, largest=3)])["vibration"]
-    page = (Path(sand.__file__).parents[3] / "docs/physics/contact-options.md").read_text("utf-8")
+    page = (Path(sand.__file__).parents[2] / "docs/physics/contact-options.md").read_text("utf-8")
     header, speeds = (
         next(line for line in page.splitlines() if line.startswith(f"| {words}")).strip("| ").split(" | ")[1:]
         for words in ("$\\zeta$ | 0 | 0.05", "largest sticking speed")

@@ -38,7 +38,7 @@ def test_the_command_writes_a_file(finished_run, tmp_path, capsys):
 @pytest.mark.compiled("fields")
 def test_a_large_file_gives_a_warning(finished_run, tmp_path, capsys, monkeypatch):
     """Above 100 MB the line advises what to do."""
-    monkeypatch.setattr(view_command, "LARGE", 1e3)
+    monkeypatch.setattr("sand.cli.report.LARGE", 1e3)
     assert main(["view", str(finished_run[0]), "--html", str(tmp_path / "a.html"), "--quiet"]) == 0
     output = capsys.readouterr()
     assert "--every" in output.err and output.out == ""

@@ -57,3 +57,18 @@ def test_a_condition_may_name_columns_of_walls():
     case["walls"][0]["material"] = "glas"
     with pytest.raises(sand.BadInput, match=r"walls.0.material: unknown material 'glas'; did you mean 'glass'"):
         check_case(case, "case")
+
+
+def test_a_condition_may_name_every_column_of_walls():
+    """Those of forces and positions, and the energy that moving walls took."""
+    case = {
+        "run": {"until": "1 us"},
+        "grains": {"kind": "gas", "number": 2, "radius": "10 nm", "material": "silica"},
+        "box": {"periodic": ["1 um", "1 um", "open"]},
+        "walls": [{"point": [0, 0, "-1 um"], "normal": [0, 0, 1], "material": "silica", "name": "floor"}],
+        "forces": {"contact": {}},
+    }
+    for column in ("lost_walls", "floor_force_z", "wall_contacts"):
+        check_case(case | {"run": {"until": "1 us", "stop": f"{column} > 1"}}, "a.toml")
+    with pytest.raises(sand.BadInput, match="wall_force"):
+        check_case(case | {"run": {"until": "1 us", "stop": "wall_force > 1"}}, "a.toml")

@@ -215,7 +215,7 @@ def test_killed_job_is_resumed(tmp_path):
         ({"start": "1e b_max"}, "start in b_max = '1e'"),
         ({"start": "-5 b_max"}, "start in b_max"),
         ({"start": "1e999 b_max"}, "start in b_max"),
-        ({"start": "1e26 m"}, "and at most 1e"),
+        ({"start": "1e26 m"}, "must be at most 1e"),
         ({"start": "10 b_max", "moment": 0.0}, "without moments"),
         ({"escape": "1 nm"}, "must exceed r1"),
         ({"target_velocity": [0.2, 0, 0]}, "never collide"),

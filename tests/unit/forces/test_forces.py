@@ -161,7 +161,7 @@ def test_external_forces_add_up():
         engine = build_engine(grains, forces, sand.Box(), sand.Verlet(), sand.Neighbours())
         parameters = engine.parameters._replace(external_work=ExternalWork(True, False))
         table, own = engine.table_of(engine.state), engine.state.grains.arrays
-        program = build_program(engine.components, parameters, table)
+        program = build_program(engine.content, parameters, table)
         own.force[...] = own.torque[...] = 0.0
         table.set("program", program)
         add_external_loads(table, 0.0)

@@ -24,9 +24,8 @@ from ...integrate.rigid.body_friction import LARGEST_DEVIATE
 from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
 from ...neighbours.search import Neighbours
-from .. import kinds
 from ..engine import Engine
-from ..kinds import Build, ForcesByType
+from ..kinds import Build, ForcesByType, Kind
 from ..part import Part
 from .body_steps import PERIODS, BodySteps
 from .quick_bodies import QuickBodies
@@ -37,33 +36,90 @@ LIST_GAP, SHARE_OF_SPACING = 3.0, 0.3
 neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
 
 
-class Kind(kinds.Kind):
+class BodiesKind(Kind):
     """An engine of rigid clusters."""
+
+    integrator = "rigid-clusters"
 
     keeps_order = True
 
     def check(self, forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
-        """As `kinds.Kind.check`."""
-        return _check(forces, others, neighbours)
+        """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
+        contact = next((f for f in forces if isinstance(f, Contact)), None)
+        problems = []
+        if contact is None:
+            problems.append("rigid clusters need sand.Contact; without contacts use clusters = 'grains' (sand.Verlet)")
+        elif contact.damping == "none":
+            problems.append(
+                "without damping no cluster comes to rest; use damping = 'critical' and a settling_time, such as 5 ns, "
+                "in [forces.contact] (sand.Contact)"
+            )
+        for name in ("slide_factor", "roll_factor", "twist_factor") if contact is not None else ():
+            if getattr(contact, name) == 0.0:
+                problems.append(f"with {name} = 0 in [forces.contact] a contact has no limit to rest at; {GRAINS}")
+        if contact is not None and contact.bath_temperature is not None:
+            problems.append(
+                f"with bath_temperature in [forces.contact] no cluster comes to rest; leave it out, or {GRAINS}"
+            )
+        ramps = [f"{force.name}.{name}" for force in forces for name in ramps_of(force)]
+        problems += [f"rigid clusters cannot follow the ramp {name}; use a number, or {GRAINS}" for name in ramps]
+        problems += [f"rigid clusters cannot have {noun}; {GRAINS}" for noun in others]
+        if neighbours.order == "curve":
+            problems.append(
+                f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}"
+            )
+        if problems:
+            raise BadInput([f"stepping: {line}" for line in problems])
+        warning = (
+            "without settling_time in [forces.contact] (sand.Contact) long chains vibrate, and stay awake, for "
+            "microseconds; 5 ns is usual for grains of 10 nm"
+        )
+        return [warning] if contact is not None and contact.settling_time is None else []
 
     def pair_gap(self, grains: Grains, box: Box) -> float:
         """Largest gap [m] of pairs that the driver of bodies looks at."""
         gap = LIST_GAP * float(grains.radius.min())
         sides = [side for side in box.lengths if side is not None]
-        if len(sides) < 3:
-            return gap
-        return max(gap, SHARE_OF_SPACING * (math.prod(sides) / len(grains)) ** (1.0 / 3.0))
+        spacing = (math.prod(sides) / len(grains)) ** (1.0 / 3.0) if len(sides) == 3 else 0.0
+        return max(gap, SHARE_OF_SPACING * spacing)
 
-    def limiting_steps(self, forces: ForcesByType) -> ForcesByType:
-        """The forces but a gas: friction and noise of bodies are exact, and `_limits` says how long steps may be."""
+    def limiting_forces(self, forces: ForcesByType) -> ForcesByType:
+        """The forces but a gas: friction and noise of bodies are exact; see `flight_limits`."""
         return forces._replace(gas=[])
 
-    def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> Any:
-        """As `kinds.Kind.flight_limits`."""
-        return _limits(parameters, forces, grains)
+    def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
+        """Limits of the steps of bodies that depend on grains, contacts and gas.
+
+        In a gas a step is at most η τ, with the shortest stopping time τ of a grain, which no mode of a body falls
+        below: the exact friction needs no short step, but drifts of half a step with the velocities before and after it
+        let a free body diffuse too fast by h²/12τ², an error of the order of η² as that of the loads. Nor may noise
+        alone move a grain farther than half of `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations
+        √(2 k_B T h/τ m).
+        """
+        law, limits = (forces.contact or Contact()).contact_law, parameters.flight_limits
+        longest, rate, gas = limits.longest_step, 0.0, parameters.gas.gas
+        if forces.gas:
+            rate = 1.0 / forces.gas[0].shortest_time(grains)
+            spread = LARGEST_DEVIATE * math.sqrt(2.0 * gas.temperature_energy * rate / float(grains.mass.min()))
+            longest = min(longest, limits.step_fraction / rate)
+            if spread > 0.0:
+                longest = min(longest, (LARGEST_FLIGHT * parameters.criteria.pair_gap / spread) ** (2.0 / 3.0))
+        awake = min(longest, longest_step_awake(law, parameters.settings, grains))
+        return limits._replace(
+            longest_step=longest,
+            longest_awake=awake,
+            smallest_radius=float(grains.radius.min()),
+            friction_rate=rate,
+            substeps=True,
+        )
 
     def complete(self, engine: Engine, forces: Sequence[Force], build: Build) -> None:
         """Give the engine arrays of bodies, and parts for awake clusters and quick bodies.
+
+        all bodies:      engine, BodySteps
+        awake clusters:    part: engine, GrainSteps
+        quick bodies:      quick.part: engine, BodySteps
+        awake ones:          part: engine, GrainSteps
 
         Parts sum forces between nearest images of all their pairs; what other images add is left to all bodies.
         """
@@ -73,9 +129,11 @@ class Kind(kinds.Kind):
         inner = build(near, Neighbours("all pairs", order="as given"))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
-        of_quick = inner.changed(parameters=own, taken=BodySteps(Part(inner, CONTACT_STEPS)))
+        of_quick = inner.changed(
+            parameters=own, warnings=engine.warnings, stepper=BodySteps(Part(inner, CONTACT_STEPS))
+        )
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
-        engine.taken = BodySteps(Part(inner, CONTACT_STEPS), quick)
+        engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), quick)
 
 
 def _between_all(force: Force) -> Force:
@@ -84,32 +142,6 @@ def _between_all(force: Force) -> Force:
     defaults = {each.name: each.default for each in dataclasses.fields(near)}
     settings = {"cutoff": None} | ({"cut": defaults["cut"]} if "cut" in defaults else {})
     return cast("Force", dataclasses.replace(near, **settings)) if "cutoff" in defaults else cast("Force", near)
-
-
-def _limits(parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
-    """Limits of the steps of bodies that depend on grains, contacts and gas.
-
-    In a gas a step is at most η τ, with the shortest stopping time τ of a grain, which no mode of a body falls below:
-    the exact friction needs no short step, but drifts of half a step with the velocities before and after it let a free
-    body diffuse too fast by h²/12τ², an error of the order of η² as that of the loads. Nor may noise alone move a grain
-    farther than half of `LARGEST_FLIGHT`: half a step with `LARGEST_DEVIATE` standard deviations √(2 k_B T h/τ m).
-    """
-    law, limits = (forces.contact or Contact()).contact_law, parameters.flight_limits
-    longest, rate, gas = limits.longest_step, 0.0, parameters.gas.gas
-    if forces.gas:
-        rate = 1.0 / forces.gas[0].shortest_time(grains)
-        spread = LARGEST_DEVIATE * math.sqrt(2.0 * gas.temperature_energy * rate / float(grains.mass.min()))
-        longest = min(longest, limits.step_fraction / rate)
-        if spread > 0.0:
-            longest = min(longest, (LARGEST_FLIGHT * parameters.criteria.pair_gap / spread) ** (2.0 / 3.0))
-    awake = min(longest, longest_step_awake(law, parameters.settings, grains))
-    return limits._replace(
-        longest_step=longest,
-        longest_awake=awake,
-        smallest_radius=float(grains.radius.min()),
-        friction_rate=rate,
-        substeps=True,
-    )
 
 
 def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Grains) -> float:
@@ -133,37 +165,3 @@ def longest_step_awake(law: ContactLaw, settings: ContactParameters, grains: Gra
             if slowest > 0.0:
                 found = min(found, 2.0 * math.pi / math.sqrt(slowest))
     return PERIODS * found
-
-
-def _check(forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
-    """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
-    contact = next((f for f in forces if isinstance(f, Contact)), None)
-    problems = []
-    if contact is None:
-        problems.append("rigid clusters need sand.Contact; without contacts use clusters = 'grains' (sand.Verlet)")
-    elif contact.damping == "none":
-        problems.append(
-            "without damping no cluster comes to rest; use damping = 'critical' and a settling_time, such as 5 ns, in "
-            "[forces.contact] (sand.Contact)"
-        )
-    for name in ("slide_factor", "roll_factor", "twist_factor") if contact is not None else ():
-        if getattr(contact, name) == 0.0:
-            problems.append(f"with {name} = 0 in [forces.contact] a contact has no limit to rest at; {GRAINS}")
-    if contact is not None and contact.bath_temperature is not None:
-        problems.append(
-            f"with bath_temperature in [forces.contact] no cluster comes to rest; leave it out, or {GRAINS}"
-        )
-    for force in forces:
-        for name in ramps_of(force):
-            problems.append(f"rigid clusters cannot follow the ramp {force.name}.{name}; use a number, or {GRAINS}")
-    problems += [f"rigid clusters cannot have {noun}; {GRAINS}" for noun in others]
-    if neighbours.order == "curve":
-        problems.append(f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}")
-    if problems:
-        raise BadInput([f"stepping: {line}" for line in problems])
-    if contact is not None and contact.settling_time is None:
-        return [
-            "without settling_time in [forces.contact] (sand.Contact) long chains vibrate, and stay awake, for "
-            "microseconds; 5 ns is usual for grains of 10 nm"
-        ]
-    return []

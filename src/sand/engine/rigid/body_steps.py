@@ -5,27 +5,31 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import wraps
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
 from ...basics.arrays import SAVED_BODIES
 from ...basics.state import (
     BODIES,
+    CONTACT_STEPS,
     CONTACTS,
     CYCLE,
+    GRAINS_AWAKE,
+    LARGEST_LOAD,
+    LATE,
     LEFT,
     LONG_RANGE_SUMS,
     OUTSIDE,
     QUIETING,
     RESTED,
     SLIPPED,
+    SOME_AWAKE,
     STAGE,
     STEP,
     STEPS,
+    SUBSTEPS,
     TIME,
     WOKEN,
     State,
@@ -48,6 +52,7 @@ from ..engine import Engine, GrainSteps
 from ..part import MOVING, Part
 from .cluster_bodies import (
     body_number,
+    contacts_of,
     describe_body,
     form_bodies,
     members,
@@ -56,9 +61,9 @@ from .cluster_bodies import (
     set_friction,
     sort_members,
 )
+from .quick_bodies import QuickBodies
 from .rigid_loads import may_stay_at_rest, rest_with_loads
 
-T = TypeVar("T")
 PERIODS = 10.0
 """Time for which the vibration of a cluster must have been low, in longest periods of its contacts; for clusters of n
 more than ten grains n²/10 of these, about half the period of the slowest bending of a straight chain."""
@@ -72,33 +77,6 @@ MOVING_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
 """Arrays of bodies that change in a step."""
 
 
-class Substeps(Protocol):
-    """Substeps of quick bodies within a step of all bodies (`quick_bodies.QuickBodies`)."""
-
-    def drivers(self) -> list[tuple[Stage, Any]]:
-        """Stages of substeps, with their parameters."""
-
-    def take(self, engine: Engine) -> Stop:
-        """The first half of a step of all bodies, and the substeps of the quick ones; returns why they failed."""
-
-    def slow_loads(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and torques on all grains that did not act in the substeps."""
-
-
-def timed(method: Callable[[Any, Engine], T]) -> Callable[[Any, Engine], T]:
-    """Count the processor time of a method as work on awake clusters."""
-
-    @wraps(method)
-    def call(self: Any, engine: Engine) -> T:
-        began = time.thread_time()
-        try:
-            return method(self, engine)
-        finally:
-            engine.taken.seconds += time.thread_time() - began
-
-    return call
-
-
 @dataclass
 class BodySteps(GrainSteps):
     """Steps of clusters at rest as rigid bodies.
@@ -109,15 +87,15 @@ class BodySteps(GrainSteps):
 
     Attributes
     ----------
-    awake : Part
+    part : Part
         The grains of awake clusters.
-    quick : Substeps or None
+    quick : QuickBodies or None
         Substeps of quick bodies; None: no body takes any.
     """
 
-    awake: Part
-    quick: Substeps | None = None
-    _awake: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
+    part: Part
+    quick: QuickBodies | None = None
+    _grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
     _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
@@ -127,11 +105,11 @@ class BodySteps(GrainSteps):
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BodySteps:
         """A copy whose parts have tables of their own."""
-        return BodySteps(copy.deepcopy(self.awake, memo), copy.deepcopy(self.quick, memo))
+        return BodySteps(copy.deepcopy(self.part, memo), copy.deepcopy(self.quick, memo))
 
     def for_part(self) -> BodySteps:
         """As `GrainSteps.for_part`, without substeps."""
-        return BodySteps(self.awake.anew())
+        return BodySteps(self.part.anew())
 
     def drivers(self) -> list[tuple[Stage, Any]]:
         """Stages of bodies; those of awake grains are the ones of all grains with other loops over pairs."""
@@ -140,7 +118,7 @@ class BodySteps(GrainSteps):
 
     def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
         """Stages of awake clusters."""
-        inner = self.awake.engine
+        inner = self.part.engine
         own: list[tuple[Stage, Any]] = [
             (measure_clusters_stage(inner.law), cluster_measures(1)),
             (kick_clusters, (self._remainder,)),
@@ -155,13 +133,28 @@ class BodySteps(GrainSteps):
         state = engine.regular_state
         form_bodies(state)
         self._list_awake(state)
-        if self._awake.size:  # the search for touches needs mass and inertia of awake clusters
+        if self._grains.size:  # the search for touches needs mass and inertia of awake clusters
             present = self._take_awake(state)
-            self._vibrated = np.zeros(len(self._awake), bool)
+            self._vibrated = np.zeros(len(self._grains), bool)
             self._measure_vibrations(engine)
             for _, own in self._awake_clusters():
-                describe_body(state, self._awake[own], present.clusters.offset[:, own])
+                describe_body(state, self._grains[own], present.clusters.offset[:, own])
         self.sum_outer_loads(engine)
+
+    def summary(self, state: State) -> dict[str, Any]:
+        """Time awake, steps of each level, and the largest load at rest."""
+        count, clock, time = state.count, state.clock, max(state.time, np.finfo(float).tiny)
+        return {
+            "time_awake": float(clock[SOME_AWAKE]) / time,
+            "grains_awake": float(clock[GRAINS_AWAKE]) / time,
+            "steps_of_bodies": state.steps,
+            "substeps_of_bodies": int(count[SUBSTEPS]),
+            "contact_steps": int(count[CONTACT_STEPS]),
+            "woken": int(count[WOKEN]),
+            "came_to_rest": int(count[RESTED]),
+            "touches_seen_late": int(count[LATE]),
+            "largest_load_at_rest": float(clock[LARGEST_LOAD]),
+        }
 
     def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """As `GrainSteps.with_missing`: a state without bodies, after a change, gets them with its loads."""
@@ -184,7 +177,7 @@ class BodySteps(GrainSteps):
     def _list_awake(self, state: State) -> None:
         """Lists of the grains of awake clusters, and of their contacts."""
         awake = state.bodies.asleep == 0
-        self._awake, self._columns = np.flatnonzero(awake), contacts_of(state, awake)
+        self._grains, self._columns = np.flatnonzero(awake), contacts_of(state, awake)
 
     def sum_outer_loads(self, engine: Engine) -> None:
         """Sum the loads of all bodies on each other."""
@@ -196,34 +189,45 @@ class BodySteps(GrainSteps):
         state.clock[TIME], state.count[LONG_RANGE_SUMS] = before, sums
 
     def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
-        """Steps of all grains before the first step, else of bodies, quick bodies and awake clusters."""
+        """Steps of all grains before the first step, else of bodies, quick bodies and awake clusters.
+
+        The driver of bodies returns in a step for what it cannot do:
+
+        * `HAS_TO_WAKE`: bodies may touch, or the loads of their contacts are near a limit.  They wake; the same step is
+          chosen again, now not longer than `RigidLimits.longest_awake`.
+        * `SUBSTEPS`: quick bodies take substeps to the end of the step.
+        * `AWAKE_STEPS`: bodies have arrived; the grains of awake clusters take contact steps to the same time.
+        * `AWAKE_LOADS`: loads at the end of the step are summed; awake clusters get their kick, or come to rest.
+
+        docs/physics/rigid-clusters.md, "The life of a cluster", tells the same in words.
+        """
         state = engine.regular_state
         if state.count[BODIES] == 0 or (state.count[STAGE] == 1 and state.clock[STEP] == 0.0):
             return super().call(engine, until, last, shorten)
         self._list_awake(state)  # of a copy of the state, or a loaded one
         before: dict[str, np.ndarray] = {}
         while True:
-            if self._awake.size and state.count[STAGE] == 0:
+            if self._grains.size and state.count[STAGE] == 0:
                 before = {name: array.copy() for name, array in _moving_arrays(state).items()}
             stop = engine.run_driver(advance_bodies, until, last, shorten)
-            if stop is Stop.TOUCH_AHEAD:
+            began, failed = time.thread_time(), Stop.NONE
+            if stop is Stop.HAS_TO_WAKE:
                 self._wake(engine)
             elif stop is Stop.AWAKE_STEPS:
                 failed = self._take_contact_steps(engine)
                 if failed is not Stop.NONE:
                     self._return_to(before, state)
-                    return failed
             elif stop is Stop.AWAKE_LOADS:
                 self._finish_step(engine)
             elif stop is Stop.SUBSTEPS:
                 failed = self._take_substeps(engine)
-                if failed is not Stop.NONE:
-                    return failed
                 self._list_awake(state)
             else:
                 return stop
+            self.seconds += time.thread_time() - began
+            if failed is not Stop.NONE:
+                return failed
 
-    @timed
     def _take_substeps(self, engine: Engine) -> Stop:
         """The first half of a step of all bodies, and the substeps of the quick ones; returns why they failed."""
         assert self.quick is not None
@@ -247,17 +251,16 @@ class BodySteps(GrainSteps):
 
     def _take_awake(self, state: State) -> State:
         """The state of the awake grains, with contacts as they are and everything else as at a start."""
-        if self._measures.size.size != len(self._awake):
-            self._measures = cluster_measures(len(self._awake))
-            self._remainder = np.zeros((2, 3, len(self._awake)))
-        return self.awake.take(state, self._awake, self._columns)
+        if self._measures.size.size != len(self._grains):
+            self._measures = cluster_measures(len(self._grains))
+            self._remainder = np.zeros((2, 3, len(self._grains)))
+        return self.part.take(state, self._grains, self._columns)
 
-    @timed
     def _take_contact_steps(self, engine: Engine) -> Stop:
         """Contact steps of the awake grains for one step of the bodies."""
         self._had_substeps = False
         state = engine.regular_state
-        present, inner = self._take_awake(state), self.awake.engine
+        present, inner = self._take_awake(state), self.part.engine
         before, end = state.time, state.time + float(state.clock[STEP])
         if engine.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
@@ -268,7 +271,7 @@ class BodySteps(GrainSteps):
         inner.drive(-math.inf, 1)
         present.count[STEPS] = 0
         self._kick_by_far_loads(state)
-        self._vibrated = np.zeros(len(self._awake), bool)
+        self._vibrated = np.zeros(len(self._grains), bool)
         pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / _limits(engine).longest_awake)
         for k in range(1, pieces):
             stop = inner.drive(before + (end - before) * k / pieces, math.inf, shorten=True)
@@ -281,9 +284,9 @@ class BodySteps(GrainSteps):
             return stop
         if engine.parameters.gas.gas.on:  # since their last kick, so that none is left for the next step
             finish_gas.run(inner.table_of(present))
-        self._slipped = self._slips(state, present)
-        self.awake.give_back(state)
-        self._columns = self.awake.columns
+        self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
+        self.part.give_back(state)
+        self._columns = self.part.columns
         return Stop.NONE
 
     def _return_to(self, before: dict[str, np.ndarray], state: State) -> None:
@@ -291,12 +294,12 @@ class BodySteps(GrainSteps):
         for name, array in _moving_arrays(state).items():
             array[...] = before[name]
         self.sort_members(state)
-        self.awake.name_limiting(state)
+        self.part.name_limiting(state)
 
     def _measure_vibrations(self, engine: Engine) -> None:
         """Measure awake clusters; notes the grains of those that vibrate too much to come to rest."""
-        measures, inner = self._measures, self.awake.engine
-        measure_clusters_stage(inner.law).run(inner.table_of(self.awake.state), measures)
+        measures, inner = self._measures, self.part.engine
+        measure_clusters_stage(inner.law).run(inner.table_of(self.part.state), measures)
         allowed = _vibration_at_rest(engine, measures.size, measures.limit)
         self._vibrated |= (measures.vibration > allowed)[measures.first.astype(np.int64)]
 
@@ -309,15 +312,15 @@ class BodySteps(GrainSteps):
 
     def _kick_by_far_loads(self, state: State) -> None:
         """Half a kick of the awake clusters by the loads of all grains that the inner engine does not sum."""
-        full, near = state.long_range, self.awake.state.long_range
+        full, near = state.long_range, self.part.state.long_range
         if full.force.size:
-            self._remainder[0] = full.force[:, self._awake] - near.force
-            self._remainder[1] = full.torque[:, self._awake] - near.torque
+            self._remainder[0] = full.force[:, self._grains] - near.force
+            self._remainder[1] = full.torque[:, self._grains] - near.torque
             self._kick(float(state.clock[STEP]))
 
     def _kick(self, step: float) -> None:
         """Half a kick of the awake clusters by the loads `_remainder`, for a step [s]."""
-        table = self.awake.engine.table_of(self.awake.state)
+        table = self.part.engine.table_of(self.part.state)
         table["scratch"][DT] = 0.5 * step
         kick_clusters.run(table, (self._remainder,))
 
@@ -334,21 +337,21 @@ class BodySteps(GrainSteps):
             Length of the step [s].
         """
         self._list_awake(state)
-        if not self._awake.size:
+        if not self._grains.size:
             return
         self._take_awake(state)
-        self._remainder[0], self._remainder[1] = force[:, self._awake], torque[:, self._awake]
+        self._remainder[0], self._remainder[1] = force[:, self._grains], torque[:, self._grains]
         self._kick(step)
         self._store_velocities(state)
 
     def _store_velocities(self, state: State) -> None:
         """Copy velocities and spins of awake grains to the state of all grains."""
         for name in ("velocity", "spin"):
-            getattr(state.grains.arrays, name)[..., self._awake] = getattr(self.awake.state.grains.arrays, name)
+            getattr(state.grains.arrays, name)[..., self._grains] = getattr(self.part.state.grains.arrays, name)
 
     def _slips(self, state: State, present: State) -> np.ndarray:
         """Which awake grains have contacts that slipped in this step of bodies: losses of these have grown."""
-        slipped = np.zeros(len(self._awake), bool)
+        slipped = np.zeros(len(self._grains), bool)
         if not present.count[SLIPPED]:
             return slipped
         contacts, columns, used = state.contacts, self._columns, int(present.count[CONTACTS])
@@ -356,11 +359,10 @@ class BodySteps(GrainSteps):
         before = dict(zip(map(frozenset, contacts.pair[:, columns].T.tolist()), lost, strict=True))
         pairs = present.contacts.pair[:, :used].T
         for pair, now in zip(pairs, present.contacts.lost[SLIP_LOSSES, :used].T, strict=True):
-            if before.get(frozenset(self._awake[pair].tolist())) != now.tobytes():
+            if before.get(frozenset(self._grains[pair].tolist())) != now.tobytes():
                 slipped[pair] = True
         return slipped
 
-    @timed
     def _finish_step(self, engine: Engine) -> None:
         """The second half kick of awake clusters; those that had no substeps, and are at rest, become bodies."""
         state = engine.regular_state
@@ -368,25 +370,25 @@ class BodySteps(GrainSteps):
             assert self.quick is not None
             self.kick_awake(state, *self.quick.slow_loads(state), float(state.clock[STEP]))
             return
-        present, bodies = self.awake.state, state.bodies
+        present, bodies = self.part.state, state.bodies
         self._kick_by_far_loads(state)
         self._store_velocities(state)
         measures = self._measures
         self._measure_vibrations(engine)
-        clusters, firsts = self._awake_clusters(), self._awake[measures.first.astype(np.int64)]
-        if not np.array_equal(firsts, bodies.first[self._awake]):
+        clusters, firsts = self._awake_clusters(), self._grains[measures.first.astype(np.int64)]
+        if not np.array_equal(firsts, bodies.first[self._grains]):
             changed = self._rename(state, firsts)
             for k, own in clusters:
                 if changed[k]:
-                    describe_body(state, self._awake[own], present.clusters.offset[:, own])
+                    describe_body(state, self._grains[own], present.clusters.offset[:, own])
         # vectors from the centres of mass now, as those of grains of bodies that are not turned
-        bodies.offset[:, self._awake] = present.clusters.offset
-        bodies.orientation[:, self._awake] = np.array([[0.0], [0.0], [0.0], [1.0]])
-        bodies.inner_field[:, self._awake] = 0.0
+        bodies.offset[:, self._grains] = present.clusters.offset
+        bodies.orientation[:, self._grains] = np.array([[0.0], [0.0], [0.0], [1.0]])
+        bodies.inner_field[:, self._grains] = 0.0
         mark_near_bodies.run(engine.table_of(state))
         rested = False
         for k, own in clusters:
-            first = int(self._awake[k])
+            first = int(self._grains[k])
             if len(own) == 1:
                 if bodies.near[first] == CLEAR:
                     rest_grain(state, first)
@@ -399,7 +401,7 @@ class BodySteps(GrainSteps):
             wait = measures.period[k] * max(PERIODS, len(own) ** 2 / 10.0)
             quiet = state.time - max(bodies.vibration[first], bodies.event[first]) > wait
             if quiet and bodies.near[first] == CLEAR and self._fits(engine, own):
-                self._rest(engine, self._awake[own], present.clusters.offset[:, own])
+                self._rest(engine, self._grains[own], present.clusters.offset[:, own])
                 rested = True
         if rested:
             self.sort_members(state)
@@ -409,7 +411,7 @@ class BodySteps(GrainSteps):
 
         Larger ones stay awake, with a warning: their grains may act on each other through the images of the box.
         """
-        s = self.awake.state.clusters.offset[:, own]
+        s = self.part.state.clusters.offset[:, own]
         extent = s.max(axis=1) - s.min(axis=1)
         lengths = engine.regular_state.box.lengths
         fits = all(side is None or size < 0.5 * side for size, side in zip(extent, lengths, strict=True))
@@ -423,12 +425,12 @@ class BodySteps(GrainSteps):
         Returns whether the cluster of each awake grain has other grains than before.
         """
         bodies, n = state.bodies, len(state.grains)
-        before = bodies.first[self._awake]
+        before = bodies.first[self._grains]
         # a cluster is the same if all of its grains had its first grain, and no other grain had
         other = np.bincount(firsts, before != firsts, n) + np.bincount(before, before != firsts, n)
         changed = other[firsts] > 0
         bodies.event[firsts[changed]] = bodies.vibration[firsts[changed]] = state.time
-        bodies.first[self._awake] = firsts
+        bodies.first[self._grains] = firsts
         self.sort_members(state)
         return changed
 
@@ -437,18 +439,13 @@ class BodySteps(GrainSteps):
         state, measures, first = engine.regular_state, self._measures, int(index[0])
         describe_body(state, index, offset)
         state.lost[QUIETING] += rest_cluster(state, index)
-        at = np.searchsorted(self._awake, first)
+        at = np.searchsorted(self._grains, first)
         rest_with_loads(state, first, float(measures.strain[at]))
         state.bodies.strength[:, first] = measures.strength[:, at]
         store_rest.run(engine.table_of(state), (), body_number(state, first))
         if engine.parameters.gas.gas.on:
             set_friction(state, engine.parameters.gas.gas, index)
         state.count[RESTED] += 1
-
-
-def contacts_of(state: State, chosen: np.ndarray) -> np.ndarray:
-    """Columns of the contacts of some clusters; `chosen` says (N,) which grains are theirs."""
-    return np.flatnonzero(chosen[state.contacts.pair[0, : state.count[CONTACTS]]])
 
 
 def _vibration_at_rest(engine: Engine, size: np.ndarray, limit: np.ndarray) -> np.ndarray:

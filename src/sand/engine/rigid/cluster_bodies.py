@@ -26,6 +26,11 @@ def body_number(state: State, first: int) -> int:
     return int(np.searchsorted(bodies.member[bodies.start[: state.count[BODIES]]], first))
 
 
+def contacts_of(state: State, chosen: np.ndarray) -> np.ndarray:
+    """Columns of the contacts of some clusters; `chosen` says (N,) which grains are theirs."""
+    return np.flatnonzero(chosen[state.contacts.pair[0, : state.count[CONTACTS]]])
+
+
 def sort_members(state: State) -> None:
     """Fill the lists of the grains of each body."""
     bodies = state.bodies

@@ -14,8 +14,7 @@ from ...integrate.parts import Stop
 from ...integrate.rigid.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
 from ..engine import Engine
 from ..part import Part
-from .body_steps import BodySteps, contacts_of
-from .cluster_bodies import sort_members
+from .cluster_bodies import contacts_of, sort_members
 
 LOADS = ("force", "torque", "field")
 LEAST_RATE = 1e-30
@@ -80,15 +79,14 @@ class QuickBodies:
         grains, bodies = state.grains.arrays, state.bodies
         return grains.force - bodies.excluded_force, grains.torque - bodies.excluded_torque
 
-    def _copy(self, state: State) -> BodySteps:
+    def _copy(self, state: State) -> Any:
         """Take the grains of quick bodies, and sum the loads that they and external forces have on them."""
         is_quick = state.bodies.quick[state.bodies.first] == 1
         own = self.part.take(state, np.flatnonzero(is_quick), contacts_of(state, is_quick))
         own.bodies.excluded_force[...] = own.bodies.excluded_torque[...] = 0.0
         # the random numbers of a gas are counted with steps and substeps
         own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]
-        steps = self.part.engine.taken
-        assert isinstance(steps, BodySteps)
+        steps: Any = self.part.engine.stepper  # `body_steps.BodySteps`
         steps.sort_members(own)
         steps.sum_outer_loads(self.part.engine)
         return steps

@@ -42,7 +42,7 @@ NODE_COST, ROW_COST, GRAIN_COST = 4.0, 3.3, 20.0
 TRANSFORMS_COST = 5000.0
 """Cost of the calls of the Fourier transforms, for each block."""
 LIST_FROM, LIST_REACH, LIST_UP_TO = 64, 1.1, 0.38
-"""Conditions for a Verlet list, as in `neighbours.settings`: grains, reach in units of r_c, fraction within reach."""
+"""Conditions for a Verlet list, as in `neighbours.search`: grains, reach in units of r_c, fraction within reach."""
 LARGEST_SPACING = 0.8
 """Upper limit of a in units of half the shortest side, for few grains and long boxes."""
 MOST_WAVES = 1_000_000

@@ -2,7 +2,7 @@
 
 One step:  choose h → kick ½h, drift, rotor → long-range and external forces on all grains → kick ½h.  In a gas the
 drift is two of ½h, with friction and noise between them (`body_friction`).  The driver returns before a step in which
-bodies may touch (`Stop.TOUCH_AHEAD`), and before one in which some bodies take substeps (`Stop.SUBSTEPS`), see
+bodies may touch (`Stop.HAS_TO_WAKE`), and before one in which some bodies take substeps (`Stop.SUBSTEPS`), see
 `substeps`.  While a cluster is awake it returns twice in a step: after the drift, so that
 grains of awake clusters take their contact steps (`AWAKE_STEPS`), and at the end (`AWAKE_LOADS`).
 """
@@ -242,7 +242,7 @@ def first_half(s, some_awake):
     s.clock[STEP] = h
     if any_has_to_wake(s.bodies, s.count):
         s.bodies.quick[:] = 0
-        return Stop.TOUCH_AHEAD.value
+        return Stop.HAS_TO_WAKE.value
     if takes_substeps:
         return Stop.SUBSTEPS.value
     kick_bodies(s.bodies, s.count, 0.5 * h)
