@@ -125,7 +125,7 @@ def listed(folder: Path) -> dict[str, Any]:
 
 @golden
 def walls(folder: Path) -> dict[str, Any]:
-    """Grains between a wall at rest and one with a mass that is pressed on them, with dashpots and the noise of a bath."""
+    """Grains between a wall at rest and one with a mass that is pressed on them, with dashpots, and with a bath."""
     position = [[2.5e-7 * x, 2.5e-7 * y, 1.05e-7 + 2.2e-7 * z] for x in range(3) for y in range(2) for z in range(2)]
     grains = sand.Grains(position, "0.1 um", "silica", velocity=[0.3, 0.1, -2.0], spin=[1e6, 2e5, 0.0])
     lid = sand.Wall([0, 0, "0.5 um"], [0, 0, -1], "ice", mass="1e-15 kg", force="1 nN")

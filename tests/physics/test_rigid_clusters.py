@@ -578,6 +578,15 @@ def test_a_condition_is_checked_in_every_step_of_bodies():
     assert before.regular_state.count[MADE] == 0
 
 
+def test_warnings_of_parts_reach_the_user():
+    """Engines of quick bodies, also those of a copy, write into the list of warnings of the whole simulation."""
+    sim = gas()
+    for engine in (sim._engine, sim.copy()._engine):
+        quick = engine.stepper.quick.part
+        assert quick.prototype.warnings is engine.warnings
+        assert quick.anew().prototype.warnings is engine.warnings
+
+
 @pytest.mark.filterwarnings("ignore:a cluster spans half of the box")
 @pytest.mark.compiled("contacts")
 def test_a_run_that_is_awake_most_of_the_time_says_so(monkeypatch):

@@ -93,7 +93,7 @@ class Simulation(ReadOnlySettings):
     box : Box or float or str, optional
         A box, or the side length of a periodic cube; open by default.
     stepping : Integrator or None, optional
-        Integrator: `sand.Verlet()`, the default, `sand.Adaptive()`, `sand.ForestRuth()` or `sand.RigidClusters()`.
+        Integrator: `sand.Verlet()`, the default, `sand.RigidClusters()`, or one of your own.
     neighbours : Neighbours or None, optional
         Settings of the neighbour search, `sand.Neighbours()` by default.
     seed : int or None, optional
