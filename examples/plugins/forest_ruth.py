@@ -35,7 +35,7 @@ from sand.basics.state import FLIGHT, LONG_RANGE_SUMS, NEEDED, REJECTED, STEPS, 
 from sand.compiler.jit import caller, formula, loop, rare
 from sand.compiler.program import call_stage, has_stage
 from sand.compiler.stage import stage
-from sand.forces.external.formulas import stiffness_of_field
+from sand.forces.external_formulas import stiffness_of_field
 from sand.integrate.flight import finish_flight_step, refresh_verlet_list, sum_free_loads
 from sand.integrate.force_calls import sum_external
 from sand.integrate.force_stages import ENERGY, POWER

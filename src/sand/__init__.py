@@ -79,10 +79,10 @@ if TYPE_CHECKING:
     from .errors import FilesFailed as FilesFailed
     from .errors import Interrupted as Interrupted
     from .errors import SandError as SandError
-    from .forces.external.electric_field import ElectricField as ElectricField
-    from .forces.external.gravity import Gravity as Gravity
-    from .forces.external.magnetic_field import Field as Field
-    from .forces.gas.model import Gas as Gas
+    from .forces.electric_field import ElectricField as ElectricField
+    from .forces.gas import Gas as Gas
+    from .forces.gravity import Gravity as Gravity
+    from .forces.magnetic_field import Field as Field
     from .forces.own import external_force as external_force
     from .forces.own import pair_force as pair_force
     from .forces.pair.dipoles import Dipoles as Dipoles

@@ -57,7 +57,7 @@ FAULTS = (
     Fault("the rate of 1/r^5 as if it were 1/r^4", "off by one", "formula", "forces/pair/dipole_rates.py",
           "-3.0 * inverse3 * radial, -5.0 * three * radial", "-3.0 * inverse3 * radial, -4.0 * three * radial",
           "unit/forces/test_pair_forces.py::test_taylor_rates_against_finite_differences"),
-    Fault("friction of a spin with r^3 for r^4", "forgotten unit", "formula", "forces/gas/drag.py",
+    Fault("friction of a spin with r^3 for r^4", "forgotten unit", "formula", "forces/gas_drag.py",
           "accommodation * density * speed * radius**4", "accommodation * density * speed * radius**3",
           "unit/forces/test_gas_drag.py::test_shortest_relaxation_time"),
     Fault("a quaternion product with one wrong sign", "sign", "formula", "numerics/quaternion.py",

@@ -15,7 +15,7 @@ from sand.basics.constants import MAGNETIC
 from sand.config.case import ForcesSection
 from sand.errors import BadInput
 from sand.forces import BUILT_IN
-from sand.forces.external.formulas import GrainState
+from sand.forces.external_formulas import GrainState
 from sand.forces.pair import dipole_loops, generic_loops
 from sand.forces.pair import long_range_loops as loops
 from sand.forces.pair.cutoff import UNCUT, cutoff_for

@@ -6,7 +6,7 @@ import pytest
 import sand
 from sand.basics.constants import BOLTZMANN, COULOMB
 from sand.basics.state import KICKED, STEP
-from sand.forces.gas.drag import rotation_friction, translation_friction
+from sand.forces.gas_drag import rotation_friction, translation_friction
 
 
 def pair_crossing_the_cutoff(cut, step):

@@ -20,8 +20,8 @@ from ..basics.state import COMPARED, CUT_RADIUS
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce
-from ..forces.gas.gas_loops import VACUUM
-from ..forces.gas.model import Gas
+from ..forces.gas import Gas
+from ..forces.gas_loops import VACUUM
 from ..forces.pair.ewald_force import EwaldForce
 from ..forces.pair.long_range_loops import LongRangeSums
 from ..integrate.integrator import Integrator

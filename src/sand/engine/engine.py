@@ -59,7 +59,7 @@ from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stag
 from ..contact.model import Contact
 from ..contact.renewal import renewal_stage
 from ..forces.base import ExternalForce, LongRangeForce
-from ..forces.external.external_loops import external_energies_for
+from ..forces.external_loops import external_energies_for
 from ..forces.pair.long_range_loops import LongRangeSums, long_range_energies_for
 from ..integrate.driver import advance
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds

@@ -9,7 +9,7 @@ from ..basics.box import Box
 from ..basics.grains import Grains
 from ..contact.model import Contact
 from ..forces.base import ExternalForce, Force, LongRangeForce
-from ..forces.gas.model import Gas
+from ..forces.gas import Gas
 from ..integrate.parts import StepParameters
 from ..neighbours.search import Neighbours
 from .engine import Engine

@@ -35,7 +35,7 @@ class Force(Protocol):
 
 @runtime_checkable
 class ExternalForce(Force, Protocol):
-    """A force on single grains; `forces/external/formulas.py` has the formulas.
+    """A force on single grains; `forces/external_formulas.py` has the formulas.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ from ..basics.units import finite_number
 from ..basics.vectors import components, three
 from ..compiler.jit import compile_error, formula
 from ..errors import BadInput, did_you_mean
-from .external.formulas import GrainState
+from .external_formulas import GrainState
 from .pair.cutoff import CutoffForce, cutoff_for
 from .pair.generic_loops import PairGrain, PairParameters, pair_sums
 from .pair.long_range_loops import LongRangeSums

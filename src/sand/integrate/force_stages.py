@@ -6,7 +6,7 @@ from typing import Any
 from ..compiler.recipes import factory
 from ..compiler.stage import PythonStage, Stage, stage
 from ..compiler.table import Table
-from ..forces.external.external_loops import external_energy, external_loads, external_power, wrapping_work
+from ..forces.external_loops import external_energy, external_loads, external_power, wrapping_work
 from ..forces.pair.long_range_loops import LongRangeSums, Round, all_blocks
 from .parts import EXTERNAL, LOAD_TIME
 from .respa import contact_pair_loops

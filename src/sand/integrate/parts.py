@@ -94,7 +94,7 @@ class GasSettings(NamedTuple):
 
     period: float  # target interval between two kicks [s]
     seed: int
-    gas: Any  # forces.gas.gas_loops.GasParameters
+    gas: Any  # forces.gas_loops.GasParameters
 
 
 class ForceNumbers(NamedTuple):

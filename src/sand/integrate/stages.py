@@ -20,7 +20,7 @@ from ..contact.law import ContactLaw
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import ContactStep, contact_pass_loop, contact_step, store_contact_sums
-from ..forces.gas.gas_loops import gas_kick
+from ..forces.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
@@ -54,7 +54,7 @@ class StageNumber(IntEnum):
     PREPARE_RATES = 13  # taylor
     STORE_POSITIONS = 14  # taylor
     EXTRAPOLATE = 15  # taylor
-    GAS_KICK = 16  # forces.gas.gas_loops
+    GAS_KICK = 16  # forces.gas_loops
     FLIGHT = 17  # of an integrator of the user
     EXPLAIN = 18  # step_control: which grains caused a stop
     SETTLE_CLUSTERS = 19  # contact.settling: damping of clusters

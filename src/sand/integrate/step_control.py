@@ -26,7 +26,7 @@ from ..basics.state import (
 )
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
-from ..forces.external.formulas import stiffness_of_field
+from ..forces.external_formulas import stiffness_of_field
 from ..numerics.simd import float_bits, float_from_bits
 from ..numerics.vec import dot, load, sub
 

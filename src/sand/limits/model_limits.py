@@ -17,7 +17,7 @@ from ..basics.units import MELTED, format_quantity
 from ..contact.law import contact_constants, ringing_energy
 from ..contact.model import DAMPED_SPEED_GAIN, Contact
 from ..forces.base import Force
-from ..forces.gas.model import Gas
+from ..forces.gas import Gas
 from ..forces.pair.dipoles import Dipoles
 from ..theory.magnetic_limits import QUOTED_SIZES, MagneticLimits, contact_field, magnetic_limits
 

@@ -21,7 +21,7 @@ from ..basics.units import format_quantity
 from ..contact.law import contact_periods, largest_pull
 from ..contact.model import Contact
 from ..forces.base import Force
-from ..forces.external.electric_field import ElectricField
+from ..forces.electric_field import ElectricField
 
 IDEAL_STRENGTH = 0.1
 """Stress that no solid holds, in units of Young's modulus (ideal strength, recalled: Orowan 1949)."""

@@ -20,7 +20,7 @@ from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity
 from ..contact.model import Contact
 from ..forces.base import Force
-from ..forces.gas.model import Gas
+from ..forces.gas import Gas
 from ..forces.pair.cutoff import CutoffForce
 from ..forces.pair.dipoles import Dipoles
 from ..forces.pair.ewald_force import EwaldForce

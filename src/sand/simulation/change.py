@@ -45,7 +45,7 @@ from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
 from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force, LongRangeForce
-from ..forces.gas.model import Gas
+from ..forces.gas import Gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
 from ..setup.checks import at_same_place

@@ -11,7 +11,7 @@ import numpy as np
 from ..basics.ramps import ramps_of
 from ..basics.units import format_quantity
 from ..errors import BadInput
-from ..forces.external.magnetic_field import Field
+from ..forces.magnetic_field import Field
 from ..io.run_folder import CASE, read_toml
 from ..numerics.vec import norm
 

@@ -13,7 +13,7 @@ from sand.basics.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, S
 from sand.compiler.jit import kernel
 from sand.contact.constants_table import column_loops, constant_names
 from sand.contact.damping import NONE
-from sand.contact.events import settle_loop
+from sand.contact.events import slip_and_break_loop
 from sand.contact.jkr import LAW as JKR
 from sand.contact.law import contact_constants
 from sand.contact.mechanics import displacements_of
@@ -40,7 +40,7 @@ PAIRS = 403
 """Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""
 STEP = 1e-11
 STATE = ("pointer1", "pointer2", "twist", "force", "torque1", "torque2", "lost")
-contact_pass, update_flagged_contacts = contact_pass_loop(JKR, NONE), settle_loop(JKR, NONE)
+contact_pass, update_flagged_contacts = contact_pass_loop(JKR, NONE), slip_and_break_loop(JKR, NONE)
 flag_contacts, columns = contact_loop(JKR, _flag_contact), column_loops(JKR)
 
 

@@ -14,9 +14,9 @@ import sand
 from sand.compiler.jit import kernel
 from sand.config.case import check_case
 from sand.errors import BadInput
+from sand.forces import external_formulas as surroundings
 from sand.forces.base import ExternalForce
-from sand.forces.external import formulas as surroundings
-from sand.forces.external.formulas import GrainState, field_in_time, flux_density_at, uniform_field
+from sand.forces.external_formulas import GrainState, field_in_time, flux_density_at, uniform_field
 
 EPS = np.finfo(float).eps
 component = st.integers(-100, 100).map(lambda n: n / 100)

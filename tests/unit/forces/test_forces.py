@@ -10,8 +10,8 @@ import sand
 from sand.compiler.jit import formula
 from sand.compiler.user_code import code_digest
 from sand.engine.assemble import build_engine
-from sand.forces.external.external_loops import external_energies_for
-from sand.forces.external.formulas import GrainState, uniform_field
+from sand.forces.external_formulas import GrainState, uniform_field
+from sand.forces.external_loops import external_energies_for
 from sand.integrate.force_calls import add_external_loads, sum_external
 from sand.integrate.force_stages import ENERGY, external_force_stages, pair_force_stages
 from sand.integrate.parts import ExternalWork

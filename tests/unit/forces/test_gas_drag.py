@@ -8,10 +8,10 @@ import pytest
 import sand
 from sand.basics.constants import BOLTZMANN
 from sand.compiler.jit import kernel
+from sand.forces import gas_drag as law
 from sand.forces.base import ExternalForce, Force
-from sand.forces.gas import drag as law
-from sand.forces.gas.gas_loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
-from sand.forces.gas.model import Gas
+from sand.forces.gas import Gas
+from sand.forces.gas_loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
 
 SPEED = math.sqrt(8.0 / math.pi)
 """v̄ for k_B T/m_g = 1."""
@@ -107,7 +107,7 @@ def test_momentum_fluctuations_obey_fluctuation_dissipation(accommodation):
 
 
 def test_error_of_the_linear_law_at_half_the_molecular_speed():
-    """At v = v̄/2 the drag exceeds f_t v by 6.2 % (specular) and 4.5 % (diffuse), see forces/gas/model.py."""
+    """At v = v̄/2 the drag exceeds f_t v by 6.2 % (specular) and 4.5 % (diffuse), see forces/gas.py."""
     velocity = np.array([0.0, 0.0, 0.5 * SPEED])
     for accommodation, excess in ((0.0, 0.062), (1.0, 0.045)):
         force = molecular_momentum_transfer(velocity, np.zeros(3), accommodation)[0]

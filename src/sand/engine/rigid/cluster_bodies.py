@@ -9,7 +9,7 @@ import numpy as np
 from ...analysis.clusters import cluster_labels
 from ...basics.arrays import LOADS_OF_BODIES
 from ...basics.state import BODIES, CONTACTS, State
-from ...forces.gas.gas_loops import GasParameters
+from ...forces.gas_loops import GasParameters
 from ...integrate.rigid.body_friction import friction_modes
 from ...integrate.rigid.rigid_body import product
 from ...numerics.quaternion import matrix_of, quaternion_of

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from ...basics.grains import Grains
 from ...contact import jkr
 from ...contact.model import Contact
-from ...forces.external.magnetic_field import Field
+from ...forces.magnetic_field import Field
 from ...forces.pair.dipoles import Dipoles
 from ...simulation.simulation import Simulation
 from .encounters import Flight, body_of

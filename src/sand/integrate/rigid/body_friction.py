@@ -1,7 +1,7 @@
 """Rigid bodies in a gas: friction of the whole body, and its exact Ornstein–Uhlenbeck step.
 
 Grain i of a body, at sᵢ from the centre of mass, moves at V + Ω×sᵢ in a gas of velocity u.  With the coefficients f_i
-of drag and f_r,i of rotational drag of its grains (`forces.gas.drag`), force and torque of the gas on the body are
+of drag and f_r,i of rotational drag of its grains (`forces.gas_drag`), force and torque of the gas on the body are
 −Γ w, w = (V − u, Ω) in the frame of the body, where Γ is constant:
 
     Γ = ( Σ f_i          −Σ f_i [s_i]×                              )
@@ -25,7 +25,7 @@ import numpy as np
 
 from ...basics.state import BODIES, STEPS, SUBSTEPS
 from ...compiler.jit import formula, loop
-from ...forces.gas.drag import decayed_fraction, rotation_friction, thermal_spread, translation_friction
+from ...forces.gas_drag import decayed_fraction, rotation_friction, thermal_spread, translation_friction
 from ...numerics.quaternion import turned, turned_back
 from ...numerics.random import normal_vector
 from ...numerics.vec import accrue, add, axpy, dot, load, load4, norm, put, scale, sub

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...analysis.clusters import cluster_labels
 from ...basics.constants import BOLTZMANN, COULOMB, MAGNETIC
-from ...forces.gas.model import Gas
+from ...forces.gas import Gas
 
 CAPTURE = 0.5
 """c of the magnetic cross-section (Eq. 14) of grains with random moments and spins."""

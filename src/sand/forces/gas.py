@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ...basics.arguments import checked
-from ...basics.box import Box
-from ...basics.constants import BOLTZMANN, LIGHT
-from ...basics.grains import Grains
-from ...basics.ramps import rampable
-from ...basics.settings import RAMP, Flag, Number, Settings, Vector
-from ...basics.units import MELTED, format_quantity
-from . import drag as law
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.constants import BOLTZMANN, LIGHT
+from ..basics.grains import Grains
+from ..basics.ramps import rampable
+from ..basics.settings import RAMP, Flag, Number, Settings, Vector
+from ..basics.units import MELTED, format_quantity
+from . import gas_drag as law
 from .gas_loops import GasParameters, shortest_stopping_time
 
 MIN_KNUDSEN = 10.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...basics.arguments import checked
-from ...basics.box import Box
-from ...basics.grains import Grains
-from ...basics.ramps import rampable
-from ...basics.settings import RAMP, AlongZ, Settings
-from .formulas import UniformElectric, uniform_electric
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.ramps import rampable
+from ..basics.settings import RAMP, AlongZ, Settings
+from .external_formulas import UniformElectric, uniform_electric
 
 
 @checked

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiler.jit import formula, loop
-from ...numerics.random import normal_vector
-from ...numerics.vec import add, dot, load, put, sub
-from .drag import decayed_fraction, ornstein_uhlenbeck, rotation_friction, thermal_spread, translation_friction
+from ..compiler.jit import formula, loop
+from ..numerics.random import normal_vector
+from ..numerics.vec import add, dot, load, put, sub
+from .gas_drag import decayed_fraction, ornstein_uhlenbeck, rotation_friction, thermal_spread, translation_friction
 
 TRANSLATION, ROTATION = range(2)
 """Random-number streams of `numerics.random`, distinct from those of all other uses."""

@@ -1,11 +1,11 @@
 """Loops of external forces: one formula over all grains."""
 
-from ...basics.box import nearest_image
-from ...compiler.jit import loop
-from ...compiler.recipes import factory
-from ...compiler.stage import stage
-from ...numerics.vec import accrue, dot, load
-from .formulas import GrainState
+from ..basics.box import nearest_image
+from ..compiler.jit import loop
+from ..compiler.recipes import factory
+from ..compiler.stage import stage
+from ..numerics.vec import accrue, dot, load
+from .external_formulas import GrainState
 
 
 @loop

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...basics.arguments import checked
-from ...basics.box import Box
-from ...basics.grains import Grains
-from ...basics.ramps import rampable
-from ...basics.settings import RAMP, Reading, Settings
-from ...basics.vectors import along_z, components
-from ...errors import BadInput, shown
-from .formulas import UniformGravity, uniform_gravity
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.ramps import rampable
+from ..basics.settings import RAMP, Reading, Settings
+from ..basics.vectors import along_z, components
+from ..errors import BadInput, shown
+from .external_formulas import UniformGravity, uniform_gravity
 
 
 def _downwards(value: Any, name: str) -> tuple[float, float, float]:

@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ...basics.arguments import checked
-from ...basics.box import Box
-from ...basics.grains import Grains
-from ...basics.ramps import force_at, forces_at_points, rampable, ramps_of
-from ...basics.settings import RAMP, AlongZ, Direction, For, Number, Reading, Settings, Word
-from ...basics.units import si
-from ...errors import BadInput
-from ...numerics.vec import across, add, cross, dot, norm, scale, sub
-from .formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
+from ..basics.arguments import checked
+from ..basics.box import Box
+from ..basics.grains import Grains
+from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
+from ..basics.settings import RAMP, AlongZ, Direction, For, Number, Reading, Settings, Word
+from ..basics.units import si
+from ..errors import BadInput
+from ..numerics.vec import across, add, cross, dot, norm, scale, sub
+from .external_formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
 
 _WAVE = "oscillating", "rotating"
 _ALONG_Z = "one value along z or three components, in T, such as '1 mT'"
@@ -120,7 +120,7 @@ class Field(Settings):
 
     @property
     def formula(self) -> Callable:
-        """The formula in `forces/external/formulas.py`; constant fields have one without trigonometric functions."""
+        """The formula in `forces/external_formulas.py`; constant fields have one without trigonometric functions."""
         return uniform_field if self.shape == "constant" else field_in_time
 
     @property

@@ -8,8 +8,8 @@ arrays as well as numbers.
 
 import math
 
-from ...compiler.jit import formula
-from ...numerics.vec import axpy, sub
+from ..compiler.jit import formula
+from ..numerics.vec import axpy, sub
 
 ATOMIC_MASS = 1.66053906660e-27
 """u [kg], CODATA 2018"""

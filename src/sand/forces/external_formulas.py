@@ -6,8 +6,8 @@ All have the signature `formula(time, grain, parameters)`.
 import math
 from typing import NamedTuple
 
-from ...compiler.jit import formula
-from ...numerics.vec import add, axpy, cross, dot, scale
+from ..compiler.jit import formula
+from ..numerics.vec import add, axpy, cross, dot, scale
 
 
 class GrainState(NamedTuple):

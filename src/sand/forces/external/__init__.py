@@ -1,1 +1,0 @@
-"""External forces on single grains: magnetic and electric fields, gravity."""

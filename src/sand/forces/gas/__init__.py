@@ -1,1 +1,0 @@
-"""Gas drag and Brownian motion."""
