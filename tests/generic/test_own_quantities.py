@@ -15,8 +15,8 @@ from sand.basics.own_quantities import RESERVED, OwnQuantities, joined
 from sand.basics.own_units import si_unit, with_own_unit
 from sand.basics.schema import FIELDS
 from sand.cli.main import main
+from sand.io.bodies import read_body, write_body
 from sand.io.frame import OF_CONTACTS, OF_GRAINS, Frame, FrameSequence
-from sand.io.read_grains import write_body
 from sand.plotting.plots import HISTORY
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import si_prefix
@@ -25,7 +25,6 @@ from sand.simulation.change import Change
 from sand.viewer.packets import frame_packet
 from sand.viewer.series import quantity_ranges
 
-from ..bodies import read_body
 from ..unit.pages import decode
 
 OWN = {
@@ -370,8 +369,8 @@ def test_frames_give_tables_starts_and_pages(run):
 
 def five_frame(index=slice(None)):
     """A frame of grains of `five`."""
+    from sand.io.bodies import contacts_of
     from sand.io.frame_chunks import stored_frame
-    from sand.io.read_grains import contacts_of
 
     grains = five()[index]
     return Frame(stored_frame(0, 0.0, grains, Box.open(), contacts_of(grains)))

@@ -8,7 +8,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.io.read_grains import SINGLE_PRECISION
+from sand.io.bodies import SINGLE_PRECISION
 from sand.io.trajectory import read_frames
 from sand.setup.from_frame import restore_overlaps
 

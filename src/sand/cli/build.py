@@ -104,7 +104,7 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, quiet: bool, **
     fractal               cluster-cluster aggregate of given fractal dimension and prefactor
     rbd                   compact sphere cut from a random ballistic deposit
     """
-    from ..io.read_grains import refuse_target, write_body
+    from ..io.bodies import refuse_target, write_body
 
     target = Path(out)
     refuse_target(target, overwrite=overwrite)
@@ -121,7 +121,7 @@ def _properties(body: Any) -> dict[str, Any]:
     """Properties of an aggregate: grains, radii, mass, size, dimension, contacts, moments."""
     from ..analysis.fractal import correlation_dimension
     from ..analysis.shape import gyration_radius
-    from ..io.read_grains import contacts_of
+    from ..io.bodies import contacts_of
 
     contacts = len(contacts_of(body)["pair"])
     try:

@@ -13,10 +13,10 @@ from ..basics.arguments import checked
 from ..basics.grains import ROUNDED
 from ..basics.material import PRESETS, SILICA, Material, as_material
 from ..errors import BadInput, warn
+from .bodies import contacts_of, read_frame
 from .frame import Frame, FrameSequence
 from .frame_chunks import stored_frame
 from .grain_files import is_gsd, open_grains
-from .read_grains import contacts_of, read_frame
 from .trajectory import Frames
 
 
@@ -28,7 +28,7 @@ def open_frames(path: str | Path, radius: Any = None, length: str | None = None,
     path : str or Path
         The file; its content tells the format.
     radius, length, material : optional
-        As for `io.read_grains.read_grains`, for files that lack them.
+        As for `io.bodies.read_grains`, for files that lack them.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class FileFrames(FrameSequence):
     Raises
     ------
     BadInput
-        As `io.read_grains.read_grains`.
+        As `io.bodies.read_grains`.
     """
 
     incomplete = generation = 0

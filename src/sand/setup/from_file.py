@@ -22,7 +22,7 @@ from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
 from .overlap_fit import fit_overlaps
 
 if TYPE_CHECKING:
-    from ..io.read_grains import ReadGrains
+    from ..io.bodies import ReadGrains
 
 EXACT = 1e-6
 """Largest difference of an overlap from that of equilibrium, relative to it, that is left as it is."""
@@ -47,7 +47,7 @@ def is_own_trajectory(path: str | Path) -> bool:
 
 
 def body_from_file(path: str | Path, *arguments: Any, **named: Any) -> Grains:
-    """Read a body that is in one piece; parameters as for `io.read_grains.read_grains`.
+    """Read a body that is in one piece; parameters as for `io.bodies.read_grains`.
 
     A body that the periodic box of its file cuts is made whole. Contacts of rounded coordinates are put at rest, with a
     note. The centre of mass is at the origin and at rest; velocities relative to it, and spins, are those of the file.
@@ -58,7 +58,7 @@ def body_from_file(path: str | Path, *arguments: Any, **named: Any) -> Grains:
         As `read_grains`; also for grains that overlap by more than a simulation allows at its start, and for grains
         without a contact to the rest. The first ten are named.
     """
-    from ..io.read_grains import centred, read_grains
+    from ..io.bodies import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
     _tell(found.notes)  # they tell how the file is understood, also if it is refused
@@ -88,7 +88,7 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
         The box of the simulation; None for the one that the file states. In another box, clusters that the faces of the
         file's box cut are made whole.
     arguments, named
-        Further parameters of `io.read_grains.read_grains`.
+        Further parameters of `io.bodies.read_grains`.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def start_from_file(path: str | Path, box: Box | None, *arguments: Any, **named:
     BadInput
         As `read_grains`; also for grains that overlap by more than a simulation allows at its start.
     """
-    from ..io.read_grains import centred, read_grains
+    from ..io.bodies import centred, read_grains
 
     found = read_grains(path, *arguments, **named)
     _tell(found.notes)  # they tell how the file is understood, also if it is refused

@@ -13,7 +13,7 @@ import pytest
 import sand
 from sand.basics.quantity_array import QuantityArray
 from sand.config.case import check_case
-from sand.io.read_grains import write_body
+from sand.io.bodies import write_body
 from sand.io.run_folder import LEDGER, TRAJECTORY
 from sand.io.trajectory import read_frames
 from sand.simulation.contact_table import ContactTable

@@ -5,7 +5,7 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.config.commands import command_for
-from sand.io.read_grains import write_body
+from sand.io.bodies import write_body
 
 RUN = """
 [run]

@@ -13,10 +13,9 @@ from sand.experiments.collision import approach, collide, collide_many
 from sand.experiments.collision_case import read_collision
 from sand.experiments.collision_job import CollisionJob
 from sand.experiments.collision_outcome import collision_title
+from sand.io.bodies import read_body
 from sand.setup import bpca, chain, grain
 from sand.theory import contact
-
-from ...bodies import read_body
 
 R = 1e-7
 

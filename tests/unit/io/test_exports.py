@@ -13,14 +13,12 @@ import sand
 from sand.analysis.clusters import cluster_labels
 from sand.basics.box import Box
 from sand.cli.main import main
+from sand.io.bodies import contacts_of, read_body, read_grains, write_body
 from sand.io.export import export_frames
 from sand.io.extended_xyz import listed
 from sand.io.file_frames import open_frames
-from sand.io.read_grains import contacts_of, read_grains, write_body
 from sand.io.run_folder import write_toml
 from sand.io.trajectory import Frames, TrajectoryWriter
-
-from ...bodies import read_body
 
 STRANGE = ("ice; amorphous", 'type "A"', "two\nlines", "a\\b", "100 % Ünïcode\u2028", "it's")
 """Names of materials with characters that mean something in files."""

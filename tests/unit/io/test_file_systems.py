@@ -13,10 +13,10 @@ import pytest
 import sand
 from sand.errors import FilesFailed
 from sand.experiments.executors import MOST_ON_WINDOWS, executor_for
+from sand.io.bodies import contacts_of
 from sand.io.checkpoint import write_checkpoint
 from sand.io.gsd_index import reserve_space
 from sand.io.ledger_table import LedgerFile
-from sand.io.read_grains import contacts_of
 from sand.io.run_folder import make_folder, replace_file, write_json
 from sand.io.trajectory import TrajectoryWriter, read_frames
 

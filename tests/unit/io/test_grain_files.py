@@ -10,12 +10,10 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.errors import BadInput
+from sand.io.bodies import read_body, read_grains, write_body
 from sand.io.file_frames import open_frames
-from sand.io.read_grains import read_grains, write_body
 from sand.setup.checks import pairs_in_contact
 from sand.setup.from_file import body_from_file, start_from_file
-
-from ...bodies import read_body
 
 R = 1e-7
 REST = sand.theory.contact("silica", R).rest_overlap
@@ -315,7 +313,7 @@ def test_a_file_of_many_frames_is_read_once(tmp_path, monkeypatch):
     (tmp_path / "a").write_text("".join(texts))
     opened, open_grains = [], file_frames.open_grains
     monkeypatch.setattr(file_frames, "open_grains", lambda path: opened.append(path) or open_grains(path))
-    monkeypatch.setattr("sand.io.read_grains.open_grains", file_frames.open_grains)
+    monkeypatch.setattr("sand.io.bodies.open_grains", file_frames.open_grains)
     frames = open_frames(tmp_path / "a", material="silica")
     assert frames.steps.tolist() == [4, 5] and [frame.step for frame in frames] == [4, 5] and len(opened) == 1
 

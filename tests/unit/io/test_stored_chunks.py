@@ -9,8 +9,8 @@ import pytest
 
 import sand
 from sand.basics.box import Box
+from sand.io.bodies import read_grains
 from sand.io.frame_chunks import stored_frame
-from sand.io.read_grains import read_grains
 from sand.io.trajectory import TrajectoryWriter, read_frames
 
 from ..synthetic_trajectories import contacts_of

@@ -11,7 +11,7 @@ import sand
 from sand.cli.main import main
 from sand.contact.jkr import rest_overlap, rest_radius
 from sand.contact.mixing import pairing_between
-from sand.io.read_grains import write_body
+from sand.io.bodies import read_body, write_body
 from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
 from sand.setup._kernels.aggregation import return_to_sphere
 from sand.setup._kernels.hash_grid import gap_to_nearest, insert_grain
@@ -20,8 +20,6 @@ from sand.setup.deposit import cut_sphere
 from sand.setup.from_file import body_from_file
 from sand.setup.growing import empty_hash_grid
 from sand.setup.population import Lognormal, PowerLaw, grain_set_of
-
-from ...bodies import read_body
 
 R, M = 3e-7, sand.SILICA
 GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}

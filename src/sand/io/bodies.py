@@ -182,6 +182,17 @@ def _box_of(data: GrainData, unit: float) -> tuple[Box, np.ndarray | None]:
     return Box((x, y, z)), 0.5 * (low + high) * unit
 
 
+def read_body(path: str | Path, *arguments: Any, **named: Any) -> Grains:
+    """Read a body, with the centre of mass at the origin; parameters as for `read_grains`.
+
+    Raises
+    ------
+    BadInput
+        As `read_grains`.
+    """
+    return centred(read_grains(path, *arguments, **named).grains)
+
+
 def centred(body: Grains) -> Grains:
     """The grains, shifted so that the centre of mass is at the origin; changes them."""
     centre = np.average(body.position, axis=0, weights=body.mass)
