@@ -133,8 +133,8 @@ def reference_solution(grains, end):
     return done.y[:, -1].reshape(4, 2, 3)
 
 
-FIXED_STEPS = {"verlet": (2, 800, 1), "forest-ruth": (4, 400, 4)}
-"""Order, fewest steps and force sums per step of the integrators with a fixed step."""
+FIXED_STEPS = {"verlet": (2, 800, 1, 1e-3), "forest-ruth": (4, 400, 4, 1e-5)}
+"""Order, fewest steps, force sums per step and largest error with these steps, of the integrators with a fixed step."""
 
 
 @pytest.mark.compiled("dipoles", "flights")
@@ -144,7 +144,7 @@ def test_order_of_convergence(record_bound, name):
 
     The reference is SciPy's DOP853 (order 8, accurate to 1e-13), with moments as vectors; the smallest error is 2e-11.
     """
-    order, fewest, sums = FIXED_STEPS[name]
+    order, fewest, sums, largest = FIXED_STEPS[name]
     end, errors = 2e-8, []
     for steps in (fewest, 2 * fewest, 4 * fewest):
         stepping = STEPPINGS[name](step=end / steps)
@@ -153,7 +153,7 @@ def test_order_of_convergence(record_bound, name):
         assert sim.time == pytest.approx(end, rel=1e-12, abs=0.0)
         assert sim.state.count[LONG_RANGE_SUMS] == sums * steps
         errors.append(np.abs(state_of(sim.grains) - reference_solution(sim.start, sim.time)).max())
-    assert errors[0] < 1e-3
+    record_bound("largest error of the longest step", errors[0], most=largest)
     for ratio in np.divide(errors[:-1], errors[1:]):
         record_bound(f"error over that of half the step, over 2^{order}", ratio / 2.0**order, least=0.85, most=1.15)
 

@@ -229,7 +229,7 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms(record_bound):
     instead gives 1.2e-3; a first-order formation gives (ω dt)²/3 of the other sign.
     """
     r, speed = 1e-8, 0.5
-    period = sand.theory.contact(sand.IRON, r).normal_period
+    period, shares = sand.theory.contact(sand.IRON, r).normal_period, []
     for phase in (0.0, 0.5):
         grains = sand.Grains(
             [[0, 0, 0], [2 * r + (30 + phase) * speed * 1.7e-12, 0, 0]],
@@ -244,7 +244,8 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms(record_bound):
         ringing = ledger["contacts"] > 0
         offset = (ledger["total"][ringing] - ledger["total"][0]).mean() / ledger["translation"][ringing].max()
         largest = (2 * math.pi / period * sim.state.clock[CONTACT_STEP]) ** 2 / 12.0
-    record_bound("energy offset of the ringing over (ω_n dt)²/12", abs(offset) / largest, most=1.0)
+        shares.append(abs(offset) / largest)
+    record_bound("energy offset of the ringing over (ω_n dt)²/12", max(shares), most=1.0)
 
 
 @pytest.mark.compiled("contacts")

@@ -327,6 +327,6 @@ class Settings:
         }
 
     def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file, without those that are None."""
+        """Settings in SI units, as in a case file; settings that are None are left out."""
         written = {name: key.setting.write(getattr(self, name)) for name, key in declared(type(self)).items()}
         return {name: value for name, value in written.items() if value is not None}

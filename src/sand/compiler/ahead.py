@@ -1,8 +1,8 @@
 """Compilation of all stages that a program lacks, side by side in several processes, before it runs.
 
-This process and its helpers (`helper`) go through one list of stages.  Each compiles into the cache what is not there
-and what no other process has begun: the locks of the cache say what has begun, so that any number of programs that
-start at once share the work.  A stage without a recipe, such as one with a formula of the user, is compiled by this
+This process and its helpers (`helper`) compile the stages of one list into the cache.  A stage that another process
+has begun is left to it: the locks of the cache say which ones have begun, so that any number of programs that start at
+once share the work.  A stage without a recipe, such as one with a formula of the user, is compiled by this
 process alone.  If there are no locks, or too little is missing, stages are compiled when they are first called.
 """
 
@@ -115,7 +115,7 @@ def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], proc
 
 
 def compile_free(kernels: Iterable[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
-    """Compile kernels into the cache; returns those that other processes compile now."""
+    """Compile kernels into the cache; returns the kernels that other processes compile now."""
     taken = []
     for each in kernels:
         for check in before_first_calls:
@@ -126,7 +126,7 @@ def compile_free(kernels: Iterable[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
 
 
 def _missing(stages: Iterable[tuple[Table, Stage | PythonStage, Any]]) -> list[Task]:
-    """Stages that are not compiled: first those that only this process can compile, then the longest."""
+    """Stages that are not compiled: first the ones that only this process can compile, then the longest."""
     known, found = compile_times(COMPILE_TIMES), list[Task]()
     for table, each, parameters in stages:
         if not isinstance(each, Stage) or (key := (each, each.key(table, parameters))) in _looked_at:

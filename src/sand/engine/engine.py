@@ -133,7 +133,7 @@ class GrainSteps:
         return {}
 
     def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """The arrays of a saved state, with those that it may lack."""
+        """The arrays of a saved state; arrays that it lacks are those of the present state."""
         return saved
 
     def loaded(self, engine: Engine) -> None:

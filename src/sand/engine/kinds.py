@@ -56,7 +56,7 @@ class Kind:
         return forces
 
     def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> Any:
-        """The run-time numbers of the integrator, with those that depend on forces and grains."""
+        """The run-time numbers of the integrator, also the ones that depend on forces and grains."""
         return parameters.flight_limits
 
     def complete(self, engine: Engine, forces: Sequence[Force], build: Build) -> None:
