@@ -49,7 +49,7 @@ KICKED = 8  # time of the last kick by the gas [s]
 FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
 SETTLED = 11  # time at which settling was last applied to clusters [s]
-WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
+COMPONENT_STEP = 12  # longest step allowed by components, such as walls [s]; 0: they allow any
 SOME_AWAKE = 13  # time with any cluster awake [s], of rigid clusters
 GRAINS_AWAKE = 14  # mean time awake of a grain [s]
 LARGEST_LOAD = 15  # largest change of the loads of the contacts of a cluster at rest, in units of their limits
@@ -58,7 +58,7 @@ LARGEST_IMPACT = 17  # largest speed of an impact in units of `contact.impact.im
 IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
-    *("corrected", "settled", "wall_step", "some_awake", "grains_awake", "largest_load"),
+    *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
     *("largest_overlap", "largest_impact", "impact_speed"),
 )
 LEAST_CLOCK = LARGEST_OVERLAP

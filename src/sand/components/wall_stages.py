@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from ..basics.state import GRAIN1, STEP, STEPS, WALL_CONTACTS, WALL_STEP
+from ..basics.state import GRAIN1, STEP, WALL_CONTACTS
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import accelerations, half_kick_weight, record_half_kick
@@ -17,9 +16,10 @@ from ..contact.law import ContactLaw
 from ..contact.measure import ENERGIES
 from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
-from ..integrate.parts import DT, Stop
-from ..integrate.stages import NEXT_STEP, StageNumber
-from ..integrate.step_control import CLOSING_FRACTION, HOLD_STEPS, quantise_step
+from ..integrate.hooks import Hook, HookStages
+from ..integrate.parts import DT, LIMIT, Stop
+from ..integrate.stages import NO_STEP
+from ..integrate.step_control import CLOSING_FRACTION, quantise_step
 from ..numerics.vec import accrue, dot, load, scale, sub
 from .wall_formulas import wall_displacements
 from .wall_loops import (
@@ -52,15 +52,13 @@ def step_stage(law: ContactLaw) -> Stage:
     """The longest step that walls allow, for one contact law."""
     constants_of, constants_at = constants_loop(law), column_loops(law).at
 
-    @stage("the time step of walls", parts=(*WALL_PARTS, "criteria"))
+    @stage("the time step of walls", parts=(*WALL_PARTS, "criteria", "scratch"))
     def wall_step(s, parameters):
-        """Set the longest step that contacts with walls allow, and that grains approaching a wall allow.
+        """Limit the step to the longest that contacts with walls allow, and that grains approaching a wall allow.
 
         The rules are those of pairs of grains (`integrate.step_control.pair_step`): the fastest mode is resolved by
         `settings.per_period` steps, an impact by steps of at most `criteria.impact` δ_c, and in one step a grain closes
-        at most CLOSING_FRACTION of its gap; this step of approach is rounded down to a power of two of a second.  The
-        result falls at once and rises at every HOLD_STEPS-th step only, so that it does not follow the phase of
-        oscillations.
+        at most CLOSING_FRACTION of its gap; this step of approach is rounded down to a power of two of a second.
 
         Returns
         -------
@@ -103,8 +101,7 @@ def step_stage(law: ContactLaw) -> Stage:
             step = np.float64(np.float32(bound))  # as in contact.update.contact_step
         if approach < step:
             step = quantise_step(1.0, approach, True)
-        if s.clock[WALL_STEP] == 0.0 or step < s.clock[WALL_STEP] or count[STEPS] % HOLD_STEPS == 0:
-            s.clock[WALL_STEP] = step
+        s.scratch[LIMIT] = min(s.scratch[LIMIT], step)
         return stop
 
     return wall_step
@@ -145,7 +142,7 @@ def wall_loads(grains, wall_contacts, count):
 @stage("the work of the noise of contacts with walls", parts=(*WALL_PARTS, "scratch"))
 def bath_wall_work(s, parameters, block):
     """As `integrate.stages.bath_work`, of contacts with walls; a wall with a mass is accelerated along its normal."""
-    weight = half_kick_weight(s.clock[STEP], s.scratch[DT] if block == NEXT_STEP else 0.0)
+    weight = half_kick_weight(s.clock[STEP], 0.0 if block == NO_STEP else s.scratch[DT])
     for c in range(s.count[WALL_CONTACTS]):
         g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
         n = load(s.walls.normal, w)
@@ -157,17 +154,13 @@ def bath_wall_work(s, parameters, block):
     return 0
 
 
-def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> dict[int, tuple[Stage, Any]]:
-    """All stages by number, with their parameters."""
-    noisy = damping == THERMAL
-    of_bath: dict[int, tuple[Stage, Any]] = (
-        {StageNumber.COMPONENT_BATH_WORK: (bath_wall_work, numbers)} if noisy else {}
-    )
+def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> HookStages:
+    """The stages of walls at each place of a step, with their parameters."""
     return {
-        StageNumber.COMPONENT_CONTACTS: (contacts_stage(law, damping), numbers),
-        StageNumber.COMPONENT_LOADS: (wall_loads, ()),
-        StageNumber.COMPONENT_STEP: (step_stage(law), numbers),
+        Hook.LIMIT_STEP: [(step_stage(law), numbers)],
+        Hook.BATH_WORK: [(bath_wall_work, numbers)] if damping == THERMAL else [],
+        Hook.CONTACTS: [(contacts_stage(law, damping), numbers)],
+        Hook.LOADS: [(wall_loads, ())],
         # called by the engine for rows of the ledger, with an array of its own; here it is compiled with the others
-        StageNumber.COMPONENT_ENERGIES: (energies_stage(law), (np.zeros(len(ENERGIES)),)),
-        **of_bath,
+        Hook.ENERGIES: [(energies_stage(law), (np.zeros(len(ENERGIES)),))],
     }

@@ -24,6 +24,7 @@ from ..forces.gas import Gas
 from ..forces.gas_loops import VACUUM
 from ..forces.pair.ewald_force import EwaldForce
 from ..forces.pair.long_range_loops import LongRangeSums
+from ..integrate.hooks import Hook
 from ..integrate.integrator import Integrator
 from ..integrate.parts import (
     ContactParameters,
@@ -145,12 +146,10 @@ def build_engine(
     )
     parameters = parameters._replace(flight_limits=kind.flight_limits(parameters, by_type, grains))
     law = (by_type.contact or Contact()).contact_law
-    of_components: dict[int, tuple[Any, Any]] = {}
+    of_components: dict[Hook, list[tuple[Any, Any]]] = {}
     for each in extra:
-        stages = each.stages(setup, law, parameters.settings)
-        if stages.keys() & of_components.keys():  # the driver calls one stage of each number
-            raise BadInput(f"{each.name}: {each.noun} cannot be used together with another component; leave one out")
-        of_components |= stages
+        for hook, stages in each.stages(setup, law, parameters.settings).items():
+            of_components.setdefault(hook, []).extend(stages)
     content = ProgramContent(
         law,
         [(sums, numbers) for _, sums, numbers in long_range],

@@ -13,6 +13,7 @@ from ..basics.material import Material
 from ..basics.state import State
 from ..contact.law import ContactLaw
 from ..errors import BadInput
+from ..integrate.hooks import HookStages
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
@@ -35,7 +36,7 @@ class Component:
 
     At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
     `stages` and `heavy`, `add_arrays`.  The ledger has its `columns` and `losses`, with the values of `row` (energies
-    stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change asks
+    stored in its contacts are added to those of all contacts by a stage of `Hook.ENERGIES`).  A change asks
     `problems_of_motion` and `problems_of_arrays`, and continues with what is `kept`; case.toml has `parameters` and
     `materials`.
 
@@ -71,8 +72,8 @@ class Component:
     def prepare(self, grains: Grains) -> None:
         """Give the grains of a start what it prescribes."""
 
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
-        """Stages that the driver calls, by number, with their parameters."""
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
+        """Stages that the driver calls at each place of a step, with their parameters."""
         return {}
 
     def heavy(self) -> list[int]:

@@ -63,11 +63,12 @@ from ..forces.external_loops import external_energies_for
 from ..forces.pair.long_range_loops import LongRangeSums, long_range_energies_for
 from ..integrate.driver import advance
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
+from ..integrate.hooks import Hook
 from ..integrate.integrator import Integrator
 from ..integrate.parts import HEAVY, PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.respa import clear_long_range_loads
-from ..integrate.stage_list import ProgramContent, build_program, variant_of
-from ..integrate.stages import NO_STEP, StageNumber, bath_work
+from ..integrate.stage_list import ProgramContent, build_program, hooks_of, variant_of
+from ..integrate.stages import NO_STEP
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import (
     SHARED,
@@ -645,9 +646,7 @@ class Engine:
     def _record_bath_work(self, state: State) -> None:
         """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
         with self._held(state):
-            bath_work.run(self.table_of(state), (), NO_STEP)
-            if (added := self.content.of_components.get(StageNumber.COMPONENT_BATH_WORK)) is not None:
-                stage, numbers = added
+            for stage, numbers in hooks_of(self.content, self.parameters)[Hook.BATH_WORK]:
                 stage.run(self.table_of(state), numbers, NO_STEP)
 
     @contextlib.contextmanager
@@ -764,8 +763,8 @@ class Engine:
         found[:] = 0.0
         if state.count[CONTACTS]:
             energies_stage(self.law).run(self.table_of(state), self._of_contacts)
-        if (added := self.content.of_components.get(StageNumber.COMPONENT_ENERGIES)) is not None:
-            added[0].run(self.table_of(state), self._of_contacts)
+        for stage, _ in self.content.of_components.get(Hook.ENERGIES, ()):
+            stage.run(self.table_of(state), self._of_contacts)
         return found.tolist()
 
     def body_motion(self) -> BodyMotion:

@@ -31,7 +31,8 @@ LOAD_TIME = 1  # time at which external forces are evaluated [s]
 EXTERNAL = 2  # energy, power or work of external forces, summed over grains [J, W]
 CYCLE_LENGTH = 3  # length of the cycle for which rates are computed [s]; 0 for a single step
 SINCE = 4  # time since the last sum of the long-range forces [s]
-SCRATCH = 5
+LIMIT = 5  # longest next step that components allow [s]
+SCRATCH = 6
 
 HEAVY = 2.0**30
 """Factor of masses that count as infinite in contact events, whose impulses are read from the changes of velocity."""
