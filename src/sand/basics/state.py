@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInput
-from ..numerics.simd import aligned_copies, all_aligned
+from .alignment import aligned_copies, all_aligned
 from .arrays import (
     GROWTH,
     NOT_SAVED,
