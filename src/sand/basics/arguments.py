@@ -20,8 +20,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from .descriptions import described, documented_units
+from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from .paths import checked_name
 
 MOST_GRAINS = 100_000_000

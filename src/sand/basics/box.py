@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadInput, shown
 from .arguments import checked
+from .errors import BadInput, shown
 from .units import dimensions, exact_quantity, format_quantity, is_word, si, si_array
 
 ALL_PAIRS_UP_TO = 200

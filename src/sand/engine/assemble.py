@@ -13,12 +13,12 @@ import numpy as np
 from ..basics.arrays import OVER_ALLOCATION
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import SILICA
 from ..basics.ramps import ramps_of
 from ..basics.state import COMPARED, CUT_RADIUS
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas import Gas
 from ..forces.gas_loops import VACUUM

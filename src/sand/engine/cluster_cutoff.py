@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.state import (
     CONTACTS,
@@ -26,7 +27,6 @@ from ..basics.state import (
 )
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity
-from ..errors import BadInput
 from ..forces.base import LongRangeForce
 from ..forces.pair.cutoff import HALF_BOX_RATIO, CutoffChoice
 from ..forces.pair.dipoles import CAPTURE_RADII, CapturingPair, Dipoles, capturing_pair

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput, first_problems
 from ..basics.grains import Grains
 from ..contact.model import Contact
-from ..errors import BadInput, first_problems
 from ..setup.checks import most_overlap
 from ..setup.from_frame import StrainedContacts
 from .engine import Engine

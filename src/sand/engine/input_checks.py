@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.units import format_quantity
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
 from ..forces.pair.inverse_square import Charges
 from ..forces.pair.screened_charges import ScreenedCharges

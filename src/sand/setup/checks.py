@@ -6,8 +6,8 @@ import numpy as np
 
 from ..analysis.clusters import labels_of
 from ..basics.box import Box
+from ..basics.errors import BadInput, first_problems
 from ..basics.grains import ROUNDED, Grains
-from ..errors import BadInput, first_problems
 from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput, did_you_mean, refuse_other
 from ..basics.grains import Grains
 from ..basics.material import Material, as_material
 from ..basics.units import format_quantity
-from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.bodies import SINGLE_PRECISION
 from .overlap_fit import APART, ITERATIONS, deficit, least_shift, overlapping, scaled_box
 

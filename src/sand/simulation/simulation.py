@@ -13,6 +13,7 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box, as_box
+from ..basics.errors import BadInput, FilesFailed
 from ..basics.grains import Grains
 from ..basics.state import CONTACTS, OUTSIDE, State
 from ..basics.temperature import kinetic_temperature
@@ -23,7 +24,6 @@ from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.component import Component, in_use
-from ..errors import BadInput, FilesFailed
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator

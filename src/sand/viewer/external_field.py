@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.errors import BadInput
 from ..basics.ramps import ramps_of
 from ..basics.units import format_quantity
-from ..errors import BadInput
 from ..forces.magnetic_field import Field
 from ..io.run_folder import CASE, read_toml
 from ..numerics.vec import norm

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...basics.alignment import padded_size
 from ...basics.box import Box
-from ...errors import BadInput
+from ...basics.errors import BadInput
 from .ewald_fit import DIPOLES, Sources, erfc, fitted
 from .ewald_loops import UNUSED, Buffers, EwaldParameters, MeshEwaldParameters, Waves
 from .long_range_loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
