@@ -14,6 +14,7 @@ from ..basics.arrays import SAVED_LONG_RANGE
 from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..basics.grains import Grains
+from ..basics.initial_pairs import at_same_place
 from ..basics.own_quantities import own_values
 from ..basics.quantity_array import QuantityArray
 from ..basics.schema import BY_NAME, CHANGEABLE, stored
@@ -48,7 +49,6 @@ from ..forces.base import Force, LongRangeForce
 from ..forces.gas import Gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
-from ..setup.checks import at_same_place
 from .settings import read_forces
 
 QUANTITIES = CHANGEABLE

@@ -15,6 +15,7 @@ from ..basics.arguments import checked
 from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, FilesFailed
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import CONTACTS, OUTSIDE, State
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
@@ -31,7 +32,6 @@ from ..integrate.verlet import Verlet
 from ..limits.solid_limits import grain_warnings
 from ..limits.truncation import truncation_warnings
 from ..neighbours.search import Neighbours
-from ..setup.from_frame import StrainedContacts
 from .cadence import Chosen, chosen_cadence
 from .change import Change, as_chosen, changed_engine
 from .condition import GIVEN, Condition
