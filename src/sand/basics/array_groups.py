@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from ..numerics.simd import all_aligned, padded_size
+from .alignment import all_aligned, padded_size
 
 GRAINS, USED, SIDES = "grains", "used", "sides"
 """Names of sizes: the number of grains, the columns in use of a table that grows, and twice as many.

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..numerics.simd import padded_size
+from .alignment import padded_size
 from .array_groups import FEWEST_COLUMNS, GRAINS, INNER, SIDES, USED, Array, new_group, saved_in
 
 ALWAYS_RECORDED = 4

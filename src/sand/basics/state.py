@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput
-from ..numerics.simd import aligned_copies, all_aligned
+from .alignment import aligned_copies, all_aligned
 from .array_groups import GROWTH, SIDES, USED, Array, arrays_of, grown, new_group, reorder_group, saved_in
 from .arrays import (
     BodyArrays,
@@ -23,6 +22,7 @@ from .arrays import (
     cluster_arrays,
 )
 from .box import Box
+from .errors import BadInput
 from .grains import GrainArrays, Grains
 from .material import Material
 from .own_quantities import OwnQuantities

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..basics.array_groups import GRAINS, SIDES, USED, Array, saved_in
 from ..basics.arrays import BodyArrays, ContactArrays, LongRangeArrays, PairList
+from ..basics.errors import BadInput
 from ..basics.schema import FIELDS
 from ..basics.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LEAST_CLOCK, LOST, PAIRS, STAGE, STEPS, TIME
-from ..errors import BadInput
 
 Groups = Mapping[str, type]
 """Groups of arrays by name; if a file has an array of one of them, it has those of all."""
