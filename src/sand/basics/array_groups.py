@@ -86,6 +86,11 @@ def saved_in(group: Any) -> dict[str, Array]:
     return _declared(group if isinstance(group, type) else type(group))[1]
 
 
+def table_in(group: Any) -> str:
+    """Name of the first array of the table of a group, which has all its columns; empty without a table."""
+    return next((name for name, each in arrays_of(group).items() if each.shape[-1] == USED), "")
+
+
 def new_group(group: Any, sizes: Mapping[str, int], columns: Mapping[str, int] | None = None) -> Any:
     """A group of new arrays.
 
@@ -109,11 +114,9 @@ def new_group(group: Any, sizes: Mapping[str, int], columns: Mapping[str, int] |
 
 def grown(group: Any, minimum: int = 0, unchanged: Collection[str] = ()) -> Any:
     """A group with more columns in its table, at least `minimum`; other arrays and the `unchanged` ones stay."""
-    declared = arrays_of(group)
-    columns = max(len(array.T) for array, each in zip(group, declared.values(), strict=True) if each.shape[-1] == USED)
-    capacity = padded_size(max(int(GROWTH * columns) + 1, minimum))
-    longer = {}
-    for name, each in declared.items():
+    columns = getattr(group, table_in(group)).shape[-1]
+    capacity, longer = padded_size(max(int(GROWTH * columns) + 1, minimum)), {}
+    for name, each in arrays_of(group).items():
         old = getattr(group, name)
         if each.shape[-1] not in (USED, SIDES, INNER) or name in unchanged:
             longer[name] = old

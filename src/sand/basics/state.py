@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .alignment import aligned_copies, all_aligned
-from .array_groups import GROWTH, SIDES, USED, Array, arrays_of, grown, new_group, reorder_group, saved_in
+from .array_groups import GROWTH, SIDES, USED, Array, arrays_of, grown, new_group, reorder_group, saved_in, table_in
 from .arrays import (
     BodyArrays,
     ClusterArrays,
@@ -23,7 +23,7 @@ from .arrays import (
 )
 from .box import Box
 from .errors import BadInput
-from .grains import GrainArrays, Grains
+from .grains import Grains
 from .material import Material
 from .own_quantities import OwnQuantities
 
@@ -157,8 +157,12 @@ class State:
             self.of_components[name] = all_aligned(new_group(group, sizes, columns))
 
     def in_groups(self) -> list[Any]:
-        """All groups of arrays but that of the grains."""
-        return [*IN_GROUPS(self), *self.of_components.values()]
+        """All groups of arrays."""
+        return [self.grains.arrays, *IN_GROUPS(self), *self.of_components.values()]
+
+    def group_names(self) -> tuple[str, ...]:
+        """Their names: parts of a simulation, and in checkpoints."""
+        return "grains", *GROUPS, *self.of_components
 
     @property
     def time(self) -> float:
@@ -209,12 +213,17 @@ class State:
 
     def arrays(self) -> list[np.ndarray]:
         """All arrays of the state."""
-        return [*self.grains.arrays, *chain.from_iterable(self.in_groups()), *OTHERS(self)]
+        return [*chain.from_iterable(self.in_groups()), *OTHERS(self)]
 
-    def named_groups(self) -> dict[str, Any]:
-        """All groups of arrays but that of the grains, by name; without bodies if there are none."""
-        groups = {name: getattr(self, name) for name in GROUPS if name != "bodies" or self.bodies.mass.size}
-        return groups | self.of_components
+    def _saved(self) -> list[tuple[str, str, np.ndarray, Array]]:
+        """Group and name of each array of a group that a checkpoint has, the array and its declaration."""
+        groups = zip(self.group_names(), self.in_groups(), strict=True)
+        return [
+            (name, key, getattr(group, key), each)
+            for name, group in groups
+            for key, each in saved_in(group).items()
+            if name != "bodies" or self.bodies.mass.size
+        ]
 
     def _used(self, name: str) -> int:
         """Columns in use of the table of a group; 0 without a table."""
@@ -228,24 +237,24 @@ class State:
             return 1
         return {USED: self._used(name), SIDES: 2 * self._used(name)}.get(str(each.shape[-1]))
 
-    def _uniform(self, group: Any) -> list[str]:
-        """Names of the arrays of a group with identical columns."""
-        declared = saved_in(group) if self.uniform_contacts else {}
-        return [name for name, each in declared.items() if each.fewer == 1]
+    def grow(self, name: str, minimum: int = 0) -> None:
+        """Allocate more columns, at least `minimum`, in the table of contacts, candidate pairs or a component."""
+        group = self.of_components.get(name) or getattr(self, name)
+        uniform = [key for key, each in arrays_of(group).items() if each.fewer == 1 and self.uniform_contacts]
+        self._put(name, grown(group, minimum, uniform))
 
-    def grow_contacts(self, minimum: int = 0) -> None:
-        """Allocate more contacts, at least `minimum`."""
-        self.contacts = grown(self.contacts, minimum, self._uniform(self.contacts))
+    def _put(self, name: str, group: Any) -> None:
+        """Replace a group."""
+        if name in GROUPS:
+            setattr(self, name, group)
+        else:
+            self.of_components[name] = group
 
-    def grow_tables(self) -> None:
+    def grow_of_components(self) -> None:
         """Allocate more columns in the tables of components, one of which is full."""
-        for name, group in self.of_components.items():
+        for name, group in tuple(self.of_components.items()):
             if hasattr(group, "used"):
-                self.of_components[name] = grown(group)
-
-    def grow_pairs(self, minimum: int = 0) -> None:
-        """Allocate more candidate pairs, at least `minimum`."""
-        self.pair_list = grown(self.pair_list, minimum, self._uniform(self.pair_list))
+                self.grow(name)
 
     def grow_rows(self) -> None:
         """Allocate a longer Verlet list; its content is discarded."""
@@ -265,8 +274,6 @@ class State:
 
     def reorder(self, rows: np.ndarray, new_index: np.ndarray) -> None:
         """Permute the grains: grain k becomes the former grain rows[k], and the former grain i is new_index[i]."""
-        for array in self.grains.arrays:
-            array[...] = array[..., rows]
         for group in self.in_groups():
             reorder_group(group, rows, new_index)
         for index in (GRAIN1, GRAIN2):
@@ -276,10 +283,7 @@ class State:
     def to_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of the state by name, for a checkpoint; unused columns are omitted."""
         out = {"clock": self.clock, "count": self.count, "lost": self.lost, "cutoff": self.cutoff}
-        out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
-        for name, group in self.named_groups().items():
-            for key, each in saved_in(group).items():
-                out[f"{name}/{key}"] = getattr(group, key)[..., : self._columns(name, each)]
+        out |= {f"{name}/{key}": array[..., : self._columns(name, each)] for name, key, array, each in self._saved()}
         return out | ({"order": self.order} if self.order.size else {})
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
@@ -297,28 +301,18 @@ class State:
         if "order" in saved:
             self.order = np.zeros(len(self.grains), np.uint32)
             _copy_into(self.order, saved, "order")
-        if self.contacts.pair.shape[1] < self.count[CONTACTS]:
-            self.grow_contacts(int(self.count[CONTACTS]))
-        if self.pair_list.pair.shape[1] < self.count[PAIRS]:
-            self.grow_pairs(int(self.count[PAIRS]))
-        if "grains/image" not in saved:  # of a checkpoint of an earlier version, which counted no crossings
-            saved = saved | {"grains/image": np.zeros_like(self.grains.arrays.image)}
-        for name in GrainArrays._fields:
-            _copy_into(getattr(self.grains.arrays, name), saved, f"grains/{name}")
-        self._take_used(saved)
-        for name, group in self.named_groups().items():
-            for key, each in saved_in(group).items():
-                self._load(getattr(group, key), saved, f"{name}/{key}", each)
+        self._make_room(saved)
+        for name, key, array, each in self._saved():
+            self._load(array, saved, f"{name}/{key}", each)
 
-    def _take_used(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over the numbers of columns in use of the tables of components, which are those of their arrays."""
-        for name, group in self.of_components.items():
-            table = next((key for key, each in saved_in(group).items() if each.shape[-1] == USED), "")
-            if f"{name}/{table}" in saved:  # otherwise `_copy_into` says that it is missing
-                used = saved[f"{name}/{table}"].shape[-1]
-                if used > getattr(group, table).shape[-1]:
-                    self.of_components[name] = grown(group, used)
-                self.of_components[name].used[0] = used
+    def _make_room(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Take over the columns in use of the tables of components, and enlarge tables that are too small."""
+        for name, group in zip(self.group_names(), self.in_groups(), strict=True):
+            table = table_in(group)
+            if name in self.of_components and f"{name}/{table}" in saved:  # `_load` says if it is missing
+                group.used[0] = saved[f"{name}/{table}"].shape[-1]
+            if table and getattr(group, table).shape[-1] < self._used(name):
+                self.grow(name, self._used(name))
 
     def _load(self, array: np.ndarray, saved: Mapping[str, np.ndarray], name: str, each: Array) -> None:
         """Load one array of a group, `name` as in a checkpoint."""

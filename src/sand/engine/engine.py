@@ -27,7 +27,6 @@ from ..basics.state import (
     CYCLE,
     GRAIN1,
     GRAIN2,
-    GROUPS,
     LEFT,
     LISTED,
     LONG_RANGE_SUMS,
@@ -93,12 +92,12 @@ ALONE = 2000
 
 def _arrays(state: State) -> tuple:
     """The arrays of a state that stages take."""
-    return state.grains.arrays, *state.in_groups(), state.clock, state.count, state.lost
+    return *state.in_groups(), state.clock, state.count, state.lost
 
 
 def _names(state: State) -> tuple[str, ...]:
     """The parts of a table that these are."""
-    return "grains", *GROUPS, *state.of_components, "clock", "count", "lost"
+    return *state.group_names(), "clock", "count", "lost"
 
 
 def _set_arrays(table: Table, state: State, present: tuple) -> None:
@@ -584,12 +583,12 @@ class Engine:
         while True:
             stop = self._call_driver(driver, until, last, shorten)
             if stop is Stop.CONTACTS_FULL:
-                state.grow_contacts()
+                state.grow("contacts")
             elif stop is Stop.TABLES_FULL:
-                state.grow_tables()
+                state.grow_of_components()
             elif stop is Stop.PAIRS_FULL:
                 found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
-                state.grow_pairs(int(OVER_ALLOCATION * found))
+                state.grow("pair_list", int(OVER_ALLOCATION * found))
             elif stop is Stop.LIST_FULL:
                 state.grow_rows()
             else:
@@ -625,7 +624,7 @@ class Engine:
         """
         state = self.state
         if state.contacts.pair.shape[1] < len(pair):
-            state.grow_contacts(len(pair))
+            state.grow("contacts", len(pair))
         vectors = (np.ascontiguousarray(array.T, dtype=np.float64) for array in (slide, roll, twist))
         initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
         arrays, settings = (state.grains.arrays, state.contacts, state.count), self.parameters.settings

@@ -14,7 +14,7 @@ import numpy as np
 from ..basics.array_groups import GRAINS, SIDES, USED, Array, saved_in
 from ..basics.arrays import BodyArrays, ContactArrays, LongRangeArrays, PairList
 from ..basics.errors import BadInput
-from ..basics.schema import FIELDS
+from ..basics.grains import GrainArrays
 from ..basics.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LEAST_CLOCK, LOST, PAIRS, STAGE, STEPS, TIME
 
 Groups = Mapping[str, type]
@@ -26,16 +26,14 @@ SINGLE = {
     "cutoff": Array((len(CUTOFF),), rule="not below 0"),
     "order": Array((GRAINS,), dtype="u4", rule="order", required=False),
     "ledger": Array(("rows", "columns")),
-    **{f"grains/{one.name}": Array((one.width, GRAINS)[one.width == 1 :], one.unit) for one in FIELDS},
-    **{f"grains/{name}": Array((GRAINS,), rule="above 0") for name in ("radius", "mass", "inertia")},
-    "grains/own": Array(("own", GRAINS)),
-    "grains/material": Array((GRAINS,), dtype="u4", rule="any"),
-    "grains/id": Array((GRAINS,), dtype="u4", rule="ascending"),
-    # earlier versions did not count crossings
-    "grains/image": Array((3, GRAINS), dtype="i4", rule="any", required=False),
 }
 """Arrays of a checkpoint besides those of groups."""
-ALWAYS: Groups = {"contacts": ContactArrays, "pair_list": PairList, "long_range": LongRangeArrays}
+ALWAYS: Groups = {
+    "grains": GrainArrays,
+    "contacts": ContactArrays,
+    "pair_list": PairList,
+    "long_range": LongRangeArrays,
+}
 """Groups that every checkpoint has."""
 OPTIONAL: Groups = {"bodies": BodyArrays}
 """Groups of rigid clusters."""
