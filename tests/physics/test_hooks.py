@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.basics.state import STEPS, WALL_CONTACTS
+from sand.basics.state import STEPS
 from sand.compiler.stage import stage
 from sand.components.walls import Walls, read_walls
 from sand.engine.assemble import build_engine
@@ -16,12 +16,12 @@ RADIUS, STEP = 1e-7, 2.0**-45
 
 
 @stage("a record of calls", cached=False)
-def record(count, parameters, block):
+def record(count, wall_contacts, parameters, block):
     """Append (component, hook, step, contacts with walls) to the array `parameters[0]`, whose first number counts."""
     calls, number = parameters
     calls[0, 0] += 1
     row = calls[0, 0]
-    calls[row, 0], calls[row, 1], calls[row, 2], calls[row, 3] = number, block, count[STEPS], count[WALL_CONTACTS]
+    calls[row, 0], calls[row, 1], calls[row, 2], calls[row, 3] = number, block, count[STEPS], wall_contacts.used[0]
     return 0
 
 

@@ -16,7 +16,6 @@ import math
 from ..basics.state import (
     BROKEN,
     COMPARED,
-    COMPONENT_STEP,
     CONTACTS,
     CORRECTED,
     CYCLE,
@@ -64,7 +63,7 @@ from .respa import (
     update_constant_loads,
 )
 from .stages import StageNumber
-from .step_control import HOLD_STEPS, cycle_steps, is_close, is_past
+from .step_control import cycle_steps, hold_step, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 from .taylor import sum_rates
@@ -197,17 +196,12 @@ def close_cycle(s):
 
 @caller
 def limit_step(s):
-    """Set the longest step that components allow; returns the value of a `Stop` that refuses any.
-
-    It falls at once, and rises at every HOLD_STEPS-th step only, so that it does not follow the phase of oscillations.
-    """
+    """Set the longest step that components allow; returns the value of a `Stop` that refuses any."""
     if not has_stage(s, Hook.LIMIT_STEP):
         return Stop.NONE.value
     s.scratch[LIMIT] = s.criteria.longest
     stop = call_hook(s, Hook.LIMIT_STEP)
-    longest = s.clock[COMPONENT_STEP]
-    if longest == 0.0 or s.scratch[LIMIT] < longest or s.count[STEPS] % HOLD_STEPS == 0:
-        s.clock[COMPONENT_STEP] = s.scratch[LIMIT]
+    hold_step(s.clock, s.count, s.scratch[LIMIT])
     return stop
 
 
