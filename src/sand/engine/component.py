@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -16,7 +18,10 @@ from ..errors import BadInput
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
+from .engine import Engine
 from .kinds import ForcesByType
+
+NO_PAIRS = np.zeros((0, 2), np.int64)
 
 
 class Setup(NamedTuple):
@@ -28,38 +33,45 @@ class Setup(NamedTuple):
     stepping: Integrator
     neighbours: Neighbours
     fresh: bool  # whether this is a new start; a resumed run may be in the middle of an impact
+    saved: Mapping[str, np.ndarray] = MappingProxyType({})  # arrays of the checkpoint from which a run continues
+    touching: np.ndarray = NO_PAIRS  # (C, 2) pairs in contact at a new start
 
 
 class Component:
     """A feature of a simulation that is no formula; what a class does not define is nothing.
 
     At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
-    `stages` and `heavy`, `add_arrays`.  The ledger has its `columns` and `losses`, with the values of `row` (energies
-    stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change asks
-    `problems_of_motion` and `problems_of_arrays`, and continues with what is `kept`; case.toml has `parameters` and
-    `materials`.
+    `at_start`, `stages` and `heavy`, `add_arrays`, `built`.  While the engine runs it calls `update`, `next_time` and
+    `contacts_changed`, between regular steps.  The ledger has its `columns` and `losses`, with the values of `row`
+    (energies stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A checkpoint
+    that was read is `loaded`.  A change asks `problems_of_motion` and `problems_of_arrays`, continues with what is
+    `kept`, and calls `saved_for_change` and `changed`; case.toml has `parameters` and `materials`.
 
     Attributes
     ----------
     name : str
         Its keyword of `sand.Simulation`, and its table in case files.
     noun : str
-        What it adds, in sentences: "rigid clusters cannot have walls".
+        What it adds, in sentences: "rigid clusters cannot have walls"; empty if it can be used with rigid clusters.
     keeps_order : bool
         Whether grains keep the order in which they were given.
     every_step : bool
         Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
     own_columns : bool
         Whether each contact needs its own constants, also between equal grains.
+    watches_contacts : bool
+        Whether `contacts_changed` is called; the driver then returns after each step in which a contact formed or
+        broke.
     items : Sequence
         What the user gave, such as `sand.Wall` objects.
     """
 
     name: ClassVar[str]
-    noun: ClassVar[str]
+    noun: ClassVar[str] = ""
     keeps_order: ClassVar[bool] = False
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
+    watches_contacts: ClassVar[bool] = False
 
     def __init__(self, items: Sequence[Any]):
         self.items = tuple(items)
@@ -70,6 +82,10 @@ class Component:
 
     def prepare(self, grains: Grains) -> None:
         """Give the grains of a start what it prescribes."""
+
+    def at_start(self, forces: ForcesByType, setup: Setup) -> ForcesByType:
+        """The forces as they act at first."""
+        return forces
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
         """Stages that the driver calls, by number, with their parameters."""
@@ -82,9 +98,47 @@ class Component:
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the arrays that it needs."""
 
+    def built(self, engine: Engine) -> None:
+        """Called when the engine is built, before contacts are added."""
+
+    def next_time(self, engine: Engine) -> float:
+        """Time [s] up to which steps may be taken without an `update`."""
+        return math.inf
+
+    def update(self, engine: Engine) -> None:
+        """Bring the engine up to date with the time of its regular state."""
+
+    def contacts_changed(self, engine: Engine) -> None:
+        """Called after steps in which contacts formed or broke, if it `watches_contacts`."""
+
+    def loaded(self, engine: Engine) -> None:
+        """Called when the arrays of a checkpoint, or of a change, have become those of the state."""
+
+    def choices(self) -> dict[str, str]:
+        """Automatic choices at the start, with their reasons."""
+        return {}
+
+    def present_choices(self, state: State) -> dict[str, str]:
+        """Automatic choices of the run so far."""
+        return {}
+
+    def notes(self, state: State) -> list[str]:
+        """What the run so far says about its set-up, a text each."""
+        return []
+
     def kept(self, kept: np.ndarray) -> Component:
         """What is left of it after a change; `kept` (K,) are the earlier indices of grains 0 … K − 1."""
         return self
+
+    def saved_for_change(self, state: State, box: Box) -> dict[str, np.ndarray]:
+        """What a change, after which the box is this one, takes from the state before as `Setup.saved`."""
+        return {}
+
+    def changed(self, arrays: dict[str, np.ndarray], *, regroups: bool) -> None:
+        """Adapt the arrays, as of `State.to_arrays`, with which a change continues.
+
+        `regroups`: there are other grains, or contacts have other numbers.
+        """
 
     def problems_of_motion(self, grains: Grains) -> list[str]:
         """Why it does not allow a change of the motion of grains to that of these."""

@@ -8,8 +8,10 @@ import numpy as np
 
 from ..basics.box import Box
 from ..basics.grains import Grains
+from ..contact.events import InitialContacts, forming_loops
 from ..contact.model import Contact
 from ..errors import BadInput, first_problems
+from ..limits.solid_limits import torn_clusters
 from ..setup.checks import most_overlap
 from ..setup.from_frame import StrainedContacts
 from .engine import Engine
@@ -32,6 +34,29 @@ def overlapping_pairs(grains: Grains, box: Box) -> OverlappingPairs:
     """All pairs of grains that overlap."""
     pair, overlap = grains.touching(box)
     return OverlappingPairs(pair[overlap > 0.0], overlap[overlap > 0.0])
+
+
+class ContactsAtStart(NamedTuple):
+    """Pairs of grains that are in contact at a start."""
+
+    overlapping: OverlappingPairs
+    touching: np.ndarray  # (C, 2) pairs that overlap, and those of an earlier run
+    number: int  # of both, for which there is memory
+    warnings: list[str]  # that these contacts cannot hold a cluster
+
+
+def contacts_at_start(
+    grains: Grains, contact: Contact | None, box: Box, contacts: StrainedContacts | None
+) -> ContactsAtStart:
+    """Contacts of overlapping grains, none without `contact`, and `contacts` of an earlier run, which may be wrong."""
+    overlapping = NO_OVERLAPS if contact is None else overlapping_pairs(grains, box)
+    touching, given = overlapping.pair, NO_OVERLAPS.pair if contacts is None else np.asarray(contacts.pair)
+    number = len(touching) + len(given)
+    if given.ndim == 2 and given.shape[1] == 2 and ((given >= 0) & (given < len(grains))).all():
+        both = np.concatenate([touching, given.astype(touching.dtype)])
+        touching = np.unique(np.sort(both, axis=1), axis=0)
+    warnings = [] if contact is None else torn_clusters(grains, contact, touching, box)
+    return ContactsAtStart(overlapping, touching, number, warnings)
 
 
 def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedContacts | None) -> np.ndarray:
@@ -60,7 +85,7 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedCont
     given = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
     if len(given) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
         raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
-    wrong = engine.add_contacts(pair, contacts.slide, contacts.roll, contacts.twist)
+    wrong = _add_to_state(engine, pair, contacts)
     if wrong >= 0:
         i, j = pair[wrong]
         raise BadInput(
@@ -69,8 +94,22 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedCont
     return given
 
 
+def _add_to_state(engine: Engine, pair: np.ndarray, contacts: StrainedContacts) -> int:
+    """Add contacts before the first step; the first that is stretched beyond its breaking point, or −1."""
+    state = engine.state
+    if state.contacts.pair.shape[1] < len(pair):
+        state.grow_contacts(len(pair))
+    vectors = (
+        np.ascontiguousarray(array.T, dtype=np.float64) for array in (contacts.slide, contacts.roll, contacts.twist)
+    )
+    initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
+    arrays, settings = (state.grains.arrays, state.contacts, state.count), engine.parameters.settings
+    with engine.heavy_grains(state):
+        return forming_loops(engine.law).add_initial(*arrays, state.box.span, settings, initial)
+
+
 def refuse_overlaps(
-    grains: Grains, contact: Contact, found: OverlappingPairs, given: np.ndarray, when: str = "at the start"
+    grains: Grains, contact: Contact | None, found: OverlappingPairs, given: np.ndarray, when: str = "at the start"
 ) -> None:
     """Refuse pairs that overlap by too much at the start.
 
@@ -88,6 +127,8 @@ def refuse_overlaps(
     BadInput
         If a pair overlaps by more than `setup.checks.most_overlap`; the first ten pairs are named.
     """
+    if contact is None:
+        return
     (i, j), radius = found.pair.T, grains.radius
     count = np.int64(len(grains))
     reduced = radius[i] * radius[j] / (radius[i] + radius[j])

@@ -48,7 +48,9 @@ from ...integrate.rigid.awake_clusters import (
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
 from ...integrate.stages import finish_gas
-from ..engine import Engine, GrainSteps
+from ..engine import Engine
+from ..grain_steps import GrainSteps
+from ..measures import external_energy
 from ..part import MOVING, Part
 from .cluster_bodies import (
     body_number,
@@ -265,7 +267,7 @@ class BodySteps(GrainSteps):
         if engine.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in engine.external:
-                state.lost[OUTSIDE] += inner.external_energy(outer, end) - inner.external_energy(outer, before)
+                state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
         present.count[STAGE] = 1
         present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
         inner.drive(-math.inf, 1)

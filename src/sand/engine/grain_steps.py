@@ -1,0 +1,58 @@
+"""Steps of all grains by the compiled driver."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..basics.state import State
+from ..compiler.stage import PythonStage, Stage
+from ..compiler.table import Table
+from ..integrate.driver import advance
+from ..integrate.parts import Stop
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+
+class GrainSteps:
+    """Steps of all grains by the compiled driver; base class of other ways to take steps (`rigid.body_steps`).
+
+    Attributes
+    ----------
+    seconds : float
+        Processor time [s] of steps within the steps that are counted.
+    """
+
+    seconds: float = 0.0
+
+    def for_part(self) -> GrainSteps:
+        """Such steps for an engine of some of the grains."""
+        return self
+
+    def drivers(self) -> list[tuple[Stage, Any]]:
+        """Stages that are called during a run besides those of the program, with their parameters."""
+        return [(advance, ())]
+
+    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Further stages that a run may call, each with a table of parts and its parameters."""
+        return []
+
+    def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
+        """Take steps up to a time [s] or a step; returns why no more were taken."""
+        return engine.run_driver(advance, until, last, shorten)
+
+    def summary(self, state: State) -> dict[str, Any]:
+        """What the summary of a run says of bodies; nothing without any."""
+        return {}
+
+    def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """The arrays of a saved state; arrays that it lacks are those of the present state."""
+        return saved
+
+    def loaded(self, engine: Engine) -> None:
+        """Called after a state was loaded."""
+
+    def begin(self, engine: Engine) -> None:
+        """Called when the loads were summed at a start, or after a change by the user."""

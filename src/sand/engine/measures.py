@@ -1,0 +1,160 @@
+"""Energies, losses, loads and motion of bodies that are measured in the state of an engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.body_motion import BodyMotion
+from ..basics.arrays import cluster_arrays
+from ..basics.state import CONTACTS, State
+from ..contact.damping import THERMAL
+from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies
+from ..forces.base import ExternalForce
+from ..forces.external_loops import external_energies_for
+from ..forces.pair.long_range_loops import LongRangeSums, long_range_energies_for
+from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
+from ..integrate.respa import clear_long_range_loads
+from ..integrate.stage_list import variant_of
+from ..integrate.stages import NO_STEP, StageNumber, bath_work
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+
+def measuring_stages(engine: Engine) -> list[tuple[Any, Any]]:
+    """The stages of all measurements, with their parameters."""
+    shares = np.zeros(len(engine.stored_state.grains))
+    stages: list[tuple[Any, Any]] = [(measure_bodies, (np.zeros((BODY_ROWS, 1)), cluster_arrays(1)))]
+    if engine.parameters.settings.on:
+        stages.append((energies_stage(engine.law), (np.zeros(len(ENERGIES)),)))
+        stages.append((contacts_stage(engine.law), (np.zeros((1, 1)),)))
+    stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in engine.long_range]
+    return stages + [
+        (external_energies_for(outer.formula), (outer.numbers(), engine.time, shares)) for outer in engine.external
+    ]
+
+
+def force_columns(engine: Engine) -> list[str]:
+    """Columns of the forces in the ledger."""
+    return [*(force.column for force, _, _ in engine.long_range), *(force.name for force in engine.external)]
+
+
+def energies_at_grains(engine: Engine, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
+    """Energy [J] of each grain (N,) by column: half of each pair energy, and the energies of per-grain forces.
+
+    Of all forces, or of those with these names.
+    """
+    return {name: share.copy() for name, share in _energies_at_grains(engine, names).items()}
+
+
+def force_energies(engine: Engine) -> dict[str, float]:
+    """Total energy [J] of each long-range and per-grain force, by ledger column."""
+    return {name: math.fsum(share.tolist()) for name, share in _energies_at_grains(engine, None).items()}
+
+
+def _energies_at_grains(engine: Engine, names: Collection[str] | None) -> dict[str, np.ndarray]:
+    """As `energies_at_grains`, in arrays that the next call uses again."""
+    state, found = engine.state, dict.fromkeys(force_columns(engine))
+    table, count = engine.table_of(state), len(state.grains)
+    shares: dict[str, np.ndarray] = engine.memory.get("shares", {})
+    if shares.keys() != found.keys() or any(len(share) != count for share in shares.values()):
+        shares = engine.memory["shares"] = {name: np.zeros(count) for name in found}
+    for share in shares.values():
+        share[:] = 0.0
+    for force, sums, numbers in engine.long_range:
+        if names is None or force.name in names:
+            _add_energies(engine, state, sums, numbers, shares[force.column])
+    for outer in engine.external:
+        if names is None or outer.name in names:
+            external_energies_for(outer.formula).run(table, (outer.numbers(), state.time, shares[outer.name]))
+    return shares
+
+
+def _add_energies(engine: Engine, state: State, sums: LongRangeSums, numbers: Any, shares: np.ndarray) -> None:
+    """Add the energies [J] of a long-range force to those of the grains."""
+    table = engine.table_of(state)
+    if sums.energies_need_rounds:
+        run_rounds(sums, engine.content.wide, table, numbers)
+    long_range_energies_for(sums).run(table, (numbers, shares))
+
+
+def external_energy(engine: Engine, outer: ExternalForce, time: float) -> float:
+    """Energy [J] of a per-grain force on the grains of the regular state, at a time [s]."""
+    state = engine.stored_state
+    shares = np.zeros(len(state.grains))
+    external_energies_for(outer.formula).run(engine.table_of(state), (outer.numbers(), time, shares))
+    return math.fsum(shares)
+
+
+def pair_energy(engine: Engine, k: int) -> float:
+    """Energy [J] of long-range force k in the regular state."""
+    state, (_, sums, numbers) = engine.stored_state, engine.long_range[k]
+    shares = np.zeros(len(state.grains))
+    _add_energies(engine, state, sums, numbers, shares)
+    return math.fsum(shares)
+
+
+def pair_loads(engine: Engine, k: int) -> np.ndarray:
+    """Forces and torques (2, 3, N) of long-range force k, in the stored order; those of the state stay as they are."""
+    state, (_, sums, numbers) = engine.stored_state, engine.long_range[k]
+    own = state.long_range
+    kept = own.force.copy(), own.torque.copy()
+    clear_long_range_loads(own)
+    pair_force_stages(sums, engine.content.wide)[SUM].run(engine.table_of(state), numbers, WHOLE)
+    found = np.array([own.force, own.torque])
+    own.force[...], own.torque[...] = kept
+    return found
+
+
+def contact_energies(engine: Engine) -> list[float]:
+    """Energies [J] stored by the contacts, see `contact.measure.ENERGIES`."""
+    state, results = engine.state, engine.memory.setdefault("contacts", (np.zeros(len(ENERGIES)),))
+    results[0][:] = 0.0
+    if state.count[CONTACTS]:
+        energies_stage(engine.law).run(engine.table_of(state), results)
+    if (added := engine.content.of_components.get(StageNumber.COMPONENT_ENERGIES)) is not None:
+        added[0].run(engine.table_of(state), results)
+    return list(results[0].tolist())
+
+
+def losses(engine: Engine) -> np.ndarray:
+    """Losses [J] up to the time of `state`, in the order of `basics.state.LOST`.
+
+    With a bath they include the work in the half kick at the end of the last step (`contact.bath_work`).
+    """
+    state = engine.state
+    if variant_of(engine.parameters.settings) != THERMAL:
+        return state.lost
+    arrays = state.all_losses()
+    kept = [array.copy() for array in arrays]
+    record_bath_work(engine, state)
+    found = state.lost.copy()
+    for array, values in zip(arrays, kept, strict=True):
+        array[...] = values
+    return found
+
+
+def record_bath_work(engine: Engine, state: State) -> None:
+    """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
+    if variant_of(engine.parameters.settings) != THERMAL:
+        return
+    with engine.heavy_grains(state):
+        bath_work.run(engine.table_of(state), (), NO_STEP)
+        if (added := engine.content.of_components.get(StageNumber.COMPONENT_BATH_WORK)) is not None:
+            stage, numbers = added
+            stage.run(engine.table_of(state), numbers, NO_STEP)
+
+
+def body_motion(engine: Engine) -> BodyMotion:
+    """Motion of each body, as `analysis.body_motion` has it."""
+    state, results = engine.state, engine.memory.get("bodies")
+    count = len(state.grains)
+    if results is None or results[0].shape[1] != count:
+        results = engine.memory["bodies"] = np.zeros((BODY_ROWS, count)), cluster_arrays(count)
+    bodies = measure_bodies.run(engine.table_of(state), results)
+    found = results[0][:, :bodies].copy()
+    return BodyMotion(found[0].astype(np.int64), *found[1:])
