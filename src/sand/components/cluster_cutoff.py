@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.state import (
     BROKEN,
@@ -35,7 +36,6 @@ from ..engine.component import Component, Setup
 from ..engine.engine import Engine
 from ..engine.kinds import ForcesByType
 from ..engine.measures import pair_energy, pair_loads
-from ..errors import BadInput
 from ..forces.base import Force
 from ..forces.pair.cutoff import HALF_BOX_RATIO, CutoffChoice
 from ..forces.pair.dipoles import CAPTURE_RADII, CapturingPair, Dipoles, capturing_pair

@@ -11,10 +11,11 @@ import numpy as np
 
 from ..basics.arrays import OVER_ALLOCATION
 from ..basics.box import Box
+from ..basics.errors import BadInput, ErrorCollector
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import COMPARED
 from ..contact.model import Contact
-from ..errors import BadInput, ErrorCollector
 from ..forces.base import Force, LongRangeForce
 from ..forces.pair.ewald_force import EwaldForce
 from ..forces.pair.long_range_loops import LongRangeSums
@@ -22,7 +23,6 @@ from ..integrate.integrator import Integrator
 from ..integrate.parts import ForceNumbers, StepParameters
 from ..integrate.stage_list import ProgramContent
 from ..neighbours.search import Neighbours
-from ..setup.from_frame import StrainedContacts
 from .component import Component, Setup, check
 from .engine import Engine
 from .initial_contacts import add_contacts, contacts_at_start, refuse_overlaps

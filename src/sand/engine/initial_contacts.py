@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput, first_problems
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts, most_overlap
 from ..contact.events import InitialContacts, forming_loops
 from ..contact.model import Contact
-from ..errors import BadInput, first_problems
 from ..limits.solid_limits import torn_clusters
-from ..setup.checks import most_overlap
-from ..setup.from_frame import StrainedContacts
 from .engine import Engine
 
 NAMED = 10
@@ -125,7 +124,7 @@ def refuse_overlaps(
     Raises
     ------
     BadInput
-        If a pair overlaps by more than `setup.checks.most_overlap`; the first ten pairs are named.
+        If a pair overlaps by more than `basics.initial_pairs.most_overlap`; the first ten pairs are named.
     """
     if contact is None:
         return

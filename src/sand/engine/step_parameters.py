@@ -9,10 +9,10 @@ from typing import Any
 
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import SILICA
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas import Gas
 from ..forces.gas_loops import VACUUM
