@@ -43,36 +43,7 @@ class Ramps(Component):
         """Next time [s] at which a parameter changes, or infinity."""
         return min(ramp.next_change(engine.regular_time) for ramp in self._ramps)
 
-    def built(self, engine: Engine) -> None:
-        """Use the parameters at the start."""
-        self._set_parameters(engine)
-
-    def loaded(self, engine: Engine) -> None:
-        """Use the parameters at the time of the state, whose loads were summed with them."""
-        self._set_parameters(engine)
-
-    def update(self, engine: Engine) -> None:
-        """Change parameters if the regular state is in new intervals of the ramps, and compute loads anew.
-
-        The change of the energy at fixed positions is work of the user. Contacts keep their displacements; a
-        contact beyond its new limits slips or breaks when the loads are computed.
-        """
-        state, of_contacts = engine.stored_state, Contact.name in self._names
-        if self._intervals == self._present_intervals(state.time):
-            return
-        before = self._energy(engine)
-        self._set_parameters(engine)
-        if of_contacts:
-            with engine.heavy_grains(state):
-                renewal_stage(engine.law).run(engine.table_of(state))
-        state.lost[OUTSIDE] += before - self._energy(engine)
-        state.count[CHECKED] = state.steps - INCREASE_INTERVAL  # the next step is chosen for the new parameters
-        engine.sort_in_space()
-        if of_contacts:
-            state.pair_list.anchor[0, 0] = math.inf  # the list has constants of possible contacts: build it anew
-        engine.sum_loads()
-
-    def _set_parameters(self, engine: Engine) -> None:
+    def begin(self, engine: Engine) -> None:
         """Give parameters their values at the time of the regular state; loads and contacts stay as they are."""
         state = engine.stored_state
         self._intervals = self._present_intervals(state.time)
@@ -86,6 +57,27 @@ class Ramps(Component):
             ],
             [now.get(force.name, force) for force in engine.external],
         )
+
+    def update(self, engine: Engine) -> None:
+        """Change parameters if the regular state is in new intervals of the ramps, and compute loads anew.
+
+        The change of the energy at fixed positions is work of the user. Contacts keep their displacements; a
+        contact beyond its new limits slips or breaks when the loads are computed.
+        """
+        state, of_contacts = engine.stored_state, Contact.name in self._names
+        if self._intervals == self._present_intervals(state.time):
+            return
+        before = self._energy(engine)
+        self.begin(engine)
+        if of_contacts:
+            with engine.heavy_grains(state):
+                renewal_stage(engine.law).run(engine.table_of(state))
+        state.lost[OUTSIDE] += before - self._energy(engine)
+        state.count[CHECKED] = state.steps - INCREASE_INTERVAL  # the next step is chosen for the new parameters
+        engine.sort_in_space()
+        if of_contacts:
+            state.pair_list.anchor[0, 0] = math.inf  # the list has constants of possible contacts: build it anew
+        engine.sum_loads()
 
     def _energy(self, engine: Engine) -> float:
         """Energy [J] of the forces with ramps."""

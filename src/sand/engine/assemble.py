@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, cast
@@ -22,15 +23,16 @@ from ..forces.pair.long_range_loops import LongRangeSums
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ForceNumbers, StepParameters
 from ..integrate.stage_list import ProgramContent
+from ..limits.solid_limits import torn_clusters
 from ..neighbours.search import Neighbours
-from .component import Component, Setup, check
+from .component import Component, Setup
 from .engine import Engine
-from .initial_contacts import add_contacts, contacts_at_start, refuse_overlaps
+from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps, with_contacts
 from .input_checks import check_system
 from .kinds import ForcesByType, Kind, forces_by_type
 from .new_state import new_state
 from .rigid.assembly import BodiesKind
-from .step_parameters import ForceDependence, external_work, longest_displacement, respa_settings, step_criteria
+from .step_parameters import external_work, force_dependent, longest_displacement, respa_settings, step_criteria
 
 KINDS: dict[str, type[Kind]] = {each.integrator: each for each in (BodiesKind,)}
 """Kinds of engines that are not those of grains, by the name of their integrator."""
@@ -77,16 +79,17 @@ def build_engine(
     setup = Setup(grains, by_type, box, stepping, neighbours, fresh, saved)
     warnings = errors.take(check_system, grains, forces, box, fresh=fresh, instead=[])
     warnings += errors.take(kind.check, forces, [each.noun for each in extra if each.noun], neighbours, instead=[])
-    errors.take(check, extra, setup)
+    errors.problems += [line for each in extra for line in each.problems(setup)]
     errors.done()
     wrapped = _wrapped(grains, box, fresh=fresh)
     for each in extra:
         each.prepare(wrapped)
     if kind.keeps_order or any(each.keeps_order for each in extra):
         neighbours = dataclasses.replace(neighbours, order="as given")
-    start = contacts_at_start(wrapped, by_type.contact if fresh else None, box, contacts)
-    warnings += start.warnings
-    setup = setup._replace(touching=start.touching)
+    overlapping = overlapping_pairs(wrapped, box) if by_type.contact and fresh else NO_OVERLAPS
+    touching = with_contacts(overlapping.pair, contacts, len(grains))
+    warnings += torn_clusters(wrapped, by_type.contact, touching, box)
+    setup = setup._replace(touching=touching)
     for each in extra:
         by_type = each.at_start(by_type, setup)
     pair_gap, flights = kind.pair_gap(grains, box), stepping.flight is not None
@@ -97,14 +100,16 @@ def build_engine(
     uniform = not any(each.own_columns for each in extra)
     stepping = stepping.resolved(grains, step_criteria(grains, verlet, kind.limiting_forces(by_type), pair_gap))
     limits = stepping.flight_limits(grains, longest_displacement(grains, box, found))
-    dependence = ForceDependence(kind, verlet, seed, pair_gap, uniform, limits)
+    dependent = functools.partial(
+        force_dependent, kind=kind, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=uniform, limits=limits
+    )
     parameters = StepParameters(
         span=box.span,
         search=found.search,
         respa=respa_settings(by_type, verlet, long_range, every_step=any(each.every_step for each in extra)),
         external_work=external_work(by_type.external, box),
         forces=ForceNumbers(len(long_range), len(by_type.external)),
-        **dependence(forces, grains)._asdict(),
+        **dependent(forces, grains)._asdict(),
     )
     law = (by_type.contact or Contact()).contact_law
     of_components: dict[int, tuple[Any, Any]] = {}
@@ -124,7 +129,7 @@ def build_engine(
         of_components=of_components,
         heavy=np.array([i for each in extra for i in each.heavy()], np.int64),
     )
-    capacity = int(OVER_ALLOCATION * start.number)
+    capacity = int(OVER_ALLOCATION * len(touching))
     over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
     state = new_state(wrapped, box, parameters, content, capacity, over_all_pairs=over_all_pairs)
     state.count[COMPARED] = 0 if any(each.watches_contacts for each in extra) else -1
@@ -141,7 +146,7 @@ def build_engine(
         search=found.reason + (SORTED if chosen.uses_spatial_sort(len(grains)) else ""),
         stepping=stepping,
         neighbours=chosen,
-        force_dependent=dependence,
+        force_dependent=dependent,
         components=extra,
     )
 
@@ -150,8 +155,8 @@ def build_engine(
 
     kind.complete(engine, forces, build)
     for each in extra:
-        each.built(engine)
-    refuse_overlaps(wrapped, by_type.contact, start.overlapping, add_contacts(engine, by_type.contact, contacts))
+        each.begin(engine)
+    refuse_overlaps(wrapped, by_type.contact, overlapping, add_contacts(engine, by_type.contact, contacts))
     return engine
 
 
@@ -167,17 +172,13 @@ def _wrapped(grains: Grains, box: Box, *, fresh: bool) -> Grains:
 
 def fitting_forces(forces: tuple[Force, ...], stepping: Integrator) -> tuple[Force, ...]:
     """The forces, with nearest images where "auto" would choose an Ewald sum whose rates a Taylor scheme needs."""
+
+    def fitted(force: Any) -> Force:
+        auto = isinstance(force, EwaldForce) and force.periodic == "auto"
+        return cast("Force", dataclasses.replace(force, periodic="nearest image") if auto else force)
+
     taylor = stepping.contact_stepping.far.startswith("taylor")
-    if not taylor or not any(isinstance(force, Contact) for force in forces):
-        return forces
-    return tuple(_of_nearest_images(force) for force in forces)
-
-
-def _of_nearest_images(force: Force) -> Force:
-    """The force, with nearest images instead of an automatic choice."""
-    given: Any = force
-    auto = isinstance(force, EwaldForce) and force.periodic == "auto"
-    return cast("Force", dataclasses.replace(given, periodic="nearest image")) if auto else force
+    return tuple(map(fitted, forces)) if taylor and any(isinstance(force, Contact) for force in forces) else forces
 
 
 def _long_range_loops(

@@ -26,17 +26,12 @@ from ..integrate.task_queue import (
 )
 from ..integrate.worker_threads import WorkerThreads
 
-ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
-"""The arrays of a state that stages take, besides those of the grains."""
 OF_STATE = ("grains", *GROUPS, "clock", "count", "lost")
-"""The parts of a table that these are."""
+"""The parts of a table that are arrays of a state."""
+arrays_of = operator.attrgetter("grains.arrays", *OF_STATE[1:])
+"""These arrays of a state."""
 ALONE = 2000
 """Grains from which on several threads take the shorter step to a time of output."""
-
-
-def _arrays_of(state: State) -> tuple:
-    """The arrays of a state, in the order of `OF_STATE`."""
-    return state.grains.arrays, *ARRAYS(state)
 
 
 def _set_arrays(table: Table, present: tuple) -> None:
@@ -75,26 +70,23 @@ class Calls:
         self.program: Program | None = None
         self.workers = WorkerThreads(take_blocks) if uses_task_queue(grains) else None
         self.compiles_ahead = True
-        self._present: tuple = (None,)  # arrays of the state that the table has
-        self._copy_present: tuple = (None,)  # those of the copy that is stepped to times of output
+        self._copy_arrays: tuple = (None,)  # of the copy that is stepped to times of output
         self._queue: TaskQueue | None = None  # of the last call of the driver
         self._queue_size = (0, 0)  # grains and contacts that it is for
 
     def table_of(self, state: State) -> Table:
         """The table with the present arrays of the state."""
-        present = _arrays_of(state)
-        if all(map(operator.is_, present, self._copy_present)):
+        present = arrays_of(state)
+        if all(map(operator.is_, present, self._copy_arrays)):
             return self._copy_table
-        if not all(map(operator.is_, present, self._present)):
-            _set_arrays(self.table, present)
-            self._present = present
+        _set_arrays(self.table, present)
         return self.table
 
     def take_copy(self, state: State, copied: State, has_same_arrays: bool) -> None:
         """Prepare a table for a copy of a state; `has_same_arrays`: those of the copy before."""
         self._copy_table.follow(self.table_of(state), OF_STATE if has_same_arrays else ())
-        self._copy_present = _arrays_of(copied)
-        _set_arrays(self._copy_table, self._copy_present)
+        self._copy_arrays = arrays_of(copied)
+        _set_arrays(self._copy_table, self._copy_arrays)
 
     def for_call(self, state: State, until: float, last: float, shorten: bool) -> Table:
         """The table for one call of the driver."""

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..basics.box import Box
-from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.state import State
@@ -41,11 +40,11 @@ class Component:
     """A feature of a simulation that is no formula; what a class does not define is nothing.
 
     At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
-    `at_start`, `stages` and `heavy`, `add_arrays`, `built`.  While the engine runs it calls `update`, `next_time` and
+    `at_start`, `stages` and `heavy`, `add_arrays`, `begin`.  While the engine runs it calls `update`, `next_time` and
     `contacts_changed`, between regular steps.  The ledger has its `columns` and `losses`, with the values of `row`
-    (energies stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A checkpoint
-    that was read is `loaded`.  A change asks `problems_of_motion` and `problems_of_arrays`, continues with what is
-    `kept`, and calls `saved_for_change` and `changed`; case.toml has `parameters` and `materials`.
+    (energies stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change
+    asks `problems_of_motion` and `problems_of_arrays`, continues with what is `kept`, and calls `saved_for_change` and
+    `changed`; case.toml has `parameters` and `materials`.
 
     Attributes
     ----------
@@ -98,9 +97,6 @@ class Component:
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the arrays that it needs."""
 
-    def built(self, engine: Engine) -> None:
-        """Called when the engine is built, before contacts are added."""
-
     def next_time(self, engine: Engine) -> float:
         """Time [s] up to which steps may be taken without an `update`."""
         return math.inf
@@ -111,8 +107,8 @@ class Component:
     def contacts_changed(self, engine: Engine) -> None:
         """Called after steps in which contacts formed or broke, if it `watches_contacts`."""
 
-    def loaded(self, engine: Engine) -> None:
-        """Called when the arrays of a checkpoint, or of a change, have become those of the state."""
+    def begin(self, engine: Engine) -> None:
+        """Called when an engine is built, before contacts are added, and when a saved or changed state was loaded."""
 
     def choices(self) -> dict[str, str]:
         """Automatic choices at the start, with their reasons."""
@@ -176,10 +172,3 @@ class Component:
 def in_use(components: Mapping[str, Component]) -> list[Component]:
     """The components that a simulation has."""
     return [each for each in components.values() if each.items]
-
-
-def check(components: Sequence[Component], setup: Setup) -> None:
-    """Check that components fit to the other parts of a simulation.  Raises BadInput with all problems."""
-    problems = [line for each in components for line in each.problems(setup)]
-    if problems:
-        raise BadInput(problems)

@@ -6,7 +6,7 @@ import contextlib
 import copy
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -95,8 +95,6 @@ class Engine:
         How steps are taken.
     calls : Calls
         Tables, program and threads.
-    memory : dict
-        Arrays that measurements use again.
     """
 
     _state: State
@@ -112,7 +110,7 @@ class Engine:
     components: Sequence[Component] = ()
     stepper: GrainSteps = field(default_factory=GrainSteps)
     calls: Calls = field(init=False)
-    memory: dict[str, Any] = field(init=False, default_factory=dict)
+    _memory: dict[str, Any] = field(init=False, default_factory=dict)  # arrays that measurements use again
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _spare: SpareCopy = field(init=False, default_factory=SpareCopy)  # memory of the copy
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
@@ -123,30 +121,19 @@ class Engine:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Engine:
         """A copy with a table of its own."""
-        other = type(self)(**{name: copy.deepcopy(value, memo) for name, value in self._settings().items()})
+        own = {each.name: copy.deepcopy(getattr(self, each.name), memo) for each in fields(self) if each.init}
+        other = type(self)(**own)
         other._is_sorted, other._output_time = self._is_sorted, self._output_time
         return other
 
-    def for_state(self, state: State) -> Self:
-        """An engine with the settings of this one, for another state, with a table of its own and no other threads."""
-        made = self.changed(_state=state, stepper=self.stepper.for_part())
-        made.calls.workers, made.calls.compiles_ahead = None, False
-        return made
+    def for_state(self, state: State, *, with_threads: bool) -> Self:
+        """An engine with the settings of this one, for another state, with a table of its own.
 
-    def share_threads(self, other: Engine) -> None:
-        """Use the threads of another engine, which does not step at the same time."""
-        self.calls.workers = other.calls.workers
-
-    def changed(self, **changes: Any) -> Self:
-        """An engine with the settings of this one but for these, and a table of its own.
-
-        What does not change, such as the list of warnings, is shared.
+        `with_threads`: it uses the threads of this one, as the two never step at once; otherwise no others.
         """
-        return type(self)(**self._settings() | changes)
-
-    def _settings(self) -> dict[str, Any]:
-        """State and settings, of which the rest is made."""
-        return {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        made = replace(self, _state=state, stepper=self.stepper.for_part())
+        made.calls.workers, made.calls.compiles_ahead = self.calls.workers if with_threads else None, False
+        return made
 
     @property
     def state(self) -> State:
@@ -337,13 +324,17 @@ class Engine:
         """The table with the present arrays of the state."""
         return self.calls.table_of(state)
 
+    def memory_for(self, measurement: str, make: Callable[[int], Any]) -> Any:
+        """Memory for a measurement, which `make` makes for a number of grains when it is first needed."""
+        if measurement not in self._memory:
+            self._memory[measurement] = make(len(self._state.grains))
+        return self._memory[measurement]
+
     def uncompiled(self) -> list[str]:
         """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
         stages = self.stages(self.first_table())
-        missing = [
-            each.purpose for table, each, own in stages if isinstance(each, Stage) and not each.is_compiled(table, own)
-        ]
-        return list(dict.fromkeys(missing))
+        compiled = ((table, each, own) for table, each, own in stages if isinstance(each, Stage))
+        return list(dict.fromkeys(each.purpose for table, each, own in compiled if not each.is_compiled(table, own)))
 
     def first_table(self) -> Table:
         """The table as for a call of the driver, with all parts that stages take."""
@@ -352,8 +343,8 @@ class Engine:
     def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
         """All stages that a run may call, each with a table of parts, by default this one, and its parameters."""
         program = self.calls.program_for(table, self.content, self.parameters)
-        stages = [*self.stepper.drivers(), *program.stages.values(), *measuring_stages(self)]
-        return [*((table, *each) for each in stages), *self.stepper.stages_within(self, table)]
+        stages = *program.stages.values(), *measuring_stages(self)
+        return [*self.stepper.stages(self, table), *((table, *each) for each in stages)]
 
     def run_driver(self, driver: Stage, until: float, last: float, shorten: bool = False) -> Stop:
         """Run a driver with the stages of the simulation, in the present order of the arrays.
@@ -429,7 +420,7 @@ class Engine:
         elif state.contacts.gather_order.size:
             resort_contacts_by_grain(state.grains.arrays, state.contacts, state.count)
         for each in self.components:
-            each.loaded(self)
+            each.begin(self)
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
         self.rebuild_list()

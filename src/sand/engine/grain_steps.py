@@ -31,13 +31,9 @@ class GrainSteps:
         """Such steps for an engine of some of the grains."""
         return self
 
-    def drivers(self) -> list[tuple[Stage, Any]]:
-        """Stages that are called during a run besides those of the program, with their parameters."""
-        return [(advance, ())]
-
-    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
-        """Further stages that a run may call, each with a table of parts and its parameters."""
-        return []
+    def stages(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Stages that a run calls besides those of the program, each with a table of parts and its parameters."""
+        return [(table, advance, ())]
 
     def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
         """Take steps up to a time [s] or a step; returns why no more were taken."""

@@ -12,7 +12,6 @@ from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts, most_overlap
 from ..contact.events import InitialContacts, forming_loops
 from ..contact.model import Contact
-from ..limits.solid_limits import torn_clusters
 from .engine import Engine
 
 NAMED = 10
@@ -35,27 +34,12 @@ def overlapping_pairs(grains: Grains, box: Box) -> OverlappingPairs:
     return OverlappingPairs(pair[overlap > 0.0], overlap[overlap > 0.0])
 
 
-class ContactsAtStart(NamedTuple):
-    """Pairs of grains that are in contact at a start."""
-
-    overlapping: OverlappingPairs
-    touching: np.ndarray  # (C, 2) pairs that overlap, and those of an earlier run
-    number: int  # of both, for which there is memory
-    warnings: list[str]  # that these contacts cannot hold a cluster
-
-
-def contacts_at_start(
-    grains: Grains, contact: Contact | None, box: Box, contacts: StrainedContacts | None
-) -> ContactsAtStart:
-    """Contacts of overlapping grains, none without `contact`, and `contacts` of an earlier run, which may be wrong."""
-    overlapping = NO_OVERLAPS if contact is None else overlapping_pairs(grains, box)
-    touching, given = overlapping.pair, NO_OVERLAPS.pair if contacts is None else np.asarray(contacts.pair)
-    number = len(touching) + len(given)
-    if given.ndim == 2 and given.shape[1] == 2 and ((given >= 0) & (given < len(grains))).all():
-        both = np.concatenate([touching, given.astype(touching.dtype)])
-        touching = np.unique(np.sort(both, axis=1), axis=0)
-    warnings = [] if contact is None else torn_clusters(grains, contact, touching, box)
-    return ContactsAtStart(overlapping, touching, number, warnings)
+def with_contacts(pair: np.ndarray, contacts: StrainedContacts | None, count: int) -> np.ndarray:
+    """Pairs of grains (P, 2) and those of contacts, unless these name others than `count` grains; sorted."""
+    given = NO_OVERLAPS.pair if contacts is None else np.asarray(contacts.pair)
+    if given.ndim != 2 or given.shape[1] != 2 or ((given < 0) | (given >= count)).any():
+        return pair  # refused when they are added
+    return np.unique(np.sort(np.concatenate([pair, given.astype(pair.dtype)]), axis=1), axis=0)
 
 
 def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedContacts | None) -> np.ndarray:

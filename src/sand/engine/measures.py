@@ -15,7 +15,7 @@ from ..contact.damping import THERMAL
 from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies
 from ..forces.base import ExternalForce
 from ..forces.external_loops import external_energies_for
-from ..forces.pair.long_range_loops import LongRangeSums, long_range_energies_for
+from ..forces.pair.long_range_loops import long_range_energies_for
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.respa import clear_long_range_loads
 from ..integrate.stage_list import variant_of
@@ -46,37 +46,30 @@ def force_columns(engine: Engine) -> list[str]:
 def energies_at_grains(engine: Engine, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """Energy [J] of each grain (N,) by column: half of each pair energy, and the energies of per-grain forces.
 
-    Of all forces, or of those with these names.
+    Of all forces, or of those with these names; in arrays that the next call uses again.
     """
-    return {name: share.copy() for name, share in _energies_at_grains(engine, names).items()}
+    state = engine.state
+    shares = engine.memory_for("shares", lambda n: {name: np.zeros(n) for name in force_columns(engine)})
+    for share in shares.values():
+        share[:] = 0.0
+    for k, (force, _, _) in enumerate(engine.long_range):
+        if names is None or force.name in names:
+            _add_energies(engine, state, k, shares[force.column])
+    for outer in engine.external:
+        if names is None or outer.name in names:
+            numbers = outer.numbers(), state.time, shares[outer.name]
+            external_energies_for(outer.formula).run(engine.table_of(state), numbers)
+    return shares
 
 
 def force_energies(engine: Engine) -> dict[str, float]:
     """Total energy [J] of each long-range and per-grain force, by ledger column."""
-    return {name: math.fsum(share.tolist()) for name, share in _energies_at_grains(engine, None).items()}
+    return {name: math.fsum(share.tolist()) for name, share in energies_at_grains(engine).items()}
 
 
-def _energies_at_grains(engine: Engine, names: Collection[str] | None) -> dict[str, np.ndarray]:
-    """As `energies_at_grains`, in arrays that the next call uses again."""
-    state, found = engine.state, dict.fromkeys(force_columns(engine))
-    table, count = engine.table_of(state), len(state.grains)
-    shares: dict[str, np.ndarray] = engine.memory.get("shares", {})
-    if shares.keys() != found.keys() or any(len(share) != count for share in shares.values()):
-        shares = engine.memory["shares"] = {name: np.zeros(count) for name in found}
-    for share in shares.values():
-        share[:] = 0.0
-    for force, sums, numbers in engine.long_range:
-        if names is None or force.name in names:
-            _add_energies(engine, state, sums, numbers, shares[force.column])
-    for outer in engine.external:
-        if names is None or outer.name in names:
-            external_energies_for(outer.formula).run(table, (outer.numbers(), state.time, shares[outer.name]))
-    return shares
-
-
-def _add_energies(engine: Engine, state: State, sums: LongRangeSums, numbers: Any, shares: np.ndarray) -> None:
-    """Add the energies [J] of a long-range force to those of the grains."""
-    table = engine.table_of(state)
+def _add_energies(engine: Engine, state: State, k: int, shares: np.ndarray) -> None:
+    """Add the energies [J] of long-range force k to those of the grains."""
+    table, (_, sums, numbers) = engine.table_of(state), engine.long_range[k]
     if sums.energies_need_rounds:
         run_rounds(sums, engine.content.wide, table, numbers)
     long_range_energies_for(sums).run(table, (numbers, shares))
@@ -92,9 +85,8 @@ def external_energy(engine: Engine, outer: ExternalForce, time: float) -> float:
 
 def pair_energy(engine: Engine, k: int) -> float:
     """Energy [J] of long-range force k in the regular state."""
-    state, (_, sums, numbers) = engine.stored_state, engine.long_range[k]
-    shares = np.zeros(len(state.grains))
-    _add_energies(engine, state, sums, numbers, shares)
+    shares = np.zeros(len(engine.stored_state.grains))
+    _add_energies(engine, engine.stored_state, k, shares)
     return math.fsum(shares)
 
 
@@ -112,7 +104,7 @@ def pair_loads(engine: Engine, k: int) -> np.ndarray:
 
 def contact_energies(engine: Engine) -> list[float]:
     """Energies [J] stored by the contacts, see `contact.measure.ENERGIES`."""
-    state, results = engine.state, engine.memory.setdefault("contacts", (np.zeros(len(ENERGIES)),))
+    state, results = engine.state, engine.memory_for("contacts", lambda _: (np.zeros(len(ENERGIES)),))
     results[0][:] = 0.0
     if state.count[CONTACTS]:
         energies_stage(engine.law).run(engine.table_of(state), results)
@@ -129,11 +121,10 @@ def losses(engine: Engine) -> np.ndarray:
     state = engine.state
     if variant_of(engine.parameters.settings) != THERMAL:
         return state.lost
-    arrays = state.all_losses()
-    kept = [array.copy() for array in arrays]
+    kept = [(array, array.copy()) for array in state.all_losses()]
     record_bath_work(engine, state)
     found = state.lost.copy()
-    for array, values in zip(arrays, kept, strict=True):
+    for array, values in kept:
         array[...] = values
     return found
 
@@ -151,10 +142,7 @@ def record_bath_work(engine: Engine, state: State) -> None:
 
 def body_motion(engine: Engine) -> BodyMotion:
     """Motion of each body, as `analysis.body_motion` has it."""
-    state, results = engine.state, engine.memory.get("bodies")
-    count = len(state.grains)
-    if results is None or results[0].shape[1] != count:
-        results = engine.memory["bodies"] = np.zeros((BODY_ROWS, count)), cluster_arrays(count)
-    bodies = measure_bodies.run(engine.table_of(state), results)
+    results = engine.memory_for("bodies", lambda n: (np.zeros((BODY_ROWS, n)), cluster_arrays(n)))
+    bodies = measure_bodies.run(engine.table_of(engine.state), results)
     found = results[0][:, :bodies].copy()
     return BodyMotion(found[0].astype(np.int64), *found[1:])

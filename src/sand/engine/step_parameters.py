@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from ..basics.box import Box
@@ -33,11 +32,20 @@ h²/12τ², at most 4e-4.
 """
 
 
-@dataclass(frozen=True)
-class ForceDependence:
-    """How parameters of steps follow from values of parameters of the forces.
+def force_dependent(
+    forces: Sequence[Force],
+    grains: Grains,
+    *,
+    kind: Kind,
+    verlet: Verlet,
+    seed: int,
+    pair_gap: float,
+    uniform: bool,
+    limits: Any,
+) -> ForceDependent:
+    """The parameters of steps that follow from values of parameters of the forces.
 
-    Attributes
+    Parameters
     ----------
     kind : Kind
         Kind of engine.
@@ -52,24 +60,14 @@ class ForceDependence:
     limits : Any
         Run-time numbers of the integrator that do not depend on forces.
     """
-
-    kind: Kind
-    verlet: Verlet
-    seed: int
-    pair_gap: float
-    uniform: bool
-    limits: Any
-
-    def __call__(self, forces: Sequence[Force], grains: Grains) -> ForceDependent:
-        """These parameters for forces with numbers, or with ramps that are at their start."""
-        by_type = forces_by_type(forces, grains)
-        found = ForceDependent(
-            settings=_contact_parameters(by_type.contact, grains, self.verlet, self.seed, uniform=self.uniform),
-            gas=_gas_settings(by_type.gas, grains, self.seed),
-            criteria=step_criteria(grains, self.verlet, self.kind.limiting_forces(by_type), self.pair_gap),
-            flight_limits=self.limits,
-        )
-        return found._replace(flight_limits=self.kind.flight_limits(found, by_type, grains))
+    by_type = forces_by_type(forces, grains)
+    found = ForceDependent(
+        settings=_contact_parameters(by_type.contact, grains, verlet, seed, uniform=uniform),
+        gas=_gas_settings(by_type.gas, grains, seed),
+        criteria=step_criteria(grains, verlet, kind.limiting_forces(by_type), pair_gap),
+        flight_limits=limits,
+    )
+    return found._replace(flight_limits=kind.flight_limits(found, by_type, grains))
 
 
 def respa_settings(

@@ -347,7 +347,8 @@ class Simulation(ReadOnlySettings):
         for side in range(2):
             np.add.at(elastic, contacts["pair"][:, side], half)
         energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
-        return {"flux_density": flux} | energies | energies_at_grains(self._engine)
+        shares = {name: share.copy() for name, share in energies_at_grains(self._engine).items()}
+        return {"flux_density": flux} | energies | shares
 
     @exclusive
     @checked

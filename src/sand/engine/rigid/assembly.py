@@ -129,9 +129,8 @@ class BodiesKind(Kind):
         inner = build(near, Neighbours("all pairs", order="as given"))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
-        of_quick = inner.changed(
-            parameters=own, warnings=engine.warnings, stepper=BodySteps(Part(inner, CONTACT_STEPS))
-        )
+        steps = BodySteps(Part(inner, CONTACT_STEPS))
+        of_quick = dataclasses.replace(inner, parameters=own, warnings=engine.warnings, stepper=steps)
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
         engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), quick)
 

@@ -113,14 +113,10 @@ class BodySteps(GrainSteps):
         """As `GrainSteps.for_part`, without substeps."""
         return BodySteps(self.part.anew())
 
-    def drivers(self) -> list[tuple[Stage, Any]]:
-        """Stages of bodies; those of awake grains are the ones of all grains with other loops over pairs."""
-        quick = [] if self.quick is None else self.quick.drivers()
-        return [*super().drivers(), (advance_bodies, ()), (mark_near_bodies, ()), *quick]
-
-    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
-        """Stages of awake clusters."""
-        inner = self.part.engine
+    def stages(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Stages of bodies and of awake clusters; those are the ones of all grains with other loops over pairs."""
+        inner, quick = self.part.engine, [] if self.quick is None else self.quick.stages()
+        of_bodies = (advance_bodies, ()), (mark_near_bodies, ()), (store_rest, ()), *quick
         own: list[tuple[Stage, Any]] = [
             (measure_clusters_stage(inner.law), cluster_measures(1)),
             (kick_clusters, (self._remainder,)),
@@ -128,7 +124,8 @@ class BodySteps(GrainSteps):
         ]
         own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
         of_inner = inner.first_table()
-        return [(table, store_rest, ()), *inner.stages(of_inner), *((of_inner, *each) for each in own)]
+        found = [*super().stages(engine, table), *((table, *each) for each in of_bodies)]
+        return [*found, *inner.stages(of_inner), *((of_inner, *each) for each in own)]
 
     def begin(self, engine: Engine) -> None:
         """Make a body of each grain without contacts; clusters are awake."""

@@ -37,7 +37,7 @@ class QuickBodies:
 
     part: Part
 
-    def drivers(self) -> list[tuple[Stage, Any]]:
+    def stages(self) -> list[tuple[Stage, Any]]:
         """Stages of substeps, with their parameters."""
         vectors = np.zeros((3, 1))
         plain = [(each, ()) for each in (kick_by_slow_loads, place_all_velocities)]
