@@ -5,7 +5,7 @@ Each has a line in `GIVEN` or `OF_FORCES`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..basics.box import Box
@@ -32,3 +32,8 @@ def read_components(**given: Any) -> dict[str, Component]:
 def components_of(forces: Sequence[Force], grains: Grains, box: Box) -> list[Component]:
     """The components that follow from the forces on these grains."""
     return [component for each in OF_FORCES if (component := each.of(forces, grains, box)).items]
+
+
+def groups() -> list[Mapping[str, type]]:
+    """Groups of arrays of each component, of which checkpoints have those of the components in use."""
+    return [component.groups for component in (*(each for _, each in GIVEN.values()), *OF_FORCES)]

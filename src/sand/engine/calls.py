@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..basics.state import CONTACTS, GROUPS, State
+from ..basics.state import CONTACTS, State
 from ..basics.threads import cores, threads
 from ..compiler.ahead import compile_ahead
 from ..compiler.program import Program
@@ -26,17 +26,23 @@ from ..integrate.task_queue import (
 )
 from ..integrate.worker_threads import WorkerThreads
 
-OF_STATE = ("grains", *GROUPS, "clock", "count", "lost")
-"""The parts of a table that are arrays of a state."""
-arrays_of = operator.attrgetter("grains.arrays", *OF_STATE[1:])
-"""These arrays of a state."""
 ALONE = 2000
 """Grains from which on several threads take the shorter step to a time of output."""
 
 
-def _set_arrays(table: Table, present: tuple) -> None:
+def _arrays(state: State) -> tuple:
+    """The arrays of a state that stages take."""
+    return *state.in_groups(), state.clock, state.count, state.lost
+
+
+def _names(state: State) -> tuple[str, ...]:
+    """The parts of a table that these are."""
+    return *state.group_names(), "clock", "count", "lost"
+
+
+def _set_arrays(table: Table, state: State, present: tuple) -> None:
     """Give a table the arrays of a state."""
-    for name, value in zip(OF_STATE, present, strict=True):
+    for name, value in zip(_names(state), present, strict=True):
         table.set(name, value)
 
 
@@ -47,8 +53,8 @@ class Calls:
     ----------
     parameters : StepParameters
         Settings of the run, as the stages take them.
-    grains : int
-        Number of grains.
+    state : State
+        A state of the engine.
 
     Attributes
     ----------
@@ -62,31 +68,35 @@ class Calls:
         Whether the first call compiles what the run needs side by side; not in engines of parts.
     """
 
-    def __init__(self, parameters: StepParameters, grains: int):
-        self.table, self._copy_table = Table(PARTS), Table(PARTS)
+    def __init__(self, parameters: StepParameters, state: State):
+        names = *PARTS, *state.of_components
+        self.table, self._copy_table = Table(names), Table(names)
         for name, value in parameters._asdict().items():
             self.table.set(name, value)
         self.table.set("scratch", np.zeros(SCRATCH))
         self.program: Program | None = None
-        self.workers = WorkerThreads(take_blocks) if uses_task_queue(grains) else None
+        self.workers = WorkerThreads(take_blocks) if uses_task_queue(len(state.grains)) else None
         self.compiles_ahead = True
+        self._arrays: tuple = (None,)  # of the state that the table has
         self._copy_arrays: tuple = (None,)  # of the copy that is stepped to times of output
         self._queue: TaskQueue | None = None  # of the last call of the driver
         self._queue_size = (0, 0)  # grains and contacts that it is for
 
     def table_of(self, state: State) -> Table:
         """The table with the present arrays of the state."""
-        present = arrays_of(state)
+        present = _arrays(state)
         if all(map(operator.is_, present, self._copy_arrays)):
             return self._copy_table
-        _set_arrays(self.table, present)
+        if not all(map(operator.is_, present, self._arrays)):
+            _set_arrays(self.table, state, present)
+            self._arrays = present
         return self.table
 
     def take_copy(self, state: State, copied: State, has_same_arrays: bool) -> None:
         """Prepare a table for a copy of a state; `has_same_arrays`: those of the copy before."""
-        self._copy_table.follow(self.table_of(state), OF_STATE if has_same_arrays else ())
-        self._copy_arrays = arrays_of(copied)
-        _set_arrays(self._copy_table, self._copy_arrays)
+        self._copy_table.follow(self.table_of(state), _names(copied) if has_same_arrays else ())
+        self._copy_arrays = _arrays(copied)
+        _set_arrays(self._copy_table, copied, self._copy_arrays)
 
     def for_call(self, state: State, until: float, last: float, shorten: bool) -> Table:
         """The table for one call of the driver."""

@@ -61,6 +61,9 @@ class Component:
     watches_contacts : bool
         Whether `contacts_changed` is called; the driver then returns after each step in which a contact formed or
         broke.
+    groups : Mapping[str, type]
+        Groups of its arrays (`basics.array_groups`) by name: parts of a simulation that stages take by this name,
+        `State.of_components`, and its arrays in a checkpoint.
     items : Sequence
         What the user gave, such as `sand.Wall` objects.
     """
@@ -71,6 +74,7 @@ class Component:
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
     watches_contacts: ClassVar[bool] = False
+    groups: ClassVar[Mapping[str, type]] = {}
 
     def __init__(self, items: Sequence[Any]):
         self.items = tuple(items)
@@ -95,7 +99,8 @@ class Component:
         return []
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
-        """Give a new state the arrays that it needs."""
+        """Give a new state the arrays of `groups`; a class whose shapes name sizes of its own has to do it itself."""
+        state.add_groups(self.groups, {})
 
     def next_time(self, engine: Engine) -> float:
         """Time [s] up to which steps may be taken without an `update`."""

@@ -117,7 +117,7 @@ class Engine:
     _output_state: State | None = field(init=False, default=None)  # made from the regular state when first needed
 
     def __post_init__(self) -> None:
-        self.calls = Calls(self.parameters, len(self._state.grains))
+        self.calls = Calls(self.parameters, self._state)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Engine:
         """A copy with a table of its own."""
@@ -357,12 +357,12 @@ class Engine:
             calls.program_for(table, self.content, self.parameters)
             stop = calls.run(driver, table, state, len(self.content.pair_forces), partial(self.stages, table))
             if stop is Stop.CONTACTS_FULL:
-                state.grow_contacts()
-            elif stop is Stop.FURTHER_CONTACTS_FULL:
-                state.grow_component_contacts()
+                state.grow("contacts")
+            elif stop is Stop.TABLES_FULL:
+                state.grow_of_components()
             elif stop is Stop.PAIRS_FULL:
                 found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
-                state.grow_pairs(int(OVER_ALLOCATION * found))
+                state.grow("pair_list", int(OVER_ALLOCATION * found))
             elif stop is Stop.LIST_FULL:
                 state.grow_rows()
             else:
@@ -389,7 +389,7 @@ class Engine:
         self.drive(-math.inf, 1)
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)
-        state.forget_losses()
+        state.forget_sums()
         self.stepper.begin(self)
 
     def refresh_loads(self) -> None:

@@ -81,7 +81,7 @@ def _add_to_state(engine: Engine, pair: np.ndarray, contacts: StrainedContacts) 
     """Add contacts before the first step; the first that is stretched beyond its breaking point, or −1."""
     state = engine.state
     if state.contacts.pair.shape[1] < len(pair):
-        state.grow_contacts(len(pair))
+        state.grow("contacts", len(pair))
     vectors = (
         np.ascontiguousarray(array.T, dtype=np.float64) for array in (contacts.slide, contacts.roll, contacts.twist)
     )

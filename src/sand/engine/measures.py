@@ -121,7 +121,7 @@ def losses(engine: Engine) -> np.ndarray:
     state = engine.state
     if variant_of(engine.parameters.settings) != THERMAL:
         return state.lost
-    kept = [(array, array.copy()) for array in state.all_losses()]
+    kept = [(array, array.copy()) for array in state.sums()]
     record_bath_work(engine, state)
     found = state.lost.copy()
     for array, values in kept:
