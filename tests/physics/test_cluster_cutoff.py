@@ -11,7 +11,7 @@ import sand
 from sand.basics import threads
 from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.basics.state import COMPARED, CONTACTS, CUT_RADIUS, CUT_TIME
-from sand.engine import calls, engine
+from sand.engine import compiled_state, engine
 from sand.integrate import task_queue
 from sand.integrate.parts import Stop
 
@@ -293,7 +293,7 @@ def test_a_regular_step_that_is_not_kept_changes_nothing(monkeypatch, order, ste
 @pytest.mark.parametrize("search", ["all pairs", "cells"])
 def test_changes_are_the_same_for_any_number_of_threads(monkeypatch, search):
     """One and two threads, with loops shared among them."""
-    for module in (task_queue, calls):
+    for module in (task_queue, compiled_state):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: True)
     ends = []
     for number in (1, 2):

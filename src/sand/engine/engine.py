@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
-from ..basics.arrays import OVER_ALLOCATION
 from ..basics.grains import Grains
 from ..basics.spare_copy import SpareCopy
 from ..basics.state import (
@@ -29,7 +26,6 @@ from ..basics.state import (
     LONG_RANGE_SUMS,
     MADE,
     ORDERED,
-    PAIRS,
     REBUILT,
     REJECTED,
     SLIPPED,
@@ -44,43 +40,28 @@ from ..basics.state import (
 from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
-from ..contact.law import ContactLaw
-from ..forces.base import ExternalForce, Force, LongRangeForce
-from ..forces.pair.long_range_loops import LongRangeSums
+from ..forces.base import Force
 from ..integrate.integrator import Integrator
-from ..integrate.parts import HEAVY, StepParameters, Stop
-from ..integrate.stage_list import ProgramContent
+from ..integrate.parts import Stop
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.search import Neighbours
-from ..neighbours.spatial_sort import SORT_INTERVAL, inverse, reorder_grains, sort_contacts_and_pairs, spatial_order
-from .calls import Calls
+from ..neighbours.spatial_sort import SORT_INTERVAL, reorder_grains, sort_contacts_and_pairs, spatial_order
+from .compiled_state import CompiledState
 from .grain_steps import GrainSteps
 from .measures import measuring_stages, record_bath_work
 
-if TYPE_CHECKING:
-    from .component import Component
-    from .kinds import ForceDependent
-
 
 @dataclass
-class Engine:
+class Engine(CompiledState):
     """The state of a simulation and the compiled driver that advances it.
 
     Attributes
     ----------
     state : State
         The state, with grains in the user's order.
-    parameters : StepParameters
-        Settings of the run, as the stages take them.
-    content : ProgramContent
-        What the program is made of.
     warnings : list[str]
         Warnings of the forces about these grains.
-    external : Sequence[ExternalForce]
-        Per-grain forces.
-    long_range : Sequence[tuple[LongRangeForce, Any, Any]]
-        Long-range forces that act on at least one grain, with their loops and numbers.
     search : str
         Description of the neighbour search and the reason for its choice.
     stepping : Integrator
@@ -88,36 +69,23 @@ class Engine:
     neighbours : Neighbours
         Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
     force_dependent : callable
-        `(forces, grains)` → the parameters of steps that follow from values of parameters of the forces.
-    components : Sequence[Component]
-        Components; the engine calls their methods for Python at fixed places.
+        `(forces, grains)` → `kinds.ForceDependent`: the parameters of steps that follow from numbers of the forces.
+    components : Sequence
+        Components (`component.Component`); the engine calls their methods for Python at fixed places.
     stepper : GrainSteps
         How steps are taken.
-    calls : Calls
-        Tables, program and threads.
     """
 
-    _state: State
-    parameters: StepParameters
-    content: ProgramContent
     warnings: list[str]
-    external: Sequence[ExternalForce]
-    long_range: Sequence[tuple[LongRangeForce, LongRangeSums, Any]]
     search: str
     stepping: Integrator
     neighbours: Neighbours
-    force_dependent: Callable[[Sequence[Force], Grains], ForceDependent]
-    components: Sequence[Component] = ()
+    force_dependent: Callable[[Sequence[Force], Grains], Any]
+    components: Sequence[Any] = ()
     stepper: GrainSteps = field(default_factory=GrainSteps)
-    calls: Calls = field(init=False)
-    _memory: dict[str, Any] = field(init=False, default_factory=dict)  # arrays that measurements use again
-    _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _spare: SpareCopy = field(init=False, default_factory=SpareCopy)  # memory of the copy
     _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
     _output_state: State | None = field(init=False, default=None)  # made from the regular state when first needed
-
-    def __post_init__(self) -> None:
-        self.calls = Calls(self.parameters, self._state)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Engine:
         """A copy with a table of its own."""
@@ -132,7 +100,7 @@ class Engine:
         `with_threads`: it uses the threads of this one, as the two never step at once; otherwise no others.
         """
         made = replace(self, _state=state, stepper=self.stepper.for_part())
-        made.calls.workers, made.calls.compiles_ahead = self.calls.workers if with_threads else None, False
+        made.workers, made.compiles_ahead = self.workers if with_threads else None, False
         return made
 
     @property
@@ -141,29 +109,6 @@ class Engine:
         if self._output_time is not None and self._output_state is None and self._output_time != self._state.time:
             self.go_to(self._output_time)  # of a checkpoint
         return self.regular_state if self._output_state is None else self._output_state
-
-    @property
-    def regular_state(self) -> State:
-        """The state after the last regular step, from which the run continues; grains in the user's order."""
-        self.restore_user_order()
-        return self._state
-
-    @regular_state.setter
-    def regular_state(self, other: State) -> None:
-        """Continue from another state, in the user's order."""
-        self._state, self._is_sorted = other, False
-        self._output_state = self._output_time = None
-
-    @property
-    def stored_state(self) -> State:
-        """The regular state in the present order of its arrays."""
-        return self._state
-
-    def restore_user_order(self) -> None:
-        """Undo the spatial sorting of the arrays, until the next step."""
-        if self._is_sorted:
-            reorder_grains(self._state, inverse(self._state.order))
-            self._is_sorted = False
 
     def go_to(self, time: float, last: float = math.inf) -> Stop:
         """Make `state` the state at exactly this time [s], after `advance` up to it; returns why no such state exists.
@@ -195,7 +140,7 @@ class Engine:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
         self._state, is_same = self._spare.of(regular)
-        self.calls.take_copy(regular, self._state, is_same)
+        self.take_copy(regular, self._state, is_same)
         self._state.count[COMPARED] = -1  # components act between regular steps only
         try:
             stop = self.drive(time, regular.steps + most_steps, shorten=True)
@@ -209,11 +154,6 @@ class Engine:
             self._output_state, self._output_time = reached, time
         self._spare.keep(reached)
         return stop
-
-    @property
-    def law(self) -> ContactLaw:
-        """The contact law."""
-        return self.content.law
 
     @property
     def time(self) -> float:
@@ -300,85 +240,16 @@ class Engine:
             for each in self.components:
                 each.contacts_changed(self)
 
-    def set_parameters(self, **changes: Any) -> None:
-        """Replace parameters of steps, by name, from the next step on."""
-        self.parameters = self.parameters._replace(**changes)
-        for name, value in changes.items():
-            self.calls.table.set(name, value)
-        self.calls.program = None
-
-    def set_forces(
-        self,
-        long_range: Sequence[tuple[LongRangeForce, LongRangeSums, Any]],
-        external: Sequence[ExternalForce],
-    ) -> None:
-        """Use other numbers of the same forces from the next step on; loads and contacts stay as they are."""
-        self.long_range, self.external = long_range, external
-        self.content = self.content._replace(
-            pair_forces=[own[1:] for own in long_range],
-            external_forces=[(force.formula, force.numbers()) for force in external],
-        )
-        self.calls.program = None
-
-    def table_of(self, state: State) -> Table:
-        """The table with the present arrays of the state."""
-        return self.calls.table_of(state)
-
-    def memory_for(self, measurement: str, make: Callable[[int], Any]) -> Any:
-        """Memory for a measurement, which `make` makes for a number of grains when it is first needed."""
-        if measurement not in self._memory:
-            self._memory[measurement] = make(len(self._state.grains))
-        return self._memory[measurement]
-
     def uncompiled(self) -> list[str]:
         """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
-        stages = self.stages(self.first_table())
+        stages = self.stages(self.table_for_call())
         compiled = ((table, each, own) for table, each, own in stages if isinstance(each, Stage))
         return list(dict.fromkeys(each.purpose for table, each, own in compiled if not each.is_compiled(table, own)))
 
-    def first_table(self) -> Table:
-        """The table as for a call of the driver, with all parts that stages take."""
-        return self.calls.for_call(self._state, math.inf, 1, False)
-
     def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
-        """All stages that a run may call, each with a table of parts, by default this one, and its parameters."""
-        program = self.calls.program_for(table, self.content, self.parameters)
-        stages = *program.stages.values(), *measuring_stages(self)
-        return [*self.stepper.stages(self, table), *((table, *each) for each in stages)]
-
-    def run_driver(self, driver: Stage, until: float, last: float, shorten: bool = False) -> Stop:
-        """Run a driver with the stages of the simulation, in the present order of the arrays.
-
-        Arrays that overflow are enlarged; returns why it stops otherwise.
-        """
-        state, calls = self._state, self.calls
-        while True:
-            table = calls.for_call(state, until, last, shorten)
-            calls.program_for(table, self.content, self.parameters)
-            stop = calls.run(driver, table, state, len(self.content.pair_forces), partial(self.stages, table))
-            if stop is Stop.CONTACTS_FULL:
-                state.grow("contacts")
-            elif stop is Stop.TABLES_FULL:
-                state.grow_of_components()
-            elif stop is Stop.PAIRS_FULL:
-                found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
-                state.grow("pair_list", int(OVER_ALLOCATION * found))
-            elif stop is Stop.LIST_FULL:
-                state.grow_rows()
-            else:
-                return stop
-
-    @contextlib.contextmanager
-    def heavy_grains(self, state: State) -> Iterator[None]:
-        """While constants of contacts are computed, some grains have a mass that counts as infinite."""
-        index, arrays = self.content.heavy, state.grains.arrays
-        for quantity in (arrays.mass, arrays.inertia):
-            quantity[index] *= HEAVY
-        try:
-            yield
-        finally:
-            for quantity in (arrays.mass, arrays.inertia):
-                quantity[index] /= HEAVY
+        """As `CompiledState.stages`, with those of steps and of measurements."""
+        of_measures = ((table, *each) for each in measuring_stages(self))
+        return [*self.stepper.stages(self, table), *super().stages(table), *of_measures]
 
     def begin(self) -> None:
         """Form contacts between grains that touch at the start, with no energy booked, and compute the first loads."""

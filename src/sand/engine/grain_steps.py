@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,11 @@ from ..compiler.table import Table
 from ..integrate.driver import advance
 from ..integrate.parts import Stop
 
-if TYPE_CHECKING:
-    from .engine import Engine
-
 
 class GrainSteps:
     """Steps of all grains by the compiled driver; base class of other ways to take steps (`rigid.body_steps`).
+
+    Methods take the engine, an `engine.Engine`.
 
     Attributes
     ----------
@@ -31,11 +30,11 @@ class GrainSteps:
         """Such steps for an engine of some of the grains."""
         return self
 
-    def stages(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+    def stages(self, engine: Any, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
         """Stages that a run calls besides those of the program, each with a table of parts and its parameters."""
         return [(table, advance, ())]
 
-    def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
+    def call(self, engine: Any, until: float, last: float, shorten: bool) -> Stop:
         """Take steps up to a time [s] or a step; returns why no more were taken."""
         return engine.run_driver(advance, until, last, shorten)
 
@@ -43,12 +42,12 @@ class GrainSteps:
         """What the summary of a run says of bodies; nothing without any."""
         return {}
 
-    def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def with_missing(self, engine: Any, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The arrays of a saved state; arrays that it lacks are those of the present state."""
         return saved
 
-    def loaded(self, engine: Engine) -> None:
+    def loaded(self, engine: Any) -> None:
         """Called after a state was loaded."""
 
-    def begin(self, engine: Engine) -> None:
+    def begin(self, engine: Any) -> None:
         """Called when the loads were summed at a start, or after a change by the user."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,30 +20,26 @@ from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.respa import clear_long_range_loads
 from ..integrate.stage_list import variant_of
 from ..integrate.stages import NO_STEP, StageNumber, bath_work
-
-if TYPE_CHECKING:
-    from .engine import Engine
+from .compiled_state import CompiledState
 
 
-def measuring_stages(engine: Engine) -> list[tuple[Any, Any]]:
+def measuring_stages(engine: CompiledState) -> list[tuple[Any, Any]]:
     """The stages of all measurements, with their parameters."""
-    shares = np.zeros(len(engine.stored_state.grains))
+    shares, time = np.zeros(len(engine.stored_state.grains)), engine.stored_state.time
     stages: list[tuple[Any, Any]] = [(measure_bodies, (np.zeros((BODY_ROWS, 1)), cluster_arrays(1)))]
     if engine.parameters.settings.on:
         stages.append((energies_stage(engine.law), (np.zeros(len(ENERGIES)),)))
         stages.append((contacts_stage(engine.law), (np.zeros((1, 1)),)))
     stages += [(long_range_energies_for(sums), (numbers, shares)) for _, sums, numbers in engine.long_range]
-    return stages + [
-        (external_energies_for(outer.formula), (outer.numbers(), engine.time, shares)) for outer in engine.external
-    ]
+    return stages + [(external_energies_for(f.formula), (f.numbers(), time, shares)) for f in engine.external]
 
 
-def force_columns(engine: Engine) -> list[str]:
+def force_columns(engine: CompiledState) -> list[str]:
     """Columns of the forces in the ledger."""
     return [*(force.column for force, _, _ in engine.long_range), *(force.name for force in engine.external)]
 
 
-def energies_at_grains(engine: Engine, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
+def energies_at_grains(engine: CompiledState, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """Energy [J] of each grain (N,) by column: half of each pair energy, and the energies of per-grain forces.
 
     Of all forces, or of those with these names; in arrays that the next call uses again.
@@ -62,12 +58,12 @@ def energies_at_grains(engine: Engine, names: Collection[str] | None = None) -> 
     return shares
 
 
-def force_energies(engine: Engine) -> dict[str, float]:
+def force_energies(engine: CompiledState) -> dict[str, float]:
     """Total energy [J] of each long-range and per-grain force, by ledger column."""
     return {name: math.fsum(share.tolist()) for name, share in energies_at_grains(engine).items()}
 
 
-def _add_energies(engine: Engine, state: State, k: int, shares: np.ndarray) -> None:
+def _add_energies(engine: CompiledState, state: State, k: int, shares: np.ndarray) -> None:
     """Add the energies [J] of long-range force k to those of the grains."""
     table, (_, sums, numbers) = engine.table_of(state), engine.long_range[k]
     if sums.energies_need_rounds:
@@ -75,7 +71,7 @@ def _add_energies(engine: Engine, state: State, k: int, shares: np.ndarray) -> N
     long_range_energies_for(sums).run(table, (numbers, shares))
 
 
-def external_energy(engine: Engine, outer: ExternalForce, time: float) -> float:
+def external_energy(engine: CompiledState, outer: ExternalForce, time: float) -> float:
     """Energy [J] of a per-grain force on the grains of the regular state, at a time [s]."""
     state = engine.stored_state
     shares = np.zeros(len(state.grains))
@@ -83,14 +79,14 @@ def external_energy(engine: Engine, outer: ExternalForce, time: float) -> float:
     return math.fsum(shares)
 
 
-def pair_energy(engine: Engine, k: int) -> float:
+def pair_energy(engine: CompiledState, k: int) -> float:
     """Energy [J] of long-range force k in the regular state."""
     shares = np.zeros(len(engine.stored_state.grains))
     _add_energies(engine, engine.stored_state, k, shares)
     return math.fsum(shares)
 
 
-def pair_loads(engine: Engine, k: int) -> np.ndarray:
+def pair_loads(engine: CompiledState, k: int) -> np.ndarray:
     """Forces and torques (2, 3, N) of long-range force k, in the stored order; those of the state stay as they are."""
     state, (_, sums, numbers) = engine.stored_state, engine.long_range[k]
     own = state.long_range
@@ -102,7 +98,7 @@ def pair_loads(engine: Engine, k: int) -> np.ndarray:
     return found
 
 
-def contact_energies(engine: Engine) -> list[float]:
+def contact_energies(engine: CompiledState) -> list[float]:
     """Energies [J] stored by the contacts, see `contact.measure.ENERGIES`."""
     state, results = engine.state, engine.memory_for("contacts", lambda _: (np.zeros(len(ENERGIES)),))
     results[0][:] = 0.0
@@ -113,7 +109,7 @@ def contact_energies(engine: Engine) -> list[float]:
     return list(results[0].tolist())
 
 
-def losses(engine: Engine) -> np.ndarray:
+def losses(engine: CompiledState) -> np.ndarray:
     """Losses [J] up to the time of `state`, in the order of `basics.state.LOST`.
 
     With a bath they include the work in the half kick at the end of the last step (`contact.bath_work`).
@@ -129,7 +125,7 @@ def losses(engine: Engine) -> np.ndarray:
     return found
 
 
-def record_bath_work(engine: Engine, state: State) -> None:
+def record_bath_work(engine: CompiledState, state: State) -> None:
     """Record the work of the bath in the half kick at the end of the last step, if no step follows it."""
     if variant_of(engine.parameters.settings) != THERMAL:
         return
@@ -140,7 +136,7 @@ def record_bath_work(engine: Engine, state: State) -> None:
             stage.run(engine.table_of(state), numbers, NO_STEP)
 
 
-def body_motion(engine: Engine) -> BodyMotion:
+def body_motion(engine: CompiledState) -> BodyMotion:
     """Motion of each body, as `analysis.body_motion` has it."""
     results = engine.memory_for("bodies", lambda n: (np.zeros((BODY_ROWS, n)), cluster_arrays(n)))
     bodies = measure_bodies.run(engine.table_of(engine.state), results)

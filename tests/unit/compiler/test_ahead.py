@@ -54,7 +54,7 @@ PROGRAMS = {
 def stages_of(forces, settings):
     simulation = sand.Simulation(GRAINS, forces, seed=1, **settings)
     engine = simulation._engine
-    found = engine.stages(engine.first_table())
+    found = engine.stages(engine.table_for_call())
     return [each for each in found if isinstance(each[1], Stage)]
 
 
@@ -171,7 +171,7 @@ simulation = sand.Simulation(
     sand.Grains(np.array([[0.0, 0.0, 0.0], [1e-6, 0.0, 0.0]]), 1e-8, sand.IRON), [sand.Contact()]
 )
 engine = simulation._engine
-table = engine.first_table()
+table = engine.table_for_call()
 stages = [(table, each, ()) for each in (remove_broken, gather_stage(False), set_contact_step)]
 ahead.WORTH_HELPERS, ahead.LONGEST_WAIT = 0.0, 60.0
 if "alone" in sys.argv:

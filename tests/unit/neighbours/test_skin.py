@@ -14,7 +14,7 @@ from sand.basics.state import (
     SQUARED_SPEED,
     SQUARED_SPIN,
 )
-from sand.engine import calls
+from sand.engine import compiled_state
 from sand.integrate import task_queue
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.skin import largest_displacement, largest_squared_speeds
@@ -64,7 +64,7 @@ def test_displacements_stay_within_the_skin(monkeypatch, blocks):
 
     Also with loops in blocks for threads.
     """
-    for module in (task_queue, calls):
+    for module in (task_queue, compiled_state):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: blocks)
     sim = dense_gas(margin="5 nm")
     limits = {
@@ -130,14 +130,14 @@ def test_a_pair_that_separates_and_meets_again_is_found():
     seen, every_step = 0, sand.Verlet(far="every step")
     for speed in np.linspace(5.25, 8.25, 13):
         ends = []
-        for number in ("one", "many"):
+        for calls in ("one", "many"):
             index = np.array([[-9.9999e-9, 0.0, 0.0], [9.9999e-9, 0.0, 0.0]])
             velocity = 0.5 * speed * np.sign(index)
             grains = sand.Grains(index, 1e-8, sand.SILICA, velocity=velocity, charge=[6e-18, -6e-18])
             sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], stepping=every_step)
             sim.run(steps=1)
             while sim.state.steps < 400:
-                sim.run(steps=399 if number == "one" else 1)
+                sim.run(steps=399 if calls == "one" else 1)
             ends.append(sim.state.to_arrays())
         seen += bool(sim.state.count[BROKEN] > 0 and sim.state.count[MADE] > 0)
         assert all(np.array_equal(ends[0][name], ends[1][name]) for name in ends[0])

@@ -123,7 +123,7 @@ class BodySteps(GrainSteps):
             (resort_contacts_by_grain, ()),
         ]
         own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
-        of_inner = inner.first_table()
+        of_inner = inner.table_for_call()
         found = [*super().stages(engine, table), *((table, *each) for each in of_bodies)]
         return [*found, *inner.stages(of_inner), *((of_inner, *each) for each in own)]
 
