@@ -10,7 +10,8 @@ from ..basics.grains import Grains
 from ..contact.model import Contact
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas import Gas
-from ..integrate.parts import StepParameters
+from ..integrate.parts import ContactParameters, GasSettings
+from ..integrate.step_control import StepCriteria
 from ..neighbours.search import Neighbours
 from .engine import Engine
 
@@ -25,6 +26,25 @@ class ForcesByType(NamedTuple):
     long_range: list[LongRangeForce]  # the forces that act on at least one grain
     external: list[ExternalForce]
     gas: list[Gas]  # at most one
+
+
+class ForceDependent(NamedTuple):
+    """The fields of `StepParameters` that follow from values of parameters of the forces, which ramps change."""
+
+    settings: ContactParameters
+    gas: GasSettings
+    criteria: StepCriteria
+    flight_limits: Any
+
+
+def forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
+    """The forces of a simulation of these grains by type."""
+    return ForcesByType(
+        next((f for f in forces if isinstance(f, Contact)), None),
+        [f for f in forces if isinstance(f, LongRangeForce) and f.acts_on(grains)],
+        [f for f in forces if isinstance(f, ExternalForce)],
+        [f for f in forces if isinstance(f, Gas)],
+    )
 
 
 class Kind:
@@ -55,7 +75,7 @@ class Kind:
         """The forces that limit the step."""
         return forces
 
-    def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> Any:
+    def flight_limits(self, parameters: ForceDependent, forces: ForcesByType, grains: Grains) -> Any:
         """The run-time numbers of the integrator, also the ones that depend on forces and grains."""
         return parameters.flight_limits
 

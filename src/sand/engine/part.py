@@ -90,8 +90,7 @@ class Part:
 
     def anew(self) -> Part:
         """A part like this for other grains; it shares the threads of this one, as the two never step at once."""
-        prototype = self.prototype.for_state(self.prototype.regular_state)
-        prototype.share_threads(self.prototype)
+        prototype = self.prototype.for_state(self.prototype.regular_state, with_threads=True)
         return Part(prototype, self.steps_are, self.has_bodies)
 
     @property
@@ -171,9 +170,8 @@ class Part:
             made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
         else:
             made.clusters = cluster_arrays(count)
-        engine = given.for_state(made)
-        if uses_task_queue(count) and not self.has_bodies:  # few grains, and bodies, share no work between threads
-            engine.share_threads(given)
+        # few grains, and bodies, share no work between threads
+        engine = given.for_state(made, with_threads=uses_task_queue(count) and not self.has_bodies)
         if len(self._engines) == MOST_ENGINES:
             self._engines.clear()
         self._engines[count] = engine
