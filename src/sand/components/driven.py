@@ -14,9 +14,9 @@ from ..basics.grains import Grains
 from ..basics.settings import List, Settings, Vector, Whole
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
-from ..integrate.hooks import Hook, HookStages
+from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
-from .driven_stage import KICKS_AND_CONTACTS, DrivenArrays, drive
+from .driven_stage import BETWEEN_CYCLES, KICKS_AND_CONTACTS, DrivenArrays, drive
 
 AT_REST = (0.0, 0.0, 0.0)
 
@@ -87,8 +87,6 @@ class DrivenGrains(Component):
             problems.append(f"driven: stepping = '{setup.stepping.name}' cannot drive grains; use sand.Verlet()")
         if setup.neighbours.order == "curve":
             problems.append("driven: neighbours order = 'curve' cannot drive grains; use order = 'as given'")
-        if setup.forces.contact is not None and setup.forces.contact.settling_time is not None:
-            problems.append("driven: contact settling_time acts on whole clusters and cannot be used; remove it")
         return problems
 
     def prepare(self, grains: Grains) -> None:
@@ -104,8 +102,10 @@ class DrivenGrains(Component):
         index, own = np.array(self.heavy(), np.int64), setup.grains.arrays
         vectors = np.ascontiguousarray(velocity), np.ascontiguousarray(spin)
         driven = DrivenArrays(index, *vectors, own.mass[index], own.inertia[index])
-        changed = (Hook.BETWEEN_CYCLES,) if setup.forces.gas else ()
-        return {hook: [(drive, driven)] for hook in (*KICKS_AND_CONTACTS, *changed)}
+        contact = setup.forces.contact
+        changes = setup.forces.gas or (contact is not None and contact.settling_time is not None)
+        hooks = (*KICKS_AND_CONTACTS, *BETWEEN_CYCLES) if changes else KICKS_AND_CONTACTS
+        return {hook: [(drive, driven)] for hook in hooks}
 
     def heavy(self) -> list[int]:
         """Indices of all driven grains."""

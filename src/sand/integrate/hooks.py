@@ -32,7 +32,9 @@ class Hook(IntEnum):
     AFTER_KICK = 9  # velocities, positions and loads are those of the end of the step; its length is scratch[DT]
     END_STEP = 10  # the step is counted: TIME and STEPS are those of its end
     BETWEEN_CYCLES = 11  # after END_STEP, but not within a cycle of r-RESPA: change velocities
-    ENERGIES = 12  # not called by the driver: add energies to an array, for a row of the ledger
+    AFTER_CHANGES = 12  # all stages of BETWEEN_CYCLES have changed velocities
+    ENERGIES = 13  # not called by the driver: add energies to an array, for a row of the ledger
+    END_OF_BODIES = 14  # not called by the driver: awake clusters end a step of rigid bodies; act for any time elapsed
 
 
 HookStages = Mapping[Hook, list[tuple[Any, Any]]]

@@ -37,6 +37,7 @@ from ...basics.state import (
 from ...compiler.stage import PythonStage, Stage
 from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
+from ...integrate.hooks import Hook
 from ...integrate.parts import DT, Stop
 from ...integrate.rigid.awake_clusters import (
     ClusterMeasures,
@@ -47,7 +48,6 @@ from ...integrate.rigid.awake_clusters import (
 )
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
-from ...integrate.stages import finish_gas
 from ..engine import Engine
 from ..grain_steps import GrainSteps
 from ..measures import external_energy
@@ -122,7 +122,6 @@ class BodySteps(GrainSteps):
             (kick_clusters, (self._remainder,)),
             (resort_contacts_by_grain, ()),
         ]
-        own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
         of_inner = inner.table_for_call()
         found = [*super().stages(engine, table), *((table, *each) for each in of_bodies)]
         return [*found, *inner.stages(of_inner), *((of_inner, *each) for each in own)]
@@ -281,8 +280,8 @@ class BodySteps(GrainSteps):
             stop = inner.drive(end, math.inf, shorten=True)
         if stop is not Stop.TIME_REACHED:
             return stop
-        if engine.parameters.gas.gas.on:  # since their last kick, so that none is left for the next step
-            finish_gas.run(inner.table_of(present))
+        for stage, numbers in inner.content.of_components.get(Hook.END_OF_BODIES, ()):
+            stage.run(inner.table_of(present), numbers)
         self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
         self.part.give_back(state)
         self._columns = self.part.columns
