@@ -86,17 +86,8 @@ class Frame:
 
 
 OF_GRAINS = (
-    "position",
-    "velocity",
-    "spin",
-    "moment",
-    "orientation",
-    "radius",
-    "mass",
-    "charge",
-    "material",
-    "image",
-    REST,
+    *("position", "velocity", "spin", "moment", "orientation", "radius", "mass", "charge"),
+    *("material", "image", REST),
 )
 OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
 
