@@ -12,6 +12,7 @@ Tiers (the last line of a run says which were left out and how to run them):
 from __future__ import annotations
 
 import compileall
+import gc
 import signal
 import warnings
 from collections import Counter
@@ -36,6 +37,9 @@ from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E4
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# numba and the collected tests are millions of objects that stay: looking through them often costs a tenth of a run
+gc.set_threshold(20_000, 10, 10)
 
 TESTS = Path(__file__).parent
 FOLDERS = ("browser", "peers")
