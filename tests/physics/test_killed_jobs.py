@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from sand.cli.exits import BAD_INPUT, DONE, INTERRUPTED
 from sand.cli.main import main
@@ -44,11 +43,11 @@ seeds = [1, 2, 3, 4, 5, 6]
     "collide": """
 [target]
 kind = "bpca"
-grains = 12
+grains = 6
 radius = "0.1 um"
 [projectile]
 kind = "bpca"
-grains = 6
+grains = 3
 radius = "0.1 um"
 [impact]
 speed = "3 m/s"
@@ -191,12 +190,10 @@ def stop_and_check(job, folder, way):
 
 @pytest.mark.parametrize(
     ("command", "way"),
-    [("grow", "Ctrl-C"), ("collide", "parent killed"), ("scatter", "SIGTERM"), ("grow", "worker killed")],
+    [("grow", "worker killed"), ("collide", "parent killed"), ("scatter", "Ctrl-C")],
 )
-def test_stopped_once(tmp_path, monkeypatch, command, way):
+def test_stopped_once(tmp_path, command, way):
     """After its first results; the resumed job has the results of an undisturbed one in a single process."""
-    for figure in ("collisions.collision_figure", "scattering.sigma_figure"):
-        monkeypatch.setattr(f"sand.plotting.{figure}", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
     case, folder, undisturbed = (tmp_path / name for name in ("case.toml", "job", "undisturbed"))
     case.write_text(CASES[command])
     assert main([command, str(case), "--out", str(undisturbed), "--workers", "1", "--quiet"]) == DONE
