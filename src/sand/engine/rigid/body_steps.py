@@ -48,8 +48,7 @@ from ...integrate.rigid.awake_clusters import (
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
 from ...integrate.stages import finish_gas
-from ..engine import Engine
-from ..grain_steps import GrainSteps
+from ..engine import Engine, GrainSteps
 from ..measures import external_energy
 from ..part import MOVING, Part
 from .cluster_bodies import (
