@@ -28,10 +28,17 @@ from .component import Component, Setup
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps, with_contacts
 from .input_checks import check_system
-from .kinds import Kind, forces_by_type
+from .kinds import Kind
 from .new_state import new_state
 from .rigid.assembly import BodiesKind
-from .step_parameters import external_work, force_dependent, longest_displacement, respa_settings, step_criteria
+from .step_parameters import (
+    external_work,
+    force_dependent,
+    forces_by_type,
+    longest_displacement,
+    respa_settings,
+    step_criteria,
+)
 
 KINDS: dict[str, type[Kind]] = {each.integrator: each for each in (BodiesKind,)}
 """Kinds of engines that are not those of grains, by the name of their integrator."""

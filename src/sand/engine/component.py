@@ -18,7 +18,7 @@ from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
 from .engine import Engine
-from .kinds import ForcesByType
+from .step_parameters import ForcesByType
 
 NO_PAIRS = np.zeros((0, 2), np.int64)
 

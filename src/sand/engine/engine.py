@@ -234,11 +234,10 @@ class Engine(CompiledState):
             self._update_components()
             change = min((each.next_time(self) for each in self.components), default=math.inf)
             stop = self._advance(min(until, change), last - self.steps)
-            if (
-                stop is Stop.TIME_REACHED and self.stored_state.time < change < until
-            ):  # the step or cycle that passes it
+            reached = stop is Stop.TIME_REACHED and change < until
+            if reached and self.stored_state.time < change:  # the step or cycle that passes it
                 stop = self._advance(until, min(1, last - self.steps))
-            if stop is Stop.TIME_REACHED and change <= self.stored_state.time < until:
+            if reached and stop is Stop.TIME_REACHED and change <= self.stored_state.time < until:
                 stop = Stop.NONE
             if stop is not Stop.NONE or self.steps >= last:
                 if stop in (Stop.NONE, Stop.TIME_REACHED):
