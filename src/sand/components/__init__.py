@@ -19,15 +19,12 @@ from .ramps import Ramps
 from .settling import Settling
 from .walls import Walls, read_walls
 
-COMPONENTS: tuple[type[Component], ...] = (
-    ClusterCutoff,
-    Ramps,  # of all parameters, the ones that others use included
-    Walls,
-    GasKicks,  # between two cycles each grain moves in the gas,
-    DrivenGrains,  # driven ones return to their prescribed motion,
-    Settling,  # and what remains is the motion of clusters, and that of their grains relative to it
-)
-"""All components, in the order in which they act at the same place."""
+COMPONENTS: tuple[type[Component], ...] = (ClusterCutoff, Ramps, Walls, GasKicks, DrivenGrains, Settling)
+"""All components, in the order in which they act at the same place.
+
+Between two cycles each grain moves in the gas, then driven grains return to their prescribed motion, and what settling
+finds is the motion of clusters, and that of their grains relative to it.
+"""
 GIVEN = {"walls": read_walls, "driven": read_driven}
 """What reads a component that the user gives, by keyword of `sand.Simulation`, which is the table of case files."""
 

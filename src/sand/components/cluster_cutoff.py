@@ -34,10 +34,10 @@ from ..basics.units import format_quantity
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
 from ..engine.engine import Engine
-from ..engine.kinds import ForcesByType
 from ..engine.measures import pair_energy, pair_loads
+from ..engine.step_parameters import ForcesByType
 from ..forces.base import Force
-from ..forces.pair.cutoff import HALF_BOX_RATIO, CutoffChoice
+from ..forces.pair.cutoff import HALF_BOX_RATIO
 from ..forces.pair.dipoles import CAPTURE_RADII, CapturingPair, Dipoles, capturing_pair
 from ..integrate.parts import ContactParameters
 
@@ -63,10 +63,6 @@ class ClusterCutoff(Component):
 
     name = "cluster_cutoff"
     watches_contacts: ClassVar[bool] = True
-
-    largest: float
-    first: CutoffChoice
-    values: np.ndarray
 
     @classmethod
     def of(cls, forces: Sequence[Force], grains: Grains, box: Box) -> Self:

@@ -16,7 +16,7 @@ from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
 from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
-from .driven_stage import BETWEEN_CYCLES, KICKS_AND_CONTACTS, DrivenArrays, drive
+from .driven_stage import CHANGES, CONTACTS, KICKS, DrivenArrays, drive
 
 AT_REST = (0.0, 0.0, 0.0)
 
@@ -27,7 +27,8 @@ class Driven(Settings):
     """Grains with prescribed velocity and spin, by default held at rest.
 
     Their contacts and all forces on other grains act as usual; loads on them do not change their motion, as if mass and
-    moment of inertia were infinite. The work of the drive is recorded in `lost_outside`.
+    moment of inertia were infinite. The work of the drive is recorded in `lost_outside`. Settling
+    (`Contact.settling_time`) of their clusters leads to their rigid motion.
 
     Parameters
     ----------
@@ -102,9 +103,8 @@ class DrivenGrains(Component):
         index, own = np.array(self.heavy(), np.int64), setup.grains.arrays
         vectors = np.ascontiguousarray(velocity), np.ascontiguousarray(spin)
         driven = DrivenArrays(index, *vectors, own.mass[index], own.inertia[index])
-        contact = setup.forces.contact
-        changes = setup.forces.gas or (contact is not None and contact.settling_time is not None)
-        hooks = (*KICKS_AND_CONTACTS, *BETWEEN_CYCLES) if changes else KICKS_AND_CONTACTS
+        changes = setup.forces.gas or getattr(setup.forces.contact, "settling_time", None) is not None
+        hooks = (*KICKS, *CONTACTS, *CHANGES) if changes else (*KICKS, *CONTACTS)
         return {hook: [(drive, driven)] for hook in hooks}
 
     def heavy(self) -> list[int]:

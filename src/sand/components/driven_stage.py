@@ -97,10 +97,6 @@ def drive(grains, lost, scratch, parameters, block):
     return 0
 
 
-KICKS_AND_CONTACTS = (
-    *(Hook.BEFORE_DRIFT, Hook.AFTER_DRIFT, Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS),
-    *(Hook.BEFORE_KICK, Hook.AFTER_KICK),
-)
-"""Where driven grains are held and released."""
-BETWEEN_CYCLES = Hook.BETWEEN_CYCLES, Hook.AFTER_CHANGES
-"""The same, if a gas or settling changes velocities."""
+KICKS = Hook.BEFORE_DRIFT, Hook.AFTER_DRIFT, Hook.BEFORE_KICK, Hook.AFTER_KICK
+CONTACTS, CHANGES = (Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS), (Hook.BETWEEN_CYCLES, Hook.AFTER_CHANGES)
+"""Where driven grains are held and released; in CHANGES if a gas or settling changes velocities."""

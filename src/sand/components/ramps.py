@@ -41,7 +41,7 @@ class Ramps(Component):
 
     def next_time(self, engine: Engine) -> float:
         """Next time [s] at which a parameter changes, or infinity."""
-        return min(ramp.next_change(engine.regular_time) for ramp in self._ramps)
+        return min(ramp.next_change(engine.stored_state.time) for ramp in self._ramps)
 
     def begin(self, engine: Engine) -> None:
         """Give parameters their values at the time of the regular state; loads and contacts stay as they are."""

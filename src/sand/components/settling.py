@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar
 
 from ..basics.arrays import cluster_arrays
-from ..basics.box import Box
-from ..basics.grains import Grains
 from ..basics.state import CYCLE, SETTLED, SETTLING, STEP, TIME, State
 from ..compiler.stage import stage
 from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
-from ..engine.component import Component, Setup
+from ..engine.component import Component
 from ..forces.base import Force
 from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import ContactParameters
@@ -32,20 +29,19 @@ def settle(grains, contacts, clusters, clock, lost, span, settings):
 
 
 class Settling(Component):
-    """Settling of clusters; its item is the contact model, and what it removes is `lost_settling`."""
+    """Settling of clusters; its item is the contact model, and what it removes is `lost_settling`.
+
+    With driven grains in a cluster, it leads to the rigid motion of these.
+    """
 
     name = "settling"
     in_parts = True
-    last_action = SETTLED
+    own_stages: ClassVar[HookStages] = {Hook.BETWEEN_CYCLES: [(settle, ())]}
 
-    @classmethod
-    def of(cls, forces: Sequence[Force], grains: Grains, box: Box) -> Self:
-        """The contact model, if it has a settling time."""
-        return cls([f for f in forces if isinstance(f, Contact) and f.settling_time is not None])
-
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
-        """The settling."""
-        return {Hook.BETWEEN_CYCLES: [(settle, ())]}
+    @staticmethod
+    def follows_from(force: Force) -> bool:
+        """Whether this is a contact model with a settling time."""
+        return isinstance(force, Contact) and force.settling_time is not None
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the memory for one cluster at a time."""

@@ -17,9 +17,8 @@ from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import COMPARED
 from ..contact.model import Contact
-from ..forces.base import Force, LongRangeForce
+from ..forces.base import Force
 from ..forces.pair.ewald_force import EwaldForce
-from ..forces.pair.long_range_loops import LongRangeSums
 from ..integrate.hooks import Hook
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ForceNumbers, StepParameters
@@ -30,10 +29,17 @@ from .component import Component, Setup
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps, with_contacts
 from .input_checks import check_system
-from .kinds import ForcesByType, Kind, forces_by_type
+from .kinds import Kind
 from .new_state import new_state
 from .rigid.assembly import BodiesKind
-from .step_parameters import external_work, force_dependent, longest_displacement, respa_settings, step_criteria
+from .step_parameters import (
+    external_work,
+    force_dependent,
+    forces_by_type,
+    longest_displacement,
+    respa_settings,
+    step_criteria,
+)
 
 KINDS: dict[str, type[Kind]] = {each.integrator: each for each in (BodiesKind,)}
 """Kinds of engines that are not those of grains, by the name of their integrator."""
@@ -97,7 +103,8 @@ def build_engine(
     cutoffs = [force.choose(grains, box).radius for force in by_type.long_range]
     found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], long_steps=flights)
     listed = [found.search.listed and r is not None for r in cutoffs]
-    long_range = _long_range_loops(by_type, grains, box, listed)
+    loops = [f.sums(box, own, grains) for f, own in zip(by_type.long_range, listed, strict=True)]
+    long_range = [(f, own, f.numbers(grains, box)) for f, own in zip(by_type.long_range, loops, strict=True)]
     uniform = not any(each.own_columns for each in extra)
     stepping = stepping.resolved(grains, step_criteria(grains, verlet, kind.limiting_forces(by_type), pair_gap))
     limits = stepping.flight_limits(grains, longest_displacement(grains, box, found))
@@ -119,7 +126,7 @@ def build_engine(
             of_components.setdefault(hook, []).extend(stages)
     content = ProgramContent(
         law=law,
-        pair_forces=[(sums, numbers) for _, sums, numbers in long_range],
+        pair_forces=[own[1:] for own in long_range],
         external_forces=[(force.formula, force.numbers()) for force in by_type.external],
         flight=stepping.flight,
         magnetic=bool(grains.body_moment.any()),
@@ -128,7 +135,7 @@ def build_engine(
         heavy=np.array([i for each in extra for i in each.heavy()], np.int64),
     )
     capacity = int(OVER_ALLOCATION * len(touching))
-    over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
+    over_all_pairs = any(not own and not sums.own_memory for own, sums in zip(listed, loops, strict=True))
     state = new_state(wrapped, box, parameters, content, capacity, over_all_pairs=over_all_pairs)
     state.count[COMPARED] = 0 if any(each.watches_contacts for each in extra) else -1
     for each in extra:
@@ -178,11 +185,3 @@ def fitting_forces(forces: tuple[Force, ...], stepping: Integrator) -> tuple[For
 
     taylor = stepping.contact_stepping.far.startswith("taylor")
     return tuple(map(fitted, forces)) if taylor and any(isinstance(force, Contact) for force in forces) else forces
-
-
-def _long_range_loops(
-    forces: ForcesByType, grains: Grains, box: Box, listed: Sequence[bool]
-) -> list[tuple[LongRangeForce, LongRangeSums, Any]]:
-    """Long-range forces with their loops and numbers."""
-    sums = [force.sums(box, own, grains) for force, own in zip(forces.long_range, listed, strict=True)]
-    return [(force, own, force.numbers(grains, box)) for force, own in zip(forces.long_range, sums, strict=True)]

@@ -60,6 +60,8 @@ class CompiledState:
 
     Attributes
     ----------
+    stored_state : State
+        The regular state in the present order of its arrays.
     parameters : StepParameters
         Settings of the run, as the stages take them.
     content : ProgramContent
@@ -78,7 +80,7 @@ class CompiledState:
         Whether the first call compiles what the run needs side by side; not in engines of parts.
     """
 
-    _state: State
+    stored_state: State
     parameters: StepParameters
     content: ProgramContent
     external: Sequence[ExternalForce]
@@ -96,39 +98,34 @@ class CompiledState:
     _queue_size: tuple[int, int] = field(init=False, default=(0, 0))  # grains and contacts that it is for
 
     def __post_init__(self) -> None:
-        names = *PARTS, *self._state.of_components
+        names = *PARTS, *self.stored_state.of_components
         self.table, self._copy_table = Table(names), Table(names)
         for name, value in self.parameters._asdict().items():
             self.table.set(name, value)
         self.table.set("scratch", np.zeros(SCRATCH))
-        if uses_task_queue(len(self._state.grains)):
+        if uses_task_queue(len(self.stored_state.grains)):
             self.workers = WorkerThreads(take_blocks)
 
     @property
     def regular_state(self) -> State:
         """The state after the last regular step, from which the run continues; grains in the user's order."""
         self.restore_user_order()
-        return self._state
+        return self.stored_state
 
     @regular_state.setter
     def regular_state(self, other: State) -> None:
         """Continue from another state, in the user's order, with the next step."""
-        self._state, self._is_sorted = other, False
+        self.stored_state, self._is_sorted = other, False
 
     @property
     def state(self) -> State:
         """The state that is measured."""
         return self.regular_state
 
-    @property
-    def stored_state(self) -> State:
-        """The regular state in the present order of its arrays."""
-        return self._state
-
     def restore_user_order(self) -> None:
         """Undo the spatial sorting of the arrays, until the next step."""
         if self._is_sorted:
-            reorder_grains(self._state, inverse(self._state.order))
+            reorder_grains(self.stored_state, inverse(self.stored_state.order))
             self._is_sorted = False
 
     @property
@@ -154,7 +151,7 @@ class CompiledState:
 
     def table_for_call(self, until: float = np.inf, last: float = 1, *, shorten: bool = False) -> Table:
         """The table as for a call of the driver, with all parts that stages take."""
-        state, table = self._state, self.table_of(self._state)
+        state, table = self.stored_state, self.table_of(self.stored_state)
         queue = self._task_queue(len(state.grains), state.contacts.flag.size)
         for name, value in (("queue", queue), ("until", float(until)), ("last", int(last)), ("shorten", shorten)):
             table.set(name, value)
@@ -190,7 +187,7 @@ class CompiledState:
 
         Arrays that overflow are enlarged; returns why it stops otherwise.
         """
-        state = self._state
+        state = self.stored_state
         while True:
             stop = self._call_driver(driver, self.table_for_call(until, last, shorten=shorten))
             if stop is Stop.CONTACTS_FULL:
@@ -207,7 +204,7 @@ class CompiledState:
 
     def _call_driver(self, driver: Stage, table: Table) -> Stop:
         """One call of a driver, with the table of `table_for_call`."""
-        state, workers = self._state, self.workers
+        state, workers = self.stored_state, self.workers
         try:
             if self.compiles_ahead:
                 self.compiles_ahead = False
@@ -244,7 +241,7 @@ class CompiledState:
     def memory_for(self, measurement: str, make: Callable[[int], Any]) -> Any:
         """Memory for a measurement, which `make` makes for a number of grains when it is first needed."""
         if measurement not in self._memory:
-            self._memory[measurement] = make(len(self._state.grains))
+            self._memory[measurement] = make(len(self.stored_state.grains))
         return self._memory[measurement]
 
     @contextlib.contextmanager

@@ -20,7 +20,7 @@ from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
 from .engine import Engine
-from .kinds import ForcesByType
+from .step_parameters import ForcesByType
 
 NO_PAIRS = np.zeros((0, 2), np.int64)
 
@@ -67,6 +67,8 @@ class Component:
         Whether it also acts on grains of awake clusters within a step of rigid bodies.
     last_action : int or None
         Entry of the clock with the time of its last action, which is the present one when a change adds it.
+    own_stages : HookStages
+        Its stages, if they are the same in all simulations.
     groups : Mapping[str, type]
         Groups of its arrays (`basics.array_groups`) by name: parts of a simulation that stages take by this name,
         `State.of_components`, and its arrays in a checkpoint.
@@ -82,6 +84,7 @@ class Component:
     watches_contacts: ClassVar[bool] = False
     in_parts: ClassVar[bool] = False
     last_action: ClassVar[int | None] = None
+    own_stages: ClassVar[HookStages] = {}
     groups: ClassVar[Mapping[str, type]] = {}
 
     def __init__(self, items: Sequence[Any]):
@@ -90,7 +93,12 @@ class Component:
     @classmethod
     def of(cls, forces: Sequence[Force], grains: Grains, box: Box) -> Self:
         """What there is of it for these forces, grains and box."""
-        return cls(())
+        return cls([force for force in forces if cls.follows_from(force)])
+
+    @staticmethod
+    def follows_from(force: Force) -> bool:
+        """Whether there is such a component because of this force."""
+        return False
 
     def problems(self, setup: Setup) -> list[str]:
         """Why it does not fit to the other parts of a simulation, a sentence each."""
@@ -104,8 +112,8 @@ class Component:
         return forces
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
-        """Stages that the driver calls at each place of a step, with their parameters."""
-        return {}
+        """Stages that the driver calls at each place of a step, with their parameters: by default, `own_stages`."""
+        return self.own_stages
 
     def heavy(self) -> list[int]:
         """Grains whose mass counts as infinite in contacts."""

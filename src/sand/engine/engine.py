@@ -41,6 +41,7 @@ from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
 from ..forces.base import Force
+from ..integrate.driver import advance
 from ..integrate.integrator import Integrator
 from ..integrate.parts import Stop
 from ..integrate.step_control import INCREASE_INTERVAL, is_past
@@ -48,8 +49,45 @@ from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.search import Neighbours
 from ..neighbours.spatial_sort import SORT_INTERVAL, reorder_grains, sort_contacts_and_pairs, spatial_order
 from .compiled_state import CompiledState
-from .grain_steps import GrainSteps
 from .measures import measuring_stages, record_bath_work
+
+
+class GrainSteps:
+    """Steps of all grains by the compiled driver; base class of other ways to take steps (`rigid.body_steps`).
+
+    Attributes
+    ----------
+    seconds : float
+        Processor time [s] of steps within the steps that are counted.
+    """
+
+    seconds: float = 0.0
+
+    def for_part(self) -> GrainSteps:
+        """Such steps for an engine of some of the grains."""
+        return self
+
+    def stages(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Stages that a run calls besides those of the program, each with a table of parts and its parameters."""
+        return [(table, advance, ())]
+
+    def call(self, engine: Engine, until: float, last: float, shorten: bool) -> Stop:
+        """Take steps up to a time [s] or a step; returns why no more were taken."""
+        return engine.run_driver(advance, until, last, shorten)
+
+    def summary(self, state: State) -> dict[str, Any]:
+        """What the summary of a run says of bodies; nothing without any."""
+        return {}
+
+    def with_missing(self, engine: Engine, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """The arrays of a saved state; arrays that it lacks are those of the present state."""
+        return saved
+
+    def loaded(self, engine: Engine) -> None:
+        """Called after a state was loaded."""
+
+    def begin(self, engine: Engine) -> None:
+        """Called when the loads were summed at a start, or after a change by the user."""
 
 
 @dataclass
@@ -99,14 +137,14 @@ class Engine(CompiledState):
 
         `with_threads`: it uses the threads of this one, as the two never step at once; otherwise no others.
         """
-        made = replace(self, _state=state, stepper=self.stepper.for_part())
+        made = replace(self, stored_state=state, stepper=self.stepper.for_part())
         made.workers, made.compiles_ahead = self.workers if with_threads else None, False
         return made
 
     @property
     def state(self) -> State:
         """The state at the last time of `go_to`, otherwise the regular state; grains in the user's order."""
-        if self._output_time is not None and self._output_state is None and self._output_time != self._state.time:
+        if self._output_time is not None and self._output_state is None and self._output_time != self.stored_state.time:
             self.go_to(self._output_time)  # of a checkpoint
         return self.regular_state if self._output_state is None else self._output_state
 
@@ -120,17 +158,17 @@ class Engine(CompiledState):
         step, which may end there too, is tried first.
         """
         while True:
-            stop = self._shorten_copy(time, self._state, 1)
+            stop = self._shorten_copy(time, self.stored_state, 1)
             if stop is Stop.TIME_REACHED:
                 return stop
-            before, is_sorted = self._state.copy(), self._is_sorted
-            compared, self._state.count[COMPARED] = self._state.count[COMPARED], -1
+            before, is_sorted = self.stored_state.copy(), self._is_sorted
+            compared, self.stored_state.count[COMPARED] = self.stored_state.count[COMPARED], -1
             regular = self._advance(math.inf, 1)
-            self._state.count[COMPARED] = compared  # if the step is kept, components act in the next `advance`
+            self.stored_state.count[COMPARED] = compared  # if the step is kept, components act in the next `advance`
             if regular is not Stop.NONE:
                 return regular
-            if is_past(self._state.time, time):  # only the shorter step ended before: go on with shorter steps
-                self._state, self._is_sorted = before, is_sorted
+            if is_past(self.stored_state.time, time):  # only the shorter step ended before: go on with shorter steps
+                self.stored_state, self._is_sorted = before, is_sorted
                 return self._shorten_copy(time, before, math.inf)
             stop = self.advance(time, max(last - self.steps, 0))
             if stop is not Stop.TIME_REACHED:
@@ -139,14 +177,14 @@ class Engine(CompiledState):
     def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
-        self._state, is_same = self._spare.of(regular)
-        self.take_copy(regular, self._state, is_same)
-        self._state.count[COMPARED] = -1  # components act between regular steps only
+        self.stored_state, is_same = self._spare.of(regular)
+        self.take_copy(regular, self.stored_state, is_same)
+        self.stored_state.count[COMPARED] = -1  # components act between regular steps only
         try:
             stop = self.drive(time, regular.steps + most_steps, shorten=True)
             reached = self.regular_state
         finally:
-            self._state, self._is_sorted = regular, is_sorted
+            self.stored_state, self._is_sorted = regular, is_sorted
         if stop is Stop.TIME_REACHED:
             reached.clock[TIME] = time
             for index in (STEPS, LONG_RANGE_SUMS, REBUILT, LISTED, REJECTED, COMPARED):
@@ -158,36 +196,31 @@ class Engine(CompiledState):
     @property
     def time(self) -> float:
         """Time of `state` [s]."""
-        return self._state.time if self._output_time is None else self._output_time
-
-    @property
-    def regular_time(self) -> float:
-        """Time of the regular state [s]."""
-        return self._state.time
+        return self.stored_state.time if self._output_time is None else self._output_time
 
     @property
     def steps(self) -> int:
         """Number of steps taken so far."""
-        return self._state.steps
+        return self.stored_state.steps
 
     @property
     def awake_work(self) -> tuple[int, int, float]:
         """Contact steps and substeps within steps of bodies, and the processor time [s] of all work on these."""
-        count = self._state.count
+        count = self.stored_state.count
         return int(count[CONTACT_STEPS]), int(count[SUBSTEPS]), self.stepper.seconds
 
     def sort_in_space(self) -> None:
         """Bring the arrays into Morton order, if they are sorted; it is renewed every `SORT_INTERVAL` steps."""
-        if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
+        if not self.neighbours.uses_spatial_sort(len(self.stored_state.grains)):
             return
-        if not self._state.order.size or self.steps >= self._state.count[ORDERED] + SORT_INTERVAL:
+        if not self.stored_state.order.size or self.steps >= self.stored_state.count[ORDERED] + SORT_INTERVAL:
             state = self.regular_state
             state.order, state.count[ORDERED] = spatial_order(state), state.steps
             reorder_grains(state, state.order)
             sort_contacts_and_pairs(state)
             self.rebuild_list()
         elif not self._is_sorted:
-            reorder_grains(self._state, self._state.order)
+            reorder_grains(self.stored_state, self.stored_state.order)
         self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
@@ -201,9 +234,10 @@ class Engine(CompiledState):
             self._update_components()
             change = min((each.next_time(self) for each in self.components), default=math.inf)
             stop = self._advance(min(until, change), last - self.steps)
-            if stop is Stop.TIME_REACHED and self._state.time < change < until:  # the step or cycle that passes it
+            reached = stop is Stop.TIME_REACHED and change < until
+            if reached and self.stored_state.time < change:  # the step or cycle that passes it
                 stop = self._advance(until, min(1, last - self.steps))
-            if stop is Stop.TIME_REACHED and change <= self._state.time < until:
+            if reached and stop is Stop.TIME_REACHED and change <= self.stored_state.time < until:
                 stop = Stop.NONE
             if stop is not Stop.NONE or self.steps >= last:
                 if stop in (Stop.NONE, Stop.TIME_REACHED):
@@ -218,12 +252,12 @@ class Engine(CompiledState):
         """As `advance`, without an update of components."""
         self._output_state = self._output_time = None
         last = self.steps + most_steps
-        if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
+        if not self.neighbours.uses_spatial_sort(len(self.stored_state.grains)):
             return self.drive(until, last)
         while True:
-            if self._state.time < until and self.steps < last:
+            if self.stored_state.time < until and self.steps < last:
                 self.sort_in_space()
-            renewed = self._state.count[ORDERED] + SORT_INTERVAL
+            renewed = self.stored_state.count[ORDERED] + SORT_INTERVAL
             stop = self.drive(until, min(last, renewed))
             if not (stop is Stop.NONE and renewed <= self.steps < last):
                 return stop
@@ -235,7 +269,7 @@ class Engine(CompiledState):
             stop = self.stepper.call(self, until, last, shorten)
             if stop is not Stop.CLUSTERS_CHANGED:
                 return stop
-            count = self._state.count
+            count = self.stored_state.count
             count[COMPARED] = count[MADE] + count[BROKEN]
             for each in self.components:
                 each.contacts_changed(self)
@@ -271,7 +305,7 @@ class Engine(CompiledState):
 
     def sum_loads(self) -> None:
         """Sum the loads anew by the second half of a step of 0 s, in the present order of the arrays."""
-        state = self._state
+        state = self.stored_state
         steps, sums = state.steps, int(state.count[LONG_RANGE_SUMS])
         record_bath_work(self, state)  # the loads that follow have no noise
         state.count[STAGE] = 1
@@ -299,13 +333,13 @@ class Engine(CompiledState):
 
     def rebuild_list(self) -> None:
         """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
-        state, search = self._state, self.parameters.search
+        state, search = self.stored_state, self.parameters.search
         while search.listed and rebuild_verlet_list(state.long_range, state.box.span, search.reach) == FULL:
             state.grow_rows()
 
     def _list_lasts(self) -> bool:
         """Whether no grain is more than half the margin of the Verlet list from its reference position."""
-        state = self._state
+        state = self.stored_state
         if not np.isfinite(state.long_range.anchor).all():
             return False
         moved = state.box.nearest((state.grains.arrays.position - state.long_range.anchor).T)

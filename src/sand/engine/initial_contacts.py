@@ -68,27 +68,20 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedCont
     given = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
     if len(given) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
         raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
-    wrong = _add_to_state(engine, pair, contacts)
+    state, law, settings = engine.state, engine.law, engine.parameters.settings
+    if state.contacts.pair.shape[1] < len(pair):
+        state.grow("contacts", len(pair))
+    vectors = (np.ascontiguousarray(np.transpose(array), dtype=np.float64) for array in contacts[1:])
+    initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
+    arrays = state.grains.arrays, state.contacts, state.count
+    with engine.heavy_grains(state):
+        wrong = forming_loops(law).add_initial(*arrays, state.box.span, settings, initial)
     if wrong >= 0:
         i, j = pair[wrong]
         raise BadInput(
             f"the contact of grains {i} and {j} is stretched beyond its breaking point for these materials and radii"
         )
     return given
-
-
-def _add_to_state(engine: Engine, pair: np.ndarray, contacts: StrainedContacts) -> int:
-    """Add contacts before the first step; the first that is stretched beyond its breaking point, or −1."""
-    state = engine.state
-    if state.contacts.pair.shape[1] < len(pair):
-        state.grow("contacts", len(pair))
-    vectors = (
-        np.ascontiguousarray(array.T, dtype=np.float64) for array in (contacts.slide, contacts.roll, contacts.twist)
-    )
-    initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
-    arrays, settings = (state.grains.arrays, state.contacts, state.count), engine.parameters.settings
-    with engine.heavy_grains(state):
-        return forming_loops(engine.law).add_initial(*arrays, state.box.span, settings, initial)
 
 
 def refuse_overlaps(

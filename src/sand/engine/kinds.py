@@ -3,48 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from ..basics.box import Box
 from ..basics.grains import Grains
-from ..contact.model import Contact
-from ..forces.base import ExternalForce, Force, LongRangeForce
-from ..forces.gas import Gas
-from ..integrate.parts import ContactParameters, GasSettings
-from ..integrate.step_control import StepCriteria
+from ..forces.base import Force
 from ..neighbours.search import Neighbours
 from .engine import Engine
+from .step_parameters import ForceDependent, ForcesByType
 
 Build = Callable[[Sequence[Force], Neighbours], Engine]
 """Builds an engine of the same grains with other forces, whose grains take contact steps."""
-
-
-class ForcesByType(NamedTuple):
-    """The forces of a simulation by type."""
-
-    contact: Contact | None
-    long_range: list[LongRangeForce]  # the forces that act on at least one grain
-    external: list[ExternalForce]
-    gas: list[Gas]  # at most one
-
-
-class ForceDependent(NamedTuple):
-    """The fields of `StepParameters` that follow from values of parameters of the forces, which ramps change."""
-
-    settings: ContactParameters
-    gas: GasSettings
-    criteria: StepCriteria
-    flight_limits: Any
-
-
-def forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
-    """The forces of a simulation of these grains by type."""
-    return ForcesByType(
-        next((f for f in forces if isinstance(f, Contact)), None),
-        [f for f in forces if isinstance(f, LongRangeForce) and f.acts_on(grains)],
-        [f for f in forces if isinstance(f, ExternalForce)],
-        [f for f in forces if isinstance(f, Gas)],
-    )
 
 
 class Kind:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
@@ -20,7 +20,6 @@ from ..integrate.parts import ContactParameters, ExternalWork, GasSettings, Resp
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
 from ..neighbours.search import ChosenSearch
-from .kinds import ForceDependent, ForcesByType, Kind, forces_by_type
 
 IDLE = 1e5
 """Longest step in sound-crossing times of a grain, where nothing else limits the step."""
@@ -32,11 +31,39 @@ h²/12τ², at most 4e-4.
 """
 
 
+class ForcesByType(NamedTuple):
+    """The forces of a simulation by type."""
+
+    contact: Contact | None
+    long_range: list[LongRangeForce]  # the forces that act on at least one grain
+    external: list[ExternalForce]
+    gas: list[Gas]  # at most one
+
+
+class ForceDependent(NamedTuple):
+    """The fields of `StepParameters` that follow from values of parameters of the forces, which ramps change."""
+
+    settings: ContactParameters
+    gas: GasSettings
+    criteria: StepCriteria
+    flight_limits: Any
+
+
+def forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
+    """The forces of a simulation of these grains by type."""
+    return ForcesByType(
+        next((f for f in forces if isinstance(f, Contact)), None),
+        [f for f in forces if isinstance(f, LongRangeForce) and f.acts_on(grains)],
+        [f for f in forces if isinstance(f, ExternalForce)],
+        [f for f in forces if isinstance(f, Gas)],
+    )
+
+
 def force_dependent(
     forces: Sequence[Force],
     grains: Grains,
     *,
-    kind: Kind,
+    kind: Any,
     verlet: Verlet,
     seed: int,
     pair_gap: float,
@@ -47,7 +74,7 @@ def force_dependent(
 
     Parameters
     ----------
-    kind : Kind
+    kind : kinds.Kind
         Kind of engine.
     verlet : Verlet
         Settings of contact steps.

@@ -178,16 +178,8 @@ class Simulation(ReadOnlySettings):
         arrays, meta = ({}, {}) if restart is None else restart
         is_new = restart is None
         self._engine = engine = build_engine(*parts, fresh=is_new, contacts=contacts, saved=arrays)
-        self._system = System(
-            start=grains.copy(),
-            forces=forces,
-            box=box,
-            stepping=engine.stepping,
-            neighbours=engine.neighbours,
-            seed=seed,
-            given=given,
-            next_id=meta.get("next_id", len(grains)),
-        )
+        fitted = engine.stepping, engine.neighbours
+        self._system = System(grains.copy(), forces, box, *fitted, seed, given, meta.get("next_id", len(grains)))
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
         self.ledger = Ledger(force_columns(engine), in_use(given), awake=engine.state.at_rest is not None)

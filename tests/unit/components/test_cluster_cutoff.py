@@ -12,7 +12,7 @@ from sand.basics.state import CONTACTS, CUT_RADIUS
 from sand.basics.temperature import kinetic_temperature
 from sand.components.cluster_cutoff import ClusterCutoff
 from sand.engine.component import Setup
-from sand.engine.kinds import forces_by_type
+from sand.engine.step_parameters import forces_by_type
 from sand.forces.pair.dipoles import capturing_pair
 
 BOX = sand.Box.periodic("20 um")

@@ -6,7 +6,7 @@ import sand
 from sand.components.walls import Walls
 from sand.config.case import check_case
 from sand.engine.component import Setup
-from sand.engine.kinds import ForcesByType
+from sand.engine.step_parameters import ForcesByType
 
 from ...plugins import ForestRuth
 

@@ -24,10 +24,10 @@ class Recorder(Component):
         self.updates, self.changes = [], []
 
     def next_time(self, engine):
-        return min((time for time in self.items if time > engine.regular_time), default=math.inf)
+        return min((time for time in self.items if time > engine.stored_state.time), default=math.inf)
 
     def update(self, engine):
-        self.updates.append(engine.regular_time)
+        self.updates.append(engine.stored_state.time)
 
     def contacts_changed(self, engine):
         self.changes.append((engine.steps, int(engine.stored_state.count[MADE])))
@@ -50,7 +50,7 @@ def test_updates_follow_the_first_step_at_or_after_each_time():
     """
     plain, ends = meeting(), [0.0]
     while plain.advance(END, 1) is not Stop.TIME_REACHED:
-        ends.append(plain.regular_time)
+        ends.append(plain.stored_state.time)
     wanted = (0.3 * END, 0.300001 * END, 0.8 * END)
     recorder = Recorder(wanted)
     engine = meeting(recorder)

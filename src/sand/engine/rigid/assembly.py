@@ -25,8 +25,9 @@ from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
 from ...neighbours.search import Neighbours
 from ..engine import Engine
-from ..kinds import Build, ForceDependent, ForcesByType, Kind
+from ..kinds import Build, Kind
 from ..part import Part
+from ..step_parameters import ForceDependent, ForcesByType
 from .body_steps import PERIODS, BodySteps
 from .quick_bodies import QuickBodies
 

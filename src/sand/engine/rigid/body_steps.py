@@ -48,8 +48,7 @@ from ...integrate.rigid.awake_clusters import (
 )
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
-from ..engine import Engine
-from ..grain_steps import GrainSteps
+from ..engine import Engine, GrainSteps
 from ..measures import external_energy
 from ..part import MOVING, Part
 from .cluster_bodies import (
@@ -281,7 +280,7 @@ class BodySteps(GrainSteps):
         if stop is not Stop.TIME_REACHED:
             return stop
         for stage, numbers in inner.content.of_components.get(Hook.END_OF_BODIES, ()):
-            stage.run(inner.table_of(present), numbers)
+            stage.run(inner.table_of(present), numbers, Hook.END_OF_BODIES)
         self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
         self.part.give_back(state)
         self._columns = self.part.columns
