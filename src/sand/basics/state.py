@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from operator import attrgetter
@@ -175,6 +175,27 @@ class State:
     def at_rest(self) -> np.ndarray | None:
         """Which grains (N,) belong to clusters at rest, single grains included; None without rigid clusters."""
         return self.bodies.asleep == 1 if self.bodies.asleep.size else None
+
+    def held_grains(self) -> np.ndarray:
+        """Grains in contact with walls."""
+        return self.wall_contacts.pair[0, : self.count[WALL_CONTACTS]]
+
+    def give_component_arrays(self, other: State, number: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Copy walls and contacts with them to a state of these grains, or a part of them; `number` of each is there."""
+        if not self.walls.work.size:
+            return
+        if not other.walls.work.size:
+            other.walls = wall_arrays(self.walls.work.size, len(other.grains))
+            other.wall_contacts = ContactArrays(*(array.copy() for array in self.wall_contacts))
+            other.__post_init__()  # aligns the arrays
+        for name in SAVED_WALLS:
+            getattr(other.walls, name)[...] = getattr(self.walls, name)
+        used = other.count[WALL_CONTACTS] = self.count[WALL_CONTACTS]
+        while other.wall_contacts.flag.size < used:
+            other.grow_component_contacts()
+        for name in WALL_CONTACT_ARRAYS:
+            getattr(other.wall_contacts, name)[..., :used] = getattr(self.wall_contacts, name)[..., :used]
+        other.wall_contacts.pair[0, :used] = number(self.held_grains())
 
     def take_extremes(self, part: State) -> None:
         """Take over the largest overlap and the largest impact of a part of the grains that took steps of its own."""

@@ -147,6 +147,13 @@ def _finish_walls(walls, contacts, count, numbers, dt):
             walls.work[w] -= dot(middle, impulse)
 
 
+@loop
+def move_walls_alone(walls, contacts, count, numbers, dt):
+    """Move walls for a step of dt [s] in which no grain is in contact with them."""
+    _start_walls(walls, numbers, dt)
+    _finish_walls(walls, contacts, count, numbers, dt)
+
+
 @rare
 def count_new_wall_contacts(grains, walls, contacts, count, numbers, dt):
     """Mark grains in contact in `walls.touching`; number of grains that touch a wall after it has moved for dt [s]."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.state import GRAIN1, STEP, STEPS, WALL_CONTACTS, WALL_STEP
+from ..basics.state import GRAIN1, LATE, STEP, STEPS, WALL_CONTACTS, WALL_STEP
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import accelerations, half_kick_weight, record_half_kick
@@ -18,7 +18,8 @@ from ..contact.measure import ENERGIES
 from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
 from ..integrate.parts import DT, Stop
-from ..integrate.stages import NEXT_STEP, StageNumber
+from ..integrate.rigid.body_touches import NEAR, TOUCHING, reach_of_plane
+from ..integrate.stages import MOVE, NEXT_STEP, StageNumber
 from ..integrate.step_control import CLOSING_FRACTION, HOLD_STEPS, quantise_step
 from ..numerics.vec import accrue, dot, load, scale, sub
 from .wall_formulas import wall_displacements
@@ -27,6 +28,7 @@ from .wall_loops import (
     WALL_PARTS,
     WallNumbers,
     constants_loop,
+    move_walls_alone,
     relative_velocity,
     wall_height,
     wall_loop,
@@ -157,17 +159,47 @@ def bath_wall_work(s, parameters, block):
     return 0
 
 
-def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> dict[int, tuple[Stage, Any]]:
+@stage("the walls that bodies may touch", parts=(*WALL_PARTS, "bodies", "gas", "flight_limits"))
+def bodies_at_walls(s, parameters, block):
+    """Mark bodies near walls (`BodyArrays.near`) for the present step; with MOVE, move walls without contacts."""
+    grains, bodies, walls, h = s.grains, s.bodies, s.walls, s.clock[STEP]
+    if block == MOVE:
+        move_walls_alone(walls, s.wall_contacts, s.count, parameters, h)
+        return 0
+    for c in range(s.count[WALL_CONTACTS]):
+        first = bodies.first[s.wall_contacts.pair[0, c]]
+        bodies.near[first] = max(bodies.near[first], NEAR)
+    for w in range(walls.work.size):
+        n = load(walls.normal, w)
+        # as of a grain, twice the distance by its present acceleration
+        moved = abs(dot(load(walls.force, w), n) + parameters.push[w]) / parameters.mass[w] * h * h
+        for g in range(grains.mass.size):
+            gap, first = wall_height(grains, walls, g, w) - grains.radius[g], bodies.first[g]
+            closing = -dot(relative_velocity(grains, walls, g, w), n)
+            reach = moved + reach_of_plane(grains, bodies, g, closing, s.gas, s.flight_limits.friction_rate, h)
+            if not gap > reach and bodies.asleep[g] == 1:  # also if the reach is not a number
+                bodies.near[first] = TOUCHING
+                s.count[LATE] += 1 if gap < 0.0 else 0
+            elif not gap > 2.0 * reach:
+                bodies.near[first] = max(bodies.near[first], NEAR)
+    return 0
+
+
+def wall_stages(
+    law: ContactLaw, damping: str, numbers: WallNumbers, *, moves_bodies: bool
+) -> dict[int, tuple[Stage, Any]]:
     """All stages by number, with their parameters."""
     noisy = damping == THERMAL
-    of_bath: dict[int, tuple[Stage, Any]] = (
+    further: dict[int, tuple[Stage, Any]] = (
         {StageNumber.COMPONENT_BATH_WORK: (bath_wall_work, numbers)} if noisy else {}
     )
+    if moves_bodies:
+        further[StageNumber.COMPONENT_BODIES] = bodies_at_walls, numbers
     return {
         StageNumber.COMPONENT_CONTACTS: (contacts_stage(law, damping), numbers),
         StageNumber.COMPONENT_LOADS: (wall_loads, ()),
         StageNumber.COMPONENT_STEP: (step_stage(law), numbers),
         # called by the engine for rows of the ledger, with an array of its own; here it is compiled with the others
         StageNumber.COMPONENT_ENERGIES: (energies_stage(law), (np.zeros(len(ENERGIES)),)),
-        **of_bath,
+        **further,
     }

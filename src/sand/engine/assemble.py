@@ -96,8 +96,8 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    kind, nouns = KINDS.get(stepping.name, Kind)(), [each.noun for each in extra]
-    warnings = check_system(grains, forces, box, fresh=fresh) + kind.check(forces, nouns, neighbours)
+    kind = KINDS.get(stepping.name, Kind)(holds=any(each.holds for each in extra))
+    warnings = check_system(grains, forces, box, fresh=fresh) + kind.check(forces, neighbours)
     by_type = _forces_by_type(forces, grains)
     setup = Setup(grains, by_type, box, stepping, neighbours, fresh)
     check(extra, setup)
@@ -178,7 +178,7 @@ def build_engine(
     engine = Engine(*parts)
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
-        return build_engine(wrapped, others, box, verlet, search, seed, fresh=False)
+        return build_engine(wrapped, others, box, verlet, search, seed, extra, fresh=False)
 
     kind.complete(engine, forces, build)
     if any(map(ramps_of, forces)):

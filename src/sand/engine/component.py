@@ -49,6 +49,8 @@ class Component:
         Whether grains keep the order in which they were given.
     every_step : bool
         Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
+    holds : bool
+        Whether it may hold grains, so that loads on their clusters do not move these as rigid bodies.
     own_columns : bool
         Whether each contact needs its own constants, also between equal grains.
     items : Sequence
@@ -60,6 +62,7 @@ class Component:
     keeps_order: ClassVar[bool] = False
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
+    holds: ClassVar[bool] = False
 
     def __init__(self, items: Sequence[Any]):
         self.items = tuple(items)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,8 @@ class Part:
                 if getattr(state.bodies, name).size:
                     getattr(state.bodies, name).take(index, axis=-1, out=getattr(own.bodies, name))
             own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
+        state.give_component_arrays(own, partial(np.searchsorted, index))
+        self.engine.content.heavy[:] = np.searchsorted(index, self.prototype.content.heavy)
         own.count[COMPARED] = -1
         own.count[CHECKED] = own.count[STEP_INCREASES] = -INCREASE_INTERVAL
         # the kicks of the gas are counted with the steps of grains, so that no random number is used twice
@@ -152,6 +155,7 @@ class Part:
                 if getattr(state.bodies, name).size:
                     getattr(state.bodies, name)[..., self.index] = getattr(own.bodies, name)
             state.bodies.first[self.index] = self.index[own.bodies.first]
+        own.give_component_arrays(state, self.index.take)
         self._count(state, own)
         return changed
 
@@ -172,6 +176,7 @@ class Part:
         else:
             made.clusters = cluster_arrays(count)
         engine = given.for_state(made)
+        engine.content = given.content.for_part(count)
         if uses_task_queue(count) and not self.has_bodies:  # few grains, and bodies, share no work between threads
             engine.share_threads(given)
         if len(self._engines) == MOST_ENGINES:

@@ -156,6 +156,8 @@ def sum_loads(s, due, elapsed):
     if has_stage(s, StageNumber.COMPONENT_LOADS):
         call_stage(s, StageNumber.COMPONENT_LOADS)
     add_external_loads(s, s.clock[TIME] + s.clock[STEP])
+    if has_stage(s, StageNumber.HELD_LOADS):
+        call_stage(s, StageNumber.HELD_LOADS)
     if s.forces.pair == 0:
         s.count[LONG_RANGE_SUMS] += 1
     elif due:

@@ -51,6 +51,15 @@ class ProgramContent(NamedTuple):
     )  # stages of components by number, with parameters
     heavy: np.ndarray = NO_GRAINS  # grains whose mass counts as infinite in contacts
 
+    def for_part(self, grains: int) -> ProgramContent:
+        """The same for a part with this number of grains, among them the heavy ones, which have other numbers there."""
+        heavy, own = self.heavy.copy(), dict(self.of_components)
+        if StageNumber.DRIVE in own:
+            own[StageNumber.DRIVE] = own[StageNumber.DRIVE][0], own[StageNumber.DRIVE][1]._replace(grain=heavy)
+        if StageNumber.HELD_LOADS in own:
+            own[StageNumber.HELD_LOADS] = own[StageNumber.HELD_LOADS][0], (np.zeros((3, grains)), np.zeros((3, grains)))
+        return self._replace(heavy=heavy, of_components=own)
+
 
 def stages_of(given: ProgramContent, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
     """The stages that a simulation calls, by number, with their own parameters."""

@@ -65,9 +65,13 @@ class StageNumber(IntEnum):
     BATH_WORK = 24  # contact.bath_work
     COMPONENT_BATH_WORK = 25  # the work of the bath in further contacts
     COMPONENT_ENERGIES = 26  # adds the energies stored in further contacts to an array
-    FIRST_FORCE = 27  # from here on the stages of forces, see `force_stages`
+    COMPONENT_BODIES = 27  # of components: MARK bodies that may touch, or MOVE what no awake cluster does
+    HELD_LOADS = 28  # rigid.awake_clusters: constant loads on grains
+    FIRST_FORCE = 29  # from here on the stages of forces, see `force_stages`
 
 
+MARK, MOVE = range(2)
+"""What the stage COMPONENT_BODIES does for a step of rigid bodies."""
 NEXT_STEP, NO_STEP = range(2)
 """What follows the work of a bath: a step of `scratch[DT]`, or none, as at a row of the ledger."""
 INNER_SKIN_FRACTION = 0.05

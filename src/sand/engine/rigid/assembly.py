@@ -20,9 +20,11 @@ from ...errors import BadInput
 from ...forces.base import Force
 from ...forces.pair.ewald_force import EwaldForce
 from ...integrate.parts import ContactParameters, StepParameters
+from ...integrate.rigid.awake_clusters import add_held_loads
 from ...integrate.rigid.body_friction import LARGEST_DEVIATE
 from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
+from ...integrate.stages import StageNumber
 from ...neighbours.search import Neighbours
 from ..engine import Engine
 from ..kinds import Build, ForcesByType, Kind
@@ -43,7 +45,7 @@ class BodiesKind(Kind):
 
     keeps_order = True
 
-    def check(self, forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
+    def check(self, forces: Sequence[Force], neighbours: Neighbours) -> list[str]:
         """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
         contact = next((f for f in forces if isinstance(f, Contact)), None)
         problems = []
@@ -63,7 +65,6 @@ class BodiesKind(Kind):
             )
         ramps = [f"{force.name}.{name}" for force in forces for name in ramps_of(force)]
         problems += [f"rigid clusters cannot follow the ramp {name}; use a number, or {GRAINS}" for name in ramps]
-        problems += [f"rigid clusters cannot have {noun}; {GRAINS}" for noun in others]
         if neighbours.order == "curve":
             problems.append(
                 f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}"
@@ -110,7 +111,7 @@ class BodiesKind(Kind):
             longest_awake=awake,
             smallest_radius=float(grains.radius.min()),
             friction_rate=rate,
-            substeps=True,
+            substeps=not self.holds,
         )
 
     def complete(self, engine: Engine, forces: Sequence[Force], build: Build) -> None:
@@ -127,13 +128,16 @@ class BodiesKind(Kind):
         state.bodies = body_arrays(len(state.grains), in_gas=parameters.gas.gas.on)
         near = [_between_all(force) for force in forces]
         inner = build(near, Neighbours("all pairs", order="as given"))
+        if self.holds and engine.content.pair_forces:
+            stages = dict(inner.content.of_components) | {StageNumber.HELD_LOADS: (add_held_loads, ())}
+            inner.content = inner.content._replace(of_components=stages).for_part(len(state.grains))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
         of_quick = inner.changed(
             parameters=own, warnings=engine.warnings, stepper=BodySteps(Part(inner, CONTACT_STEPS))
         )
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
-        engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), quick)
+        engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), None if self.holds else quick)
 
 
 def _between_all(force: Force) -> Force:

@@ -41,8 +41,11 @@ def sort_members(state: State) -> None:
     bodies.start[: len(starts)], bodies.start[len(starts) :] = starts, len(state.grains)
 
 
-def form_bodies(state: State) -> None:
-    """Make a body of each grain without contacts, at rest, and of each cluster, awake and not yet described."""
+def form_bodies(state: State, held: np.ndarray) -> None:
+    """Make a body of each grain without contacts, at rest, and of each cluster, awake and not yet described.
+
+    Single grains among the `held` ones are awake, too.
+    """
     bodies, n = state.bodies, len(state.grains)
     labels = cluster_labels(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
     first = np.full(labels.max(initial=-1) + 1, n)
@@ -56,7 +59,7 @@ def form_bodies(state: State) -> None:
     bodies.changed[:] = bodies.load[:] = 0.0
     bodies.reserve[:] = math.inf
     bodies.strength[...] = math.inf
-    for i in np.flatnonzero(np.bincount(bodies.first, minlength=n) == 1).tolist():
+    for i in np.setdiff1d(np.flatnonzero(np.bincount(bodies.first, minlength=n) == 1), held).tolist():
         rest_grain(state, i)
 
 

@@ -79,6 +79,15 @@ def kick_clusters(grains, contacts, clusters, span, scratch, parameters):
     return 0
 
 
+@stage("the held loads on awake clusters")
+def add_held_loads(grains, parameters):
+    """Add the constant forces and torques `parameters` (3, n) to the loads of the grains."""
+    for i in range(grains.mass.size):
+        accrue(grains.force, i, load(parameters[0], i))
+        accrue(grains.torque, i, load(parameters[1], i))
+    return 0
+
+
 @factory
 def measure_clusters_stage(law: ContactLaw) -> Stage:
     """The stage that fills `ClusterMeasures`, its parameters, and `clusters.offset`, from the centres of mass."""

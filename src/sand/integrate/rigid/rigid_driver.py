@@ -30,7 +30,7 @@ from ...basics.state import (
     TIME,
 )
 from ...compiler.jit import caller, formula, loop
-from ...compiler.program import call_stage
+from ...compiler.program import call_stage, has_stage
 from ...compiler.stage import stage
 from ...neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
 from ...numerics.quaternion import turned
@@ -40,7 +40,7 @@ from ..force_stages import ENERGY, WRAPPING
 from ..motion import wrap_all
 from ..parts import DRIVER_PARTS, Stop
 from ..respa import add_long_range_loads
-from ..stages import StageNumber
+from ..stages import MARK, MOVE, StageNumber
 from ..step_control import is_close, is_past
 from ..task_queue import join_workers
 from .body_friction import drift_bodies_in_gas
@@ -236,10 +236,12 @@ def first_half(s, some_awake):
             s.bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
         h = s.until - s.clock[TIME]
+    s.clock[STEP] = h
     if not takes_substeps:
         find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
+        if has_stage(s, StageNumber.COMPONENT_BODIES):
+            call_stage(s, StageNumber.COMPONENT_BODIES, MARK)
     find_loaded_bodies(s.grains, s.bodies, s.clock, s.count)
-    s.clock[STEP] = h
     if any_has_to_wake(s.bodies, s.count):
         s.bodies.quick[:] = 0
         return Stop.HAS_TO_WAKE.value
@@ -247,6 +249,8 @@ def first_half(s, some_awake):
         return Stop.SUBSTEPS.value
     kick_bodies(s.bodies, s.count, 0.5 * h)
     drift_with_work(s, h)
+    if not some_awake and has_stage(s, StageNumber.COMPONENT_BODIES):
+        call_stage(s, StageNumber.COMPONENT_BODIES, MOVE)
     s.count[STAGE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
