@@ -143,6 +143,19 @@ class BodySteps(GrainSteps):
                 describe_body(state, self._grains[own], present.clusters.offset[:, own])
         self.sum_outer_loads(engine)
 
+    def loads(self, engine: Engine) -> tuple[np.ndarray, np.ndarray]:
+        """As `GrainSteps.loads`, with those of the contacts of awake clusters."""
+        state = engine.state.copy()
+        contacts, grains = state.contacts, state.grains.arrays
+        columns = contacts_of(state, state.bodies.asleep == 0)
+        for side, sign, torque in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
+            index = contacts.pair[side, columns]
+            np.add.at(grains.force, (slice(None), index), sign * contacts.force[:, columns])
+            np.add.at(grains.torque, (slice(None), index), torque[:, columns])
+        if (added := engine.content.of_components.get(StageNumber.COMPONENT_LOADS)) is not None:
+            added[0].run(engine.table_of(state), added[1])
+        return state.grains.force, state.grains.torque
+
     def summary(self, state: State) -> dict[str, Any]:
         """Time awake, steps of each level, and the largest load at rest."""
         count, clock, time = state.count, state.clock, max(state.time, np.finfo(float).tiny)
