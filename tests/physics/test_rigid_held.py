@@ -45,11 +45,11 @@ WALLS = {
 def test_a_tumbling_cluster_lands_on_a_wall_as_grain_by_grain(wall):
     """Motion of grains and wall, time and energy of the touch, and impulses, against `sand.Verlet`.
 
-    The rotor errs by 8e-4 rad of 2e-8 m, 0.02 nm (`compare_first_touches`); the strain of the centrifugal force is less,
-    m ω² s R²/k_r = 3.3e-20 kg (5e7/s)² 2e-8 m over 8 N/m, 2e-13 m.  The touch is this much earlier or later, 2e-11 s at
-    1 m/s.  After it the trimer moves by at most 1 m/s, so that positions differ by twice this.  In 2e-11 s the forces of
-    the touch, a few m v in a period of 1e-10 s, change the impulse by a fifth of m v; they have decayed long before the
-    end, and what is left of them is compared to 1 % of m v.
+    The rotor errs by 8e-4 rad of 2e-8 m, 0.02 nm (`compare_first_touches`); the strain of the centrifugal force is
+    less, m ω² s R²/k_r = 3.3e-20 kg (5e7/s)² 2e-8 m over 8 N/m, 2e-13 m.  The touch is this much earlier or later,
+    2e-11 s at 1 m/s.  After it the trimer moves by at most 1 m/s, so that positions differ by twice this.  In 2e-11 s
+    the forces of the touch, a few m v in a period of 1e-10 s, change the impulse by a fifth of m v; they have decayed
+    long before the end, and what is left of them is compared to 1 % of m v.
     """
     ends = []
     for stepping in (sand.RigidClusters(), sand.Verlet()):
@@ -117,7 +117,8 @@ def test_a_wall_holds_a_magnetic_chain_against_a_grain_that_pulls_it():
 
     The grain above, of 1e-12 kg, flies as a body at rest: its pull acts on the awake chain for whole steps of bodies.
     After 40 ns vibrations have decayed.  The pull is that at the start of a step of at most 1 ns, in which the grain,
-    3e-12 N/1e-12 kg · 100 ns = 3e-7 m/s fast, does not move.  As kicks between these steps it would vibrate by all of it.
+    3e-12 N/1e-12 kg · 100 ns = 3e-7 m/s fast, does not move.  Kicks between these steps would make the force of the
+    floor vibrate by as much as it is.
     """
     mu, height = 6.6e-18, sand.theory.contact("iron", 2.0 * RADIUS).rest_overlap
     z = np.array([RADIUS - height, RADIUS - height + PITCH, 9.0 * RADIUS])
@@ -170,13 +171,11 @@ def test_a_tumbling_cluster_hits_a_driven_grain_as_grain_by_grain():
 def test_work_of_a_drive_against_the_dipole_of_a_body_at_rest():
     """A grain driven towards a heavy one, head to tail: `lost_outside` is U(start) − U(end), U = −2kμ²/r³.
 
-    The force is held for steps h, and half its change follows: the trapezoidal rule, whose error is (h v/r)² of the work,
-    1 ns · 1 m/s over 60 nm.
+    The force is held for steps h, and half its change follows: the trapezoidal rule, whose error is (h v/r)² of the
+    work, 1 ns · 1 m/s over 60 nm.
     """
     mu = 6.6e-18
-    grains = sand.Grains(
-        [[0, 0, 0], [0, 0, 1e-7]], RADIUS, "iron", moment=[[0, 0, mu]] * 2, mass=[3.3e-20, 1e-12]
-    )
+    grains = sand.Grains([[0, 0, 0], [0, 0, 1e-7]], RADIUS, "iron", moment=[[0, 0, mu]] * 2, mass=[3.3e-20, 1e-12])
     driven = sand.Driven([0], velocity=[0, 0, 1.0])
     sim = sand.Simulation(
         grains, [PLAIN, sand.Dipoles(cutoff=None)], driven=driven, stepping=sand.RigidClusters(), frame_every=1.0
@@ -199,9 +198,9 @@ def magnetic_gas(held, **options):
         held = {"walls": [floor, sand.Wall([0, 0, "0.2 um"], [0, 0, -1], "iron", mass="1e-17 kg", force="1e-11 N")]}
     else:
         held = {"driven": [sand.Driven([3, 5]), sand.Driven([11], velocity=["1 m/s", 0, 0], spin=[0, 1e8, 0])]}
-    stepping = sand.RigidClusters()
     forces = [contact() if "walls" in held else PLAIN, sand.Dipoles(cutoff="0.1 um"), gas]
-    return sand.Simulation(grains, forces, box=box, stepping=stepping, seed=4, **({"frame_every": 1.0} | held | options))
+    options = {"frame_every": 1.0} | held | options
+    return sand.Simulation(grains, forces, box=box, stepping=sand.RigidClusters(), seed=4, **options)
 
 
 @pytest.mark.filterwarnings(NO_SETTLING, "ignore:.* broke while aggregates grew", "ignore:dipoles. the cut-off")

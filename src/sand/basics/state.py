@@ -181,7 +181,7 @@ class State:
         return self.wall_contacts.pair[0, : self.count[WALL_CONTACTS]]
 
     def give_component_arrays(self, other: State, number: Callable[[np.ndarray], np.ndarray]) -> None:
-        """Copy walls and contacts with them to a state of these grains, or a part of them; `number` of each is there."""
+        """Copy walls and contacts with them to a state of other grains; `number` gives those of its grains."""
         if not self.walls.work.size:
             return
         if not other.walls.work.size:

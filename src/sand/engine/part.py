@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -122,7 +121,7 @@ class Part:
                 if getattr(state.bodies, name).size:
                     getattr(state.bodies, name).take(index, axis=-1, out=getattr(own.bodies, name))
             own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
-        state.give_component_arrays(own, partial(np.searchsorted, index))
+        state.give_component_arrays(own, lambda grains: np.searchsorted(index, grains))
         self.engine.content.heavy[:] = np.searchsorted(index, self.prototype.content.heavy)
         own.count[COMPARED] = -1
         own.count[CHECKED] = own.count[STEP_INCREASES] = -INCREASE_INTERVAL

@@ -45,8 +45,8 @@ from ...integrate.rigid.awake_clusters import (
     measure_clusters_stage,
     store_rest,
 )
-from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.body_touches import CLEAR, LOADED, NEAR
+from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import advance_bodies, mark_near_bodies
 from ...integrate.stages import MARK, RESET, StageNumber, finish_gas
 from ..engine import Engine, GrainSteps
@@ -150,8 +150,8 @@ class BodySteps(GrainSteps):
         columns = contacts_of(state, state.bodies.asleep == 0)
         for side, sign, torque in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
             index = contacts.pair[side, columns]
-            np.add.at(grains.force, (slice(None), index), sign * contacts.force[:, columns])
-            np.add.at(grains.torque, (slice(None), index), torque[:, columns])
+            np.add.at(grains.force.T, index, sign * contacts.force.T[columns])
+            np.add.at(grains.torque.T, index, torque.T[columns])
         if (added := engine.content.of_components.get(StageNumber.COMPONENT_LOADS)) is not None:
             added[0].run(engine.table_of(state), added[1])
         return state.grains.force, state.grains.torque
