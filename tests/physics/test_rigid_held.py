@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import sand
 from sand.basics.constants import MAGNETIC
-from sand.basics.state import LATE, RESTED, WOKEN
+from sand.basics.state import CONTACT_STEPS, LATE, RESTED, WOKEN
+from sand.integrate import task_queue
 
 from .setups import different, rest_distance
 from .test_rigid_clusters import contact, free_flights
@@ -228,3 +229,19 @@ def test_the_ledger_closes_and_output_and_restarts_change_no_bit(tmp_path, held)
     else:
         assert whole.grains.velocity[[3, 5, 11]].tolist() == [[0, 0, 0], [0, 0, 0], [1, 0, 0]]
         assert whole.grains.spin[[3, 5, 11]].tolist() == [[0, 0, 0], [0, 0, 0], [0, 1e8, 0]]
+
+
+@pytest.mark.filterwarnings(NO_SETTLING, "ignore:dipoles. the cut-off")
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("held", ["walls", "driven grains"])
+def test_threads_of_awake_clusters_change_no_bit(monkeypatch, held):
+    """Loops over so few grains are not shared; here they are, also those over the grains of awake clusters."""
+    monkeypatch.setattr(task_queue, "PARALLEL_FROM", 1)
+    ends = []
+    for number in (1, 2):
+        sand.set_threads(number)
+        ends.append(magnetic_gas(held))
+        ends[-1].run(until="25 ns")
+    sand.set_threads(None)
+    assert ends[0].regular_state.count[CONTACT_STEPS] > 100
+    assert different(*ends) == []

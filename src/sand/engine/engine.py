@@ -599,6 +599,7 @@ class Engine:
         state = self._state
         table, queue = self._call_table(until, last, shorten)
         try:
+            program = self._program_for(table)  # threads take it from the table
             if self._compiles_ahead:
                 self._compiles_ahead = False
                 compile_ahead(self.stages(table), min(cores(), threads()))
@@ -609,7 +610,7 @@ class Engine:
                 and benefits_from_workers(len(self.content.pair_forces), int(state.count[CONTACTS]))
             ):
                 self._workers.start(table)
-            return Stop(self._program_for(table).run(driver, table))
+            return Stop(program.run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(queue)
             raise
