@@ -33,6 +33,12 @@ def tumbling(seed, count, height, speed):
     return sand.Grains(position, RADIUS, "iron", velocity=velocity, spin=spin)
 
 
+def formed_at_walls(sim):
+    """Times [s] at which the contacts with walls formed."""
+    contacts = sim.state.of_components["wall_contacts"]
+    return contacts.formed[: contacts.used[0]]
+
+
 WALLS = {
     "at rest": {},
     "moving": {"velocity": [0.5, 0.0, 0.4]},
@@ -62,7 +68,7 @@ def test_a_tumbling_cluster_lands_on_a_wall_as_grain_by_grain(wall):
         fallen = 0.5 * pushed * 2e-8**2 + WALLS[wall].get("velocity", [0.0])[-1] * 2e-8
         assert sim.walls[0].position[2] == pytest.approx(fallen, rel=1e-12, abs=0.0)
         sim.run(until="80 ns")
-        ends.append((sim, sim._log_row(), sim.walls[0], sim.state.wall_contacts.formed[0]))
+        ends.append((sim, sim._log_row(), sim.walls[0], formed_at_walls(sim)[0]))
     (one, row, mine, formed), (other, exact, theirs, touched) = ends
     assert row["wall_contacts"] == exact["wall_contacts"] > 0
     assert formed == pytest.approx(touched, abs=2e-11)
@@ -88,8 +94,8 @@ def compare_first_touches(seed, count):
     sim = sand.Simulation(grains, [contact()], walls=[wall], stepping=sand.RigidClusters(), frame_every=1.0)
     sim.run(until=5e-8)
     assert sim.regular_state.count[LATE] == 0 and sim.regular_state.count[WOKEN] > 0
-    state, found = sim.state, np.full(count, np.inf)
-    np.minimum.at(found, state.held_grains() // 3, state.wall_contacts.formed[: len(state.held_grains())])
+    found = np.full(count, np.inf)
+    np.minimum.at(found, sim.state.held_grains() // 3, formed_at_walls(sim))
     for k in range(count):
         before = gap[: math.ceil(found[k] / step) if found[k] < math.inf else len(gap), k]
         assert before.min() > -error

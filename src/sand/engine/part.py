@@ -121,7 +121,7 @@ class Part:
                 if getattr(state.bodies, name).size:
                     getattr(state.bodies, name).take(index, axis=-1, out=getattr(own.bodies, name))
             own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
-        state.give_component_arrays(own, lambda grains: np.searchsorted(index, grains))
+        state.give_component_arrays(own, index, np.arange(len(index)))
         self.engine.content.heavy[:] = np.searchsorted(index, self.prototype.content.heavy)
         own.count[COMPARED] = -1
         own.count[CHECKED] = own.count[STEP_INCREASES] = -INCREASE_INTERVAL
@@ -154,7 +154,7 @@ class Part:
                 if getattr(state.bodies, name).size:
                     getattr(state.bodies, name)[..., self.index] = getattr(own.bodies, name)
             state.bodies.first[self.index] = self.index[own.bodies.first]
-        own.give_component_arrays(state, self.index.take)
+        own.give_component_arrays(state, np.arange(len(self.index)), self.index)
         self._count(state, own)
         return changed
 
@@ -174,6 +174,7 @@ class Part:
             made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
         else:
             made.clusters = cluster_arrays(count)
+        state.give_component_arrays(made, self.index, np.arange(count))
         engine = given.for_state(made)
         engine.content = given.content.for_part(count)
         if uses_task_queue(count) and not self.has_bodies:  # few grains, and bodies, share no work between threads
@@ -187,7 +188,7 @@ class Part:
         """Copy the contacts to the state of the part."""
         used, contacts = len(self.columns), state.contacts
         if own.contacts.pair.shape[1] < used:
-            own.grow_contacts(used)
+            own.grow("contacts", used)
         own.contacts.pair[:, :used] = np.searchsorted(self.index, contacts.pair[:, self.columns])
         for name in CONTACT_COLUMNS:
             if getattr(own.contacts, name).shape[-1]:
@@ -213,7 +214,7 @@ class Part:
         kept = np.setdiff1d(np.arange(state.count[CONTACTS]), self.columns)
         first, end = len(kept), len(kept) + used
         if state.contacts.pair.shape[1] < end:
-            state.grow_contacts(end)
+            state.grow("contacts", end)
         contacts, pairs = state.contacts, self.index[own.contacts.pair[:, :used]]
         for name in ("pair", *CONTACT_COLUMNS, "constants"):
             array = getattr(contacts, name)
