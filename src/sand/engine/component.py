@@ -14,6 +14,7 @@ from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.state import State
 from ..contact.law import ContactLaw
+from ..integrate.hooks import HookStages
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
@@ -42,7 +43,7 @@ class Component:
     At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
     `at_start`, `stages` and `heavy`, `add_arrays`, `begin`.  While the engine runs it calls `update`, `next_time` and
     `contacts_changed`, between regular steps.  The ledger has its `columns` and `losses`, with the values of `row`
-    (energies stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change
+    (energies stored in its contacts are added to those of all contacts by a stage of `Hook.ENERGIES`).  A change
     asks `problems_of_motion` and `problems_of_arrays`, continues with what is `kept`, and calls `saved_for_change` and
     `changed`; case.toml has `parameters` and `materials`.
 
@@ -93,8 +94,8 @@ class Component:
         """The forces as they act at first."""
         return forces
 
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
-        """Stages that the driver calls, by number, with their parameters."""
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
+        """Stages that the driver calls at each place of a step, with their parameters."""
         return {}
 
     def heavy(self) -> list[int]:

@@ -19,12 +19,12 @@ from ...contact.law import ContactLaw, Pairing, contact_constants
 from ...contact.model import Contact
 from ...forces.base import Force
 from ...forces.pair.ewald_force import EwaldForce
+from ...integrate.hooks import Hook
 from ...integrate.parts import ContactParameters
-from ...integrate.rigid.awake_clusters import add_held_loads
+from ...integrate.rigid.awake_clusters import HeldLoads, add_held_loads
 from ...integrate.rigid.body_friction import LARGEST_DEVIATE
 from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
-from ...integrate.stages import StageNumber
 from ...neighbours.search import Neighbours
 from ..engine import Engine
 from ..kinds import Build, Kind
@@ -130,7 +130,9 @@ class BodiesKind(Kind):
         near = [_between_all(force) for force in forces]
         inner = build(near, Neighbours("all pairs", order="as given"))
         if self.holds and engine.content.pair_forces:
-            stages = dict(inner.content.of_components) | {StageNumber.HELD_LOADS: (add_held_loads, ())}
+            stages = dict(inner.content.of_components)
+            none = HeldLoads(np.zeros((3, 0)), np.zeros((3, 0)))
+            stages[Hook.LOADS] = [*stages.get(Hook.LOADS, ()), (add_held_loads, none)]
             inner.content = inner.content._replace(of_components=stages).for_part(len(state.grains))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)

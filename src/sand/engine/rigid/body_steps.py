@@ -37,9 +37,11 @@ from ...basics.state import (
 from ...compiler.stage import PythonStage, Stage
 from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
+from ...integrate.hooks import Hook
 from ...integrate.parts import DT, Stop
 from ...integrate.rigid.awake_clusters import (
     ClusterMeasures,
+    add_held_loads,
     cluster_measures,
     kick_clusters,
     measure_clusters_stage,
@@ -48,7 +50,7 @@ from ...integrate.rigid.awake_clusters import (
 from ...integrate.rigid.body_touches import CLEAR, LOADED, NEAR
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import advance_bodies, mark_near_bodies
-from ...integrate.stages import MARK, RESET, StageNumber, finish_gas
+from ...integrate.stages import finish_gas
 from ..engine import Engine, GrainSteps
 from ..measures import external_energy
 from ..part import MOVING, Part
@@ -150,8 +152,8 @@ class BodySteps(GrainSteps):
             index = contacts.pair[side, columns]
             np.add.at(grains.force.T, index, sign * contacts.force.T[columns])
             np.add.at(grains.torque.T, index, torque.T[columns])
-        if (added := engine.content.of_components.get(StageNumber.COMPONENT_LOADS)) is not None:
-            added[0].run(engine.table_of(state), added[1])
+        for stage, numbers in engine.content.of_components.get(Hook.LOADS, ()):
+            stage.run(engine.table_of(state), numbers)
         return state.grains.force, state.grains.torque
 
     def summary(self, state: State) -> dict[str, Any]:
@@ -300,8 +302,8 @@ class BodySteps(GrainSteps):
             return stop
         if engine.parameters.gas.gas.on:  # since their last kick, so that none is left for the next step
             finish_gas.run(inner.table_of(present))
-            if (drive := inner.content.of_components.get(StageNumber.DRIVE)) is not None:
-                drive[0].run(inner.table_of(present), drive[1], RESET)
+            for stage, numbers in inner.content.of_components.get(Hook.BETWEEN_CYCLES, ()):
+                stage.run(inner.table_of(present), numbers, Hook.BETWEEN_CYCLES)
         self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
         self.part.give_back(state)
         self._columns = self.part.columns
@@ -338,8 +340,8 @@ class BodySteps(GrainSteps):
 
     def _held_loads(self) -> tuple[np.ndarray, ...]:
         """Forces and torques (3, n) that act on awake grains for the whole step; none where rigid kicks do."""
-        stage = self.part.engine.content.of_components.get(StageNumber.HELD_LOADS)
-        return () if stage is None else stage[1]
+        found = self.part.engine.content.of_components.get(Hook.LOADS, ())
+        return next((numbers for stage, numbers in found if stage is add_held_loads), ())
 
     def _begin_far_loads(self, state: State) -> None:
         """Hold the far loads for the step, or kick the awake clusters by half of them."""
@@ -463,8 +465,8 @@ class BodySteps(GrainSteps):
         """Mark bodies near others or walls, and those with driven grains, which do not come to rest."""
         state, table = engine.regular_state, engine.table_of(engine.regular_state)
         mark_near_bodies.run(table)
-        if (added := engine.content.of_components.get(StageNumber.COMPONENT_BODIES)) is not None:
-            added[0].run(table, added[1], MARK)
+        for stage, numbers in engine.content.of_components.get(Hook.NEAR_BODIES, ()):
+            stage.run(table, numbers, Hook.NEAR_BODIES)
         firsts = state.bodies.first[engine.content.heavy]
         state.bodies.near[firsts] = np.maximum(state.bodies.near[firsts], NEAR)
 

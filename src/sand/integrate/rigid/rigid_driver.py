@@ -29,17 +29,18 @@ from ...basics.state import (
     TIME,
 )
 from ...compiler.jit import caller, formula, loop
-from ...compiler.program import call_stage, has_stage
+from ...compiler.program import call_stage
 from ...compiler.stage import stage
 from ...neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
 from ...numerics.quaternion import turned
 from ...numerics.vec import accrue, dot, load, load4, nearest_image, norm, put, sub
 from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
+from ..hooks import Hook, call_hook
 from ..motion import wrap_all
 from ..parts import DRIVER_PARTS, Stop
 from ..respa import add_long_range_loads
-from ..stages import MARK, MOVE, StageNumber
+from ..stages import StageNumber
 from ..step_control import is_close, is_past
 from ..task_queue import join_workers
 from .body_friction import drift_bodies_in_gas
@@ -238,8 +239,7 @@ def first_half(s, some_awake):
     s.clock[STEP] = h
     if not takes_substeps:
         find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
-        if has_stage(s, StageNumber.COMPONENT_BODIES):
-            call_stage(s, StageNumber.COMPONENT_BODIES, MARK)
+        call_hook(s, Hook.NEAR_BODIES)
     find_loaded_bodies(s.grains, s.bodies, s.clock, s.count)
     if any_has_to_wake(s.bodies, s.count):
         s.bodies.quick[:] = 0
@@ -248,8 +248,8 @@ def first_half(s, some_awake):
         return Stop.SUBSTEPS.value
     kick_bodies(s.bodies, s.count, 0.5 * h)
     drift_with_work(s, h)
-    if not some_awake and has_stage(s, StageNumber.COMPONENT_BODIES):
-        call_stage(s, StageNumber.COMPONENT_BODIES, MOVE)
+    if not some_awake:
+        call_hook(s, Hook.NONE_AWAKE)
     s.count[STAGE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
