@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...analysis.clusters import cluster_labels
 from ...basics.arrays import LOADS_OF_BODIES
+from ...basics.clusters import labels_of
 from ...basics.state import BODIES, CONTACTS, State
 from ...forces.gas_loops import GasParameters
 from ...integrate.rigid.body_friction import friction_modes
@@ -44,7 +44,7 @@ def sort_members(state: State) -> None:
 def form_bodies(state: State) -> None:
     """Make a body of each grain without contacts, at rest, and of each cluster, awake and not yet described."""
     bodies, n = state.bodies, len(state.grains)
-    labels = cluster_labels(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
+    labels = labels_of(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
     first = np.full(labels.max(initial=-1) + 1, n)
     np.minimum.at(first, labels, np.arange(n))
     bodies.first[:], bodies.asleep[:] = first[labels], 0
