@@ -56,7 +56,7 @@ def error_of(folder, arrays, meta=META):
 def refusal_of(arrays):
     """The error message for these arrays, without a file."""
     with pytest.raises(sand.BadInput) as error:
-        check_state(arrays, META | {"version": VERSION})
+        check_state(arrays, META | {"version": VERSION}, components.groups())
     (message,) = error.value.problems
     return message
 
