@@ -296,7 +296,7 @@ def test_output_split_and_resume_change_no_bit(tmp_path):
 @pytest.mark.compiled("contacts")
 def test_order_in_memory_and_threads(monkeypatch):
     """Sorted arrays change results by rounding only; threads change no bit."""
-    from sand.engine import engine
+    from sand.engine import compiled_state
     from sand.integrate import task_queue
 
     plain, ordered = bouncing(), bouncing(order="curve")
@@ -306,7 +306,7 @@ def test_order_in_memory_and_threads(monkeypatch):
     first, second = (sorted(at_walls(sim).T.tolist()) for sim in (plain, ordered))
     assert first == second != []
     np.testing.assert_allclose(ordered.grains.position, plain.grains.position, rtol=0.0, atol=1e-6 * R)
-    for module in (task_queue, engine):
+    for module in (task_queue, compiled_state):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: True)
     ends = []
     for number in (1, 2):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +16,9 @@ from ..contact.law import ContactLaw
 from ..contact.measure import ENERGIES
 from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
+from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import DT, LIMIT, Stop
-from ..integrate.stages import NEXT_STEP, StageNumber
+from ..integrate.stages import NO_STEP
 from ..integrate.step_control import CLOSING_FRACTION, quantise_step
 from ..numerics.vec import accrue, dot, load, scale, sub
 from .wall_formulas import wall_displacements
@@ -142,7 +142,7 @@ def wall_loads(grains, wall_contacts):
 @stage("the work of the noise of contacts with walls", parts=(*WALL_PARTS, "scratch"))
 def bath_wall_work(s, parameters, block):
     """As `integrate.stages.bath_work`, of contacts with walls; a wall with a mass is accelerated along its normal."""
-    weight = half_kick_weight(s.clock[STEP], s.scratch[DT] if block == NEXT_STEP else 0.0)
+    weight = half_kick_weight(s.clock[STEP], 0.0 if block == NO_STEP else s.scratch[DT])
     for c in range(s.wall_contacts.used[0]):
         g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
         n = load(s.walls.normal, w)
@@ -154,17 +154,13 @@ def bath_wall_work(s, parameters, block):
     return 0
 
 
-def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> dict[int, tuple[Stage, Any]]:
-    """All stages by number, with their parameters."""
-    noisy = damping == THERMAL
-    of_bath: dict[int, tuple[Stage, Any]] = (
-        {StageNumber.COMPONENT_BATH_WORK: (bath_wall_work, numbers)} if noisy else {}
-    )
+def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> HookStages:
+    """The stages of walls at each place of a step, with their parameters."""
     return {
-        StageNumber.COMPONENT_CONTACTS: (contacts_stage(law, damping), numbers),
-        StageNumber.COMPONENT_LOADS: (wall_loads, ()),
-        StageNumber.COMPONENT_STEP: (step_stage(law), numbers),
+        Hook.LIMIT_STEP: [(step_stage(law), numbers)],
+        Hook.BATH_WORK: [(bath_wall_work, numbers)] if damping == THERMAL else [],
+        Hook.CONTACTS: [(contacts_stage(law, damping), numbers)],
+        Hook.LOADS: [(wall_loads, ())],
         # called by the engine for rows of the ledger, with an array of its own; here it is compiled with the others
-        StageNumber.COMPONENT_ENERGIES: (energies_stage(law), (np.zeros(len(ENERGIES)),)),
-        **of_bath,
+        Hook.ENERGIES: [(energies_stage(law), (np.zeros(len(ENERGIES)),))],
     }

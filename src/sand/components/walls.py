@@ -1,7 +1,7 @@
 """Walls: planes to which grains stick, at rest, moving with a given velocity, or with a mass and a given force.
 
 Their energies reach the ledger in two ways: what their contacts store is added to the columns of contacts (`normal`, …)
-by the stage COMPONENT_ENERGIES, and what moving walls took from grains and contacts is `lost_walls`, in `Walls.row`.
+by a stage of `Hook.ENERGIES`, and what moving walls took from grains and contacts is `lost_walls`, in `Walls.row`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ..contact.constants_table import constant_names
 from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
+from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
 from .wall_arrays import WallArrays, WallContactArrays
@@ -155,18 +156,18 @@ class Walls(Component):
             problems.append(f"walls: sand.{type(stepping).__name__} does not know walls; use stepping=sand.Verlet()")
         for wall in self.items:
             problems += _material_problems(wall, setup.grains, contact)
-            lengths = setup.box.lengths
+            lengths, materials = setup.box.lengths, (wall.material, *setup.grains.materials)
             axes = [axis for axis, v, length in zip("xyz", wall.normal, lengths, strict=True) if v and length]
             if axes:
                 problems.append(
                     f"walls: the normal of '{wall.name}' has a component along {axes[0]}, along which the box is "
                     "periodic; open this axis, or give another normal"
                 )
-            elif setup.fresh and contact is not None and wall.material.surface_energy is not None:
+            elif setup.fresh and contact is not None and all(m.surface_energy is not None for m in materials):
                 problems += _grain_problems(wall, setup.grains, contact)
         return problems
 
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Contacts, loads, the limit of the step, and the work of a bath."""
         contact = setup.forces.contact
         assert contact is not None
