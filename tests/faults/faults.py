@@ -117,7 +117,7 @@ FAULTS = (
           "ENERGY) - before + work", "ENERGY) - before - work",
           "examples/test_forest_ruth.py::test_work_of_an_oscillating_and_of_a_ramped_field"),
     Fault("the second half of a kick is a whole one", "factor 2", "loop", "integrate/driver.py",
-          "return kick(s.grains, 0.5 * s.clock[STEP])", "return kick(s.grains, s.clock[STEP])",
+          "= kick(s.grains, 0.5 * s.clock[STEP])", "= kick(s.grains, s.clock[STEP])",
           "physics/test_magnetic_dynamics.py::test_oscillation_of_two_distant_dipoles"),
     Fault("after a break the others keep the wrong twist", "lost row", "loop", "contact/events.py",
           "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
