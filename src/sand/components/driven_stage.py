@@ -8,7 +8,7 @@ driven grains, ½ Δt (F·v + M·ω) with the loads at either end of a step, and
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -28,6 +28,10 @@ class DrivenArrays(NamedTuple):
     spin: np.ndarray  # (3, K) [rad/s]
     mass: np.ndarray  # (K,) [kg], as of other grains
     inertia: np.ndarray  # (K,) [kg m²]
+
+    def for_part(self, heavy: np.ndarray, grains: int) -> Self:
+        """The same for a part in which the driven grains have other numbers."""
+        return self._replace(grain=heavy)
 
 
 @loop
@@ -90,13 +94,14 @@ def drive(grains, lost, scratch, parameters, block):
     elif block == Hook.AFTER_CONTACTS.value or block == Hook.AFTER_CHANGES.value:
         lost[OUTSIDE] += restore_velocities(grains, parameters)
         set_masses(grains, parameters, 1.0)
-    else:  # BETWEEN_CYCLES, after drag and random kicks, and before the settling of clusters
+    else:  # after drag and random kicks; BETWEEN_CYCLES, the settling of clusters follows
         lost[OUTSIDE] += kinetic_energy(grains, parameters)
         restore_velocities(grains, parameters)
-        set_masses(grains, parameters, HEAVY)
+        set_masses(grains, parameters, HEAVY if block == Hook.BETWEEN_CYCLES.value else 1.0)
     return 0
 
 
 KICKS = Hook.BEFORE_DRIFT, Hook.AFTER_DRIFT, Hook.BEFORE_KICK, Hook.AFTER_KICK
-CONTACTS, CHANGES = (Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS), (Hook.BETWEEN_CYCLES, Hook.AFTER_CHANGES)
+CONTACTS = Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS
+CHANGES = Hook.BETWEEN_CYCLES, Hook.AFTER_CHANGES, Hook.END_OF_BODIES
 """Where driven grains are held and released; in CHANGES if a gas or settling changes velocities."""
