@@ -107,7 +107,7 @@ class Engine(CompiledState):
     neighbours : Neighbours
         Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
     force_dependent : callable
-        `(forces, grains)` → `kinds.ForceDependent`: the parameters of steps that follow from numbers of the forces.
+        `(forces, grains)` → `step_parameters.ForceDependent`: what follows from numbers of the forces.
     components : Sequence
         Components (`component.Component`); the engine calls their methods for Python at fixed places.
     stepper : GrainSteps
