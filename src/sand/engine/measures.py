@@ -132,8 +132,7 @@ def record_bath_work(engine: CompiledState, state: State) -> None:
     with engine.heavy_grains(state):
         bath_work.run(engine.table_of(state), (), NO_STEP)
         if (added := engine.content.of_components.get(StageNumber.COMPONENT_BATH_WORK)) is not None:
-            stage, numbers = added
-            stage.run(engine.table_of(state), numbers, NO_STEP)
+            added[0].run(engine.table_of(state), added[1], NO_STEP)
 
 
 def body_motion(engine: CompiledState) -> BodyMotion:
