@@ -193,6 +193,15 @@ class State:
         """Which grains (N,) belong to clusters at rest, single grains included; None without rigid clusters."""
         return self.bodies.asleep == 1 if self.bodies.asleep.size else None
 
+    def limiting_grains(self) -> tuple[int, ...]:
+        """Indices of the grains that caused the last stop."""
+        return tuple(sorted({int(self.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))
+
+    def begin_empty_step(self) -> None:
+        """Be in the middle of a step of 0 s, whose second half sums the loads."""
+        self.count[STAGE] = 1
+        self.clock[STEP] = self.clock[CYCLE] = self.clock[LEFT] = 0.0
+
     def held_grains(self) -> np.ndarray:
         """Grains in tables of components, such as those in contact with walls."""
         found = [
