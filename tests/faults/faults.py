@@ -198,7 +198,7 @@ FAULTS = (
           'seconds = si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
           "unit/cli/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
     # analysis
-    Fault("a cluster is made whole without images", "forgotten image", "analysis", "analysis/clusters.py",
+    Fault("a cluster is made whole without images", "forgotten image", "analysis", "basics/clusters.py",
           "whole[i] + box.nearest(whole[j] - whole[i])", "whole[i] + (whole[j] - whole[i])",
           "unit/analysis/test_clusters.py::test_clusters_are_made_whole"),
     # set-up

@@ -68,7 +68,7 @@ class DrivenGrains(Component):
 
     name = "driven"
     noun = "driven grains"
-    keeps_order = every_step = own_columns = True
+    keeps_order = every_step = own_columns = holds = True
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""

@@ -7,7 +7,7 @@ driven grains, ½ Δt (F·v + M·ω) with the loads at either end of a step, and
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -27,6 +27,10 @@ class DrivenArrays(NamedTuple):
     spin: np.ndarray  # (3, K) [rad/s]
     mass: np.ndarray  # (K,) [kg], as of other grains
     inertia: np.ndarray  # (K,) [kg m²]
+
+    def for_part(self, heavy: np.ndarray, grains: int) -> Self:
+        """The same for a part in which the driven grains have other numbers."""
+        return self._replace(grain=heavy)
 
 
 @loop

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..basics.state import GRAIN1, STEP
+from ..basics.state import GRAIN1, LATE, STEP
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import accelerations, half_kick_weight, record_half_kick
@@ -18,6 +18,7 @@ from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
 from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import DT, LIMIT, Stop
+from ..integrate.rigid.body_touches import NEAR, TOUCHING, reach_of_plane
 from ..integrate.stages import NO_STEP
 from ..integrate.step_control import CLOSING_FRACTION, quantise_step
 from ..numerics.vec import accrue, dot, load, scale, sub
@@ -27,6 +28,7 @@ from .wall_loops import (
     WALL_PARTS,
     WallNumbers,
     constants_loop,
+    move_walls_alone,
     relative_velocity,
     wall_height,
     wall_loop,
@@ -154,7 +156,36 @@ def bath_wall_work(s, parameters, block):
     return 0
 
 
-def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> HookStages:
+OF_BODIES = Hook.NEAR_BODIES, Hook.NONE_AWAKE
+
+
+@stage("the walls that bodies may touch", parts=(*WALL_PARTS, "bodies", "gas", "flight_limits"))
+def bodies_at_walls(s, parameters, block):
+    """Mark bodies near walls (`BodyArrays.near`) for the present step; at NONE_AWAKE, move walls without contacts."""
+    grains, bodies, walls, h = s.grains, s.bodies, s.walls, s.clock[STEP]
+    if block == Hook.NONE_AWAKE.value:
+        move_walls_alone(walls, s.wall_contacts, parameters, h)
+        return 0
+    for c in range(s.wall_contacts.used[0]):
+        first = bodies.first[s.wall_contacts.pair[0, c]]
+        bodies.near[first] = max(bodies.near[first], NEAR)
+    for w in range(walls.work.size):
+        n = load(walls.normal, w)
+        # as of a grain, twice the distance by its present acceleration
+        moved = abs(dot(load(walls.force, w), n) + parameters.push[w]) / parameters.mass[w] * h * h
+        for g in range(grains.mass.size):
+            gap, first = wall_height(grains, walls, g, w) - grains.radius[g], bodies.first[g]
+            closing = -dot(relative_velocity(grains, walls, g, w), n)
+            reach = moved + reach_of_plane(grains, bodies, g, closing, s.gas, s.flight_limits.friction_rate, h)
+            if not gap > reach and bodies.asleep[g] == 1:  # also if the reach is not a number
+                bodies.near[first] = TOUCHING
+                s.count[LATE] += 1 if gap < 0.0 else 0
+            elif not gap > 2.0 * reach:
+                bodies.near[first] = max(bodies.near[first], NEAR)
+    return 0
+
+
+def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers, *, moves_bodies: bool) -> HookStages:
     """The stages of walls at each place of a step, with their parameters."""
     return {
         Hook.LIMIT_STEP: [(step_stage(law), numbers)],
@@ -163,4 +194,5 @@ def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> HookStag
         Hook.LOADS: [(wall_loads, ())],
         # called by the engine for rows of the ledger, with an array of its own; here it is compiled with the others
         Hook.ENERGIES: [(energies_stage(law), (np.zeros(len(ENERGIES)),))],
+        **{hook: [(bodies_at_walls, numbers)] for hook in (OF_BODIES if moves_bodies else ())},
     }

@@ -27,6 +27,7 @@ from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
 from ..integrate.hooks import HookStages
+from ..integrate.integrator import moves_bodies
 from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
 from .wall_arrays import WallArrays, WallContactArrays
@@ -140,6 +141,7 @@ class Walls(Component):
 
     name = "walls"
     noun = "walls"
+    holds = True
     groups: ClassVar = {"walls": WallArrays, "wall_contacts": WallContactArrays}
 
     def problems(self, setup: Setup) -> list[str]:
@@ -179,7 +181,7 @@ class Walls(Component):
             np.array([math.inf if wall.mass is None else wall.mass for wall in self.items]),
             np.array([wall.force or 0.0 for wall in self.items]),
         )
-        return wall_stages(law, variant_of(settings), numbers)
+        return wall_stages(law, variant_of(settings), numbers, moves_bodies=moves_bodies(setup.stepping))
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state its walls, and memory for their contacts."""

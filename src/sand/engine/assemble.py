@@ -81,11 +81,12 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    kind, verlet, errors = KINDS.get(stepping.name, Kind)(), stepping.contact_stepping, ErrorCollector()
+    holding, verlet, errors = [each for each in extra if each.holds], stepping.contact_stepping, ErrorCollector()
+    kind = KINDS.get(stepping.name, Kind)(holds=bool(holding))
     by_type = forces_by_type(forces, grains)
     setup = Setup(grains, by_type, box, stepping, neighbours, fresh, saved)
     warnings = errors.take(check_system, grains, forces, box, fresh=fresh, instead=[])
-    warnings += errors.take(kind.check, forces, [each.noun for each in extra if each.noun], neighbours, instead=[])
+    warnings += errors.take(kind.check, forces, neighbours, instead=[])
     errors.problems += [line for each in extra for line in each.problems(setup)]
     errors.done()
     wrapped = _wrapped(grains, box, fresh=fresh)
@@ -157,7 +158,7 @@ def build_engine(
     )
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
-        return build_engine(wrapped, others, box, verlet, search, seed, fresh=False)
+        return build_engine(wrapped, others, box, verlet, search, seed, holding, fresh=False)
 
     kind.complete(engine, forces, build)
     for each in extra:

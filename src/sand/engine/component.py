@@ -52,11 +52,13 @@ class Component:
     name : str
         Its keyword of `sand.Simulation`, and its table in case files.
     noun : str
-        What it adds, in sentences: "rigid clusters cannot have walls"; empty if it can be used with rigid clusters.
+        What it adds, in sentences: "walls cannot be used together with …".
     keeps_order : bool
         Whether grains keep the order in which they were given.
     every_step : bool
         Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
+    holds : bool
+        Whether it may hold grains, so that loads on their clusters do not move these as rigid bodies.
     own_columns : bool
         Whether each contact needs its own constants, also between equal grains.
     watches_contacts : bool
@@ -74,6 +76,7 @@ class Component:
     keeps_order: ClassVar[bool] = False
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
+    holds: ClassVar[bool] = False
     watches_contacts: ClassVar[bool] = False
     groups: ClassVar[Mapping[str, type]] = {}
 

@@ -32,7 +32,9 @@ class Hook(IntEnum):
     AFTER_KICK = 9  # velocities, positions and loads are those of the end of the step; its length is scratch[DT]
     END_STEP = 10  # the step is counted: TIME and STEPS are those of its end
     BETWEEN_CYCLES = 11  # after END_STEP, but not within a cycle of r-RESPA: change velocities
-    ENERGIES = 12  # not called by the driver: add energies to an array, for a row of the ledger
+    NEAR_BODIES = 12  # of a step of bodies of clock[STEP]: mark those that may touch something but each other
+    NONE_AWAKE = 13  # bodies have moved by clock[STEP], and no cluster takes contact steps in which other things move
+    ENERGIES = 14  # not called by the driver: add energies to an array, for a row of the ledger
 
 
 HookStages = Mapping[Hook, list[tuple[Any, Any]]]

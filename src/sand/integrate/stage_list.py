@@ -47,6 +47,19 @@ class ProgramContent(NamedTuple):
     of_components: HookStages
     heavy: np.ndarray  # grains whose mass counts as infinite in contacts
 
+    def for_part(self, grains: int) -> ProgramContent:
+        """The same for a part with this number of grains, among them the heavy ones, which have other numbers there.
+
+        Parameters of components that depend on these have a method `for_part`.
+        """
+        heavy = self.heavy.copy()
+
+        def own(numbers: Any) -> Any:
+            return numbers.for_part(heavy, grains) if hasattr(numbers, "for_part") else numbers
+
+        stages = {hook: [(each, own(given)) for each, given in found] for hook, found in self.of_components.items()}
+        return self._replace(heavy=heavy, of_components=stages)
+
 
 def stages_of(given: ProgramContent, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
     """The stages that a simulation calls, by number, with their own parameters."""
