@@ -135,9 +135,8 @@ def build_engine(
         of_components=of_components,
         heavy=np.array([i for each in extra for i in each.heavy()], np.int64),
     )
-    capacity = int(OVER_ALLOCATION * len(touching))
-    over_all_pairs = any(not own and not sums.own_memory for own, sums in zip(listed, loops, strict=True))
-    state = new_state(wrapped, box, parameters, content, capacity, over_all_pairs=over_all_pairs)
+    all_pairs = any(not own and not sums.own_memory for own, sums in zip(listed, loops, strict=True))
+    state = new_state(wrapped, box, parameters, content, int(OVER_ALLOCATION * len(touching)), over_all_pairs=all_pairs)
     state.count[COMPARED] = 0 if any(each.watches_contacts for each in extra) else -1
     for each in extra:
         each.add_arrays(state, law, parameters.settings)

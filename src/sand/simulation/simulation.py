@@ -290,11 +290,8 @@ class Simulation(ReadOnlySettings):
         choices = {"start": self.origin} if self.origin else {}
         choices["boundary"] = self.box.describe()
         for force in self.forces:
-            choose = getattr(force, "choose", None)
-            if choose is not None:
-                radius, reason = choose(self.start, self.box)
-                length = "none" if radius is None else format_quantity(radius, "m")
-                choices[f"{force.name} cut-off"] = f"{length} ({reason})"
+            if choose := getattr(force, "choose", None):
+                choices[f"{force.name} cut-off"] = str(choose(self.start, self.box))
         choices |= {name: text for each in engine.components for name, text in each.choices().items()}
         return choices | {"neighbours": engine.search} | present
 

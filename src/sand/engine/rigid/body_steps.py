@@ -15,11 +15,9 @@ from ...basics.state import (
     BODIES,
     CONTACT_STEPS,
     CONTACTS,
-    CYCLE,
     GRAINS_AWAKE,
     LARGEST_LOAD,
     LATE,
-    LEFT,
     LONG_RANGE_SUMS,
     OUTSIDE,
     QUIETING,
@@ -282,8 +280,7 @@ class BodySteps(GrainSteps):
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in engine.external:
                 state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
-        present.count[STAGE] = 1
-        present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
+        present.begin_empty_step()
         inner.drive(-math.inf, 1)
         present.count[STEPS] = 0
         self._begin_far_loads(state)
