@@ -130,7 +130,6 @@ def build_engine(
         pair_forces=[own[1:] for own in long_range],
         external_forces=[(force.formula, force.numbers()) for force in by_type.external],
         flight=stepping.flight,
-        gas=bool(by_type.gas),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
         of_components=of_components,
@@ -157,7 +156,8 @@ def build_engine(
     )
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
-        return build_engine(wrapped, others, box, verlet, search, seed, holding, fresh=False)
+        own = [each for each in extra if each.in_parts]
+        return build_engine(wrapped, others, box, verlet, search, seed, own, fresh=False)
 
     kind.complete(engine, forces, build)
     for each in extra:

@@ -173,7 +173,7 @@ class Simulation(ReadOnlySettings):
         self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         forces = fitting_forces(forces, integrator)
-        extra = [*in_use(given), *components_of(forces, grains, box)]
+        extra = components_of(given, forces, grains, box)
         parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), extra)
         arrays, meta = ({}, {}) if restart is None else restart
         is_new = restart is None
