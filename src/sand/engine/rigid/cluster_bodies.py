@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...analysis.clusters import cluster_labels
 from ...basics.arrays import LOADS_OF_BODIES
+from ...basics.clusters import labels_of
 from ...basics.state import BODIES, CONTACTS, State
 from ...forces.gas_loops import GasParameters
 from ...integrate.rigid.body_friction import friction_modes
@@ -47,7 +47,7 @@ def form_bodies(state: State, held: np.ndarray) -> None:
     Single grains among the `held` ones are awake, too.
     """
     bodies, n = state.bodies, len(state.grains)
-    labels = cluster_labels(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
+    labels = labels_of(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
     first = np.full(labels.max(initial=-1) + 1, n)
     np.minimum.at(first, labels, np.arange(n))
     bodies.first[:], bodies.asleep[:] = first[labels], 0
