@@ -804,6 +804,71 @@ def refused(match, forces, **options):
         gas(forces=forces, number=4, **options)
 
 
+RAMPED = sand.Field(sand.Ramp([[0, 0, 0], [0, "20 mT", "40 mT"]], ["8 ns", "28 ns"], steps=60))
+
+
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off")
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("vibration", [0.01, 1e-40], ids=["at rest", "awake"])
+def test_a_cluster_turns_in_a_field_with_a_ramp_as_grain_by_grain(vibration):
+    """Motion, and the work of the source −Σ ∫ μ·dB, against `sand.Verlet`; the cluster is at rest, or kept awake.
+
+    A change of the field waits for the end of a step of h = 0.1 ns: the ramp of 20 ns is late by h/2, 0.25 % of its
+    length, and so is the angle of 2 to 4 rad by which it turns the grains at 1.4e-8 m from the centre: 1e-10 m.
+    """
+    corner = np.array([[0.0, 0.0, 0.0], [PITCH, 0.0, 0.0], [PITCH, PITCH, 0.0]])
+    mass = sand.Grains(corner, 1e-8, "iron").mass[0]
+    ends = []
+    for stepping in (sand.RigidClusters(longest_step="0.1 ns", vibration=vibration), sand.Verlet()):
+        grains = sand.Grains(corner, 1e-8, "iron", moment=2e2 * mass * np.array([[1, 0, 0], [0, 1, 0], [0, 1, 0]]))
+        sim = sand.Simulation(grains, [contact(), sand.Dipoles(cutoff=None), RAMPED], stepping=stepping)
+        sim.run(until="36 ns")
+        ends.append(sim)
+    one, other = ends
+    assert one.state.at_rest.all() == (vibration == 0.01) == (one.regular_state.clock[SOME_AWAKE] < 0.1 * one.time)
+    np.testing.assert_allclose(one.grains.position, other.grains.position, rtol=0.0, atol=2e-10)
+    row, exact = one._log_row(), other._log_row()
+    assert row["field"] == pytest.approx(exact["field"], rel=1e-2, abs=0.0)
+    assert row["lost_outside"] == pytest.approx(exact["lost_outside"], rel=1e-2, abs=0.0) != 0.0
+    for sim in ends:
+        assert sim.ledger["total"][-1] == pytest.approx(sim.ledger["total"][0], abs=5e-3 * abs(exact["lost_outside"]))
+
+
+@pytest.mark.compiled("dipoles")
+def test_friction_of_a_cluster_at_rest_follows_a_ramp_of_the_gas():
+    """Without noise a pair at rest slows down as v exp(−∫ Γ dt), Γ = f_t/m with the pressure of each interval.
+
+    f_t is proportional to the pressure p at a constant temperature: v(t) = v(0) (v₁/v(0))^(∫ p dt/p₀t₁), with v₁ of a
+    run at p₀.  Friction is exact; the jump of p waits for the end of a step of at most 0.5 ns, 1/280 of the integral.
+    """
+    ends = []
+    for pressure in ("1 bar", sand.Ramp(["1 bar", "1 bar", "3 bar", "3 bar"], ["0 ns", "20 ns", "20 ns", "60 ns"])):
+        grains = sand.Grains([[0, 0, 0], [PITCH, 0, 0]], 1e-8, "iron", velocity=[0, 1.0, 0])
+        forces = [contact(), sand.Gas("300 K", pressure=pressure, brownian=False)]
+        sim = sand.Simulation(grains, forces, stepping=sand.RigidClusters(longest_step="0.5 ns"), frame_every=1.0)
+        sim.run(until="60 ns")
+        ends.append(math.log(sim.grains.velocity[0, 1]))
+        assert sim.state.at_rest.all()
+    assert ends[1] / ends[0] == pytest.approx((20.0 + 3.0 * 40.0) / 60.0, rel=1e-2, abs=0.0)
+
+
+@pytest.mark.filterwarnings("ignore:dipoles. the cut-off")
+@pytest.mark.compiled("dipoles")
+def test_output_and_restarts_change_no_bit_with_ramps(tmp_path):
+    """A magnetic gas in a growing field and a gas that becomes hotter, in one run and stopped within the ramps."""
+    thermal = sand.Gas(sand.Ramp(["100 K", "300 K"], ["5 ns", "25 ns"], steps=10), pressure="1 bar")
+    forces = [contact(), sand.Dipoles(cutoff="0.15 um"), RAMPED, thermal]
+    whole, often = gas(forces=forces), gas(forces=forces, frame_every="3 ns")
+    stopped = gas(forces=forces, out=tmp_path / "run")
+    whole.run(until="40 ns")
+    often.run(until="40 ns")
+    stopped.run(until="17.3 ns")
+    again = sand.resume(tmp_path / "run")
+    again.run(until="40 ns")
+    assert whole.regular_state.count[RESTED] > 0 and whole.ledger.drift < 5e-3
+    assert different(whole, often) == different(whole, again) == []
+
+
 def test_what_rigid_clusters_cannot_do_is_refused():
     """One line for each, with what to do."""
     refused("without damping no cluster comes to rest; use damping = 'critical'", [sand.Contact()])
@@ -816,8 +881,8 @@ def test_what_rigid_clusters_cannot_do_is_refused():
     ):
         gas(forces=[sand.Contact(damping="critical")], number=4)
     refused(
-        "cannot follow the ramp field.flux_density; use a number, or use clusters = 'grains'",
-        [contact(), sand.Field(sand.Ramp([0.0, 1e-9], [0.0, 1e-3]))],
+        "cannot follow the ramp contact.surface_energy_factor: each change .* would wake all clusters; use a number",
+        [contact(surface_energy_factor=sand.Ramp([1.0, 0.9], [0.0, 1e-3]))],
     )
 
 

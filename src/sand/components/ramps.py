@@ -55,6 +55,7 @@ class Ramps(Component):
             for force, sums, numbers in engine.long_range
         ]
         engine.set_forces(long_range, [now.get(force.name, force) for force in engine.external])
+        engine.stepper.follow(engine, forces)
 
     def update(self, engine: Engine) -> None:
         """Change parameters if the regular state is in new intervals of the ramps, and compute loads anew.
@@ -75,7 +76,7 @@ class Ramps(Component):
         engine.sort_in_space()
         if of_contacts:
             state.pair_list.anchor[0, 0] = math.inf  # the list has constants of possible contacts: build it anew
-        engine.sum_loads()
+        engine.stepper.sum_loads(engine)
 
     def _energy(self, engine: Engine) -> float:
         """Energy [J] of the forces with ramps."""

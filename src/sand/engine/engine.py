@@ -69,6 +69,13 @@ class GrainSteps:
         """Take steps up to a time [s] or a step; returns why no more were taken."""
         return engine.run_driver(advance, until, last, shorten)
 
+    def follow(self, engine: Engine, forces: Sequence[Force]) -> None:
+        """Called when numbers of the forces have changed, to these, with those of the engine."""
+
+    def sum_loads(self, engine: Engine) -> None:
+        """Sum the loads after such a change."""
+        engine.sum_loads()
+
     def loads(self, engine: Engine) -> tuple[np.ndarray, np.ndarray]:
         """Forces [N] and torques [N m] on the grains, (N, 3)."""
         grains = engine.state.grains

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, cast
@@ -64,8 +65,11 @@ class BodiesKind(Kind):
             problems.append(
                 f"with bath_temperature in [forces.contact] no cluster comes to rest; leave it out, or {GRAINS}"
             )
-        ramps = [f"{force.name}.{name}" for force in forces for name in ramps_of(force)]
-        problems += [f"rigid clusters cannot follow the ramp {name}; use a number, or {GRAINS}" for name in ramps]
+        problems += [
+            f"rigid clusters cannot follow the ramp contact.{name}: each change of limits of contacts would wake all "
+            f"clusters; use a number, or {GRAINS}"
+            for name in ramps_of(contact)
+        ]
         if neighbours.order == "curve":
             problems.append(
                 f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}"
@@ -125,21 +129,27 @@ class BodiesKind(Kind):
 
         Parts sum forces between nearest images of all their pairs; what other images add is left to all bodies.
         """
-        state, parameters = engine.regular_state, engine.parameters
-        state.bodies = body_arrays(len(state.grains), in_gas=parameters.gas.gas.on)
+        state = engine.regular_state
+        state.bodies = body_arrays(len(state.grains), in_gas=engine.parameters.gas.gas.on)
+        engine.stepper = self._steps(engine, forces, build)
+
+    def _steps(self, engine: Engine, forces: Sequence[Force], build: Build) -> BodySteps:
+        """Steps of bodies, with parts for forces without ramps."""
+        parameters = engine.parameters
         near = [_between_all(force) for force in forces]
         inner = build(near, Neighbours("all pairs", order="as given"))
         if self.holds and engine.content.pair_forces:
             stages = dict(inner.content.of_components)
             none = HeldLoads(np.zeros((3, 0)), np.zeros((3, 0)))
             stages[Hook.LOADS] = [*stages.get(Hook.LOADS, ()), (add_held_loads, none)]
-            inner.content = inner.content._replace(of_components=stages).for_part(len(state.grains))
+            inner.content = inner.content._replace(of_components=stages).for_part(len(inner.regular_state.grains))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
         steps = BodySteps(Part(inner, CONTACT_STEPS))
         of_quick = dataclasses.replace(inner, parameters=own, warnings=engine.warnings, stepper=steps)
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
-        engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), None if self.holds else quick)
+        made = functools.partial(self._steps, build=build)
+        return BodySteps(Part(inner, CONTACT_STEPS), None if self.holds else quick, made)
 
 
 def _between_all(force: Force) -> Force:

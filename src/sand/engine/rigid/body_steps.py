@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -35,6 +36,7 @@ from ...basics.state import (
 from ...compiler.stage import PythonStage, Stage
 from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
+from ...forces.base import Force
 from ...integrate.hooks import Hook
 from ...integrate.parts import DT, Stop
 from ...integrate.rigid.awake_clusters import (
@@ -93,10 +95,13 @@ class BodySteps(GrainSteps):
         The grains of awake clusters.
     quick : QuickBodies or None
         Substeps of quick bodies; None: no body takes any.
+    made : callable or None
+        `(engine, forces)` → such steps for other numbers of the forces.
     """
 
     part: Part
     quick: QuickBodies | None = None
+    made: Callable[[Engine, Sequence[Force]], BodySteps] | None = None
     _grains: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # grains that are awake
     _columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))  # contacts between them
     _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
@@ -104,10 +109,11 @@ class BodySteps(GrainSteps):
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
     _had_substeps: bool = field(init=False, default=False)  # of the present step
+    _changed_forces: Sequence[Force] | None = field(init=False, default=None)  # which the parts do not have yet
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BodySteps:
         """A copy whose parts have tables of their own."""
-        return BodySteps(copy.deepcopy(self.part, memo), copy.deepcopy(self.quick, memo))
+        return BodySteps(copy.deepcopy(self.part, memo), copy.deepcopy(self.quick, memo), self.made)
 
     def for_part(self) -> BodySteps:
         """As `GrainSteps.for_part`, without substeps."""
@@ -129,6 +135,7 @@ class BodySteps(GrainSteps):
     def begin(self, engine: Engine) -> None:
         """Make a body of each grain without contacts; clusters are awake."""
         state = engine.regular_state
+        self._update_parts(engine)
         form_bodies(state, np.union1d(engine.content.heavy, state.held_grains()))
         self._list_awake(state)
         if self._grains.size:  # the search for touches needs mass and inertia of awake clusters
@@ -173,8 +180,28 @@ class BodySteps(GrainSteps):
 
     def loaded(self, engine: Engine) -> None:
         """As `GrainSteps.loaded`."""
+        self.sort_members(engine.regular_state)
+        self._set_frictions(engine)
+
+    def follow(self, engine: Engine, forces: Sequence[Force]) -> None:
+        """As `GrainSteps.follow`: the parts are made anew before they are used."""
+        self._changed_forces = forces
+        self._set_frictions(engine)
+
+    def _update_parts(self, engine: Engine) -> None:
+        """Make the parts anew if numbers of the forces have changed; they begin anew in each step anyway."""
+        if self._changed_forces is not None and self.made is not None:
+            workers, steps = self.part.prototype.workers, self.made(engine, self._changed_forces)
+            self.part, self.quick, self._changed_forces = steps.part, steps.quick, None
+            self.part.prototype.workers = workers  # instead of more and more threads
+
+    def sum_loads(self, engine: Engine) -> None:
+        """As `GrainSteps.sum_loads`: clusters at rest stay at rest."""
+        self.sum_outer_loads(engine)
+
+    def _set_frictions(self, engine: Engine) -> None:
+        """The modes of friction of all clusters at rest."""
         state, gas = engine.regular_state, engine.parameters.gas.gas
-        self.sort_members(state)
         if gas.on:
             firsts, sizes = np.unique(state.bodies.first, return_counts=True)
             for first in firsts[(sizes > 1) & (state.bodies.asleep[firsts] == 1)].tolist():
@@ -241,6 +268,7 @@ class BodySteps(GrainSteps):
 
     def _take_substeps(self, engine: Engine) -> Stop:
         """The first half of a step of all bodies, and the substeps of the quick ones; returns why they failed."""
+        self._update_parts(engine)
         assert self.quick is not None
         failed = self.quick.take(engine)
         self._had_substeps = failed is Stop.NONE
@@ -273,6 +301,7 @@ class BodySteps(GrainSteps):
     def _take_contact_steps(self, engine: Engine) -> Stop:
         """Contact steps of the awake grains for one step of the bodies."""
         self._had_substeps = False
+        self._update_parts(engine)
         state = engine.regular_state
         present, inner = self._take_awake(state), self.part.engine
         before, end = state.time, state.time + float(state.clock[STEP])
