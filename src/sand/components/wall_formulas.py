@@ -82,6 +82,7 @@ def wall_constants(law: ContactLaw) -> Callable:
 
     @formula
     def constants_at_wall(pairing, radius, mass, wall_mass):
-        return constants_of(pairing, radius, 1.0 / mass + 1.0 / wall_mass, 2.5 / (mass * radius * radius))
+        inverse_inertia = 2.5 / (mass * radius * radius)
+        return constants_of(pairing, radius, radius, 1.0 / mass + 1.0 / wall_mass, inverse_inertia)
 
     return constants_at_wall

@@ -32,7 +32,7 @@ from .law import ContactLaw
 from .losses import record_slip
 from .mechanics import displacements_of, exceeds_limits, release_loss, scaled_stiffness, slip_losses, time_since
 from .transitions import BROKEN_FLAG, PENDING_FLAG, Break, Touch, breaking_loop, clear_contact, touch_loop
-from .update import displacements_before, overlap_share, pose_at, single_contact_loop, slipped_pose
+from .update import displacements_before, pose_at, single_contact_loop, slipped_pose
 
 
 @loop
@@ -231,11 +231,10 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
             formed = clock[TIME] + step.dt - time_since(overlap, closing, step.dt)
             c = add_contact(grains, contacts, count, step.span, step.settings, i, j, formed)
-            share = overlap_share(overlap, grains.radius[i], grains.radius[j])
-            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], share)
             pairing = load_pairing(step.settings.pairings, grains.material[i], grains.material[j])
             reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
             pose, constants = pose_at(grains, contacts, step.span, c, 0.0), constants_at(contacts, c)
+            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], overlap * constants.derived.inverse_radius)
             radius = contact_radius(overlap, radius_root(overlap, constants), constants)
             touched = Touch(n, Held(pose, radius, constants), overlap, closing, reduced, pairing.modulus)
             apply_pair_impulse(grains, i, j, n, touch(grains, contacts, lost, clock, c, touched, step))

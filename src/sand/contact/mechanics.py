@@ -11,7 +11,7 @@ from typing import NamedTuple
 from ..compiler.jit import formula
 from ..numerics.vec import across, add, axpy, cross, dot, scale, sub
 from . import tangential
-from .law import ContactConstants
+from .law import ContactConstants, Derived
 
 
 class Pose(NamedTuple):
@@ -19,9 +19,18 @@ class Pose(NamedTuple):
 
     n: tuple  # unit vector from grain 2 to grain 1
     distance: float  # D [m]
+    inverse_distance: float  # 1/D [1/m]
     n1: tuple  # contact pointers: unit vectors from each centre to the contact, laboratory frame
     n2: tuple
     twist: float  # φ [rad]
+
+
+@formula
+def pose_of(separation, n1, n2, twist):
+    """Pose of two grains with x1 − x2 [m], contact pointers n1, n2 in the laboratory frame and twist φ [rad]."""
+    distance = math.sqrt(dot(separation, separation))
+    inverse = 1.0 / distance
+    return Pose(scale(inverse, separation), distance, inverse, n1, n2, twist)
 
 
 class Displacements(NamedTuple):
@@ -58,6 +67,13 @@ def scaled_stiffness(constants, y, follow):
         constants.twist_damping,
         constants.max_squared_frequency,
         constants.normal,
+        Derived(
+            constants.derived.roll_torque_stiffness * (y2 * y),
+            constants.derived.squared_slide_limit,
+            constants.derived.squared_roll_limit,
+            constants.derived.inverse_break_overlap,
+            constants.derived.inverse_radius,
+        ),
     )
 
 
@@ -83,7 +99,7 @@ def contact_load(pose, normal, r1, r2, constants):
         Constants with the present stiffnesses (see `scaled_stiffness`).
     """
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    pull = constants.slide_stiffness * along / pose.distance
+    pull = constants.slide_stiffness * along * pose.inverse_distance
     force, torque1, torque = load_on_grain(pose, pose.n2, zeta, pull, normal, r1, constants)
     return force, torque1, add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
 
@@ -110,7 +126,7 @@ def load_on_grain(pose, n2, slide, pull, normal, radius, constants):
         Constants with the present stiffnesses.
     """
     force = axpy(normal, pose.n, scale(pull, slide))
-    rolling_torque = scale(constants.reduced_radius**2 * constants.roll_stiffness, cross(pose.n1, n2))
+    rolling_torque = scale(constants.derived.roll_torque_stiffness, cross(pose.n1, n2))
     torque = axpy(constants.twist_stiffness * pose.twist, pose.n, rolling_torque)
     return force, sub(scale(-radius * constants.slide_stiffness, cross(pose.n1, slide)), torque), torque
 
@@ -124,12 +140,15 @@ def displacements_of(pose, overlap, r1, r2, constants):
 
 @formula
 def exceeds_limits(displacements, n, constants):
-    """Whether a displacement exceeds its limit, so that the contact must slip or break."""
-    xi = across(displacements.roll, n)
+    """Whether a displacement exceeds its limit, so that the contact must slip or break.
+
+    With q = R (n1 + n2), ξ² = q² − (q·n)²; q·n is of second order.
+    """
+    roll, along = displacements.roll, dot(displacements.roll, n)
     return (
         (displacements.overlap < -constants.break_overlap)
-        | (dot(displacements.slide, displacements.slide) > constants.slide_limit * constants.slide_limit)
-        | (dot(xi, xi) > constants.roll_limit * constants.roll_limit)
+        | (dot(displacements.slide, displacements.slide) > constants.derived.squared_slide_limit)
+        | (dot(roll, roll) - along * along > constants.derived.squared_roll_limit)
         | (abs(displacements.twist) > constants.twist_limit)
     )
 

@@ -29,7 +29,7 @@ from ..basics.state import (
 from ..compiler.jit import COMPILED, formula, loop, rare
 from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
-from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
+from ..numerics.vec import axpy, load, load4, put, scale, sub
 from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads
@@ -41,6 +41,7 @@ from .mechanics import (
     contact_load,
     displacements_of,
     exceeds_limits,
+    pose_of,
     scaled_stiffness,
     slip_losses,
 )
@@ -53,6 +54,15 @@ SLIP_FRACTION = 0.1
 """Fraction of a block's contacts flagged in the last step, above which the block uses `_slip_contact`."""
 MIN_REMAINDER = 4
 """Remaining contacts from which a padded SIMD vector is faster than a scalar loop."""
+
+
+class PassVariant(NamedTuple):
+    """What the pass over contacts computes; loops are compiled without what a simulation does not need."""
+
+    damping: str = NONE  # of `damping`: NONE, DASHPOTS or THERMAL
+    periodic: bool = True  # nearest images; False for open boxes
+    follow: bool = False  # stiffnesses that follow the contact radius
+    adhesive: bool = False  # whether all contacts adhere
 
 
 class ContactStep(NamedTuple):
@@ -98,42 +108,48 @@ class ContactSums(NamedTuple):
     deepest: float  # largest overlap, in radii of the smaller grain; 0 if no grains overlap
 
 
-@formula
-def overlap_share(overlap, r1, r2):
-    """Overlap in radii of the smaller grain; 0 or less for separated surfaces."""
-    return overlap / (r1 if r1 < r2 else r2)
+@loop
+def _separation(grains, contacts, span, c):
+    """x1 − x2 [m] of the grains of contact c in an open box."""
+    return sub(load(grains.position, contacts.pair[0, c]), load(grains.position, contacts.pair[1, c]))
+
+
+@loop
+def _nearest_separation(grains, contacts, span, c):
+    """x1 − x2 [m] of the grains of contact c in any box."""
+    return nearest_image(_separation(grains, contacts, span, c), span)
 
 
 @loop
 def pose_at(grains, contacts, span, c, twist):
     """Relative pose of the grains of contact c now, with the given twist φ [rad]."""
+    return _pose_apart(grains, contacts, _nearest_separation(grains, contacts, span, c), c, twist)
+
+
+@loop
+def _pose_apart(grains, contacts, separation, c, twist):
+    """As `pose_at`, for given x1 − x2 [m]."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    distance = math.sqrt(dot(separation, separation))
-    return Pose(
-        scale(1.0 / distance, separation),
-        distance,
-        turned(load4(grains.orientation, i), load(contacts.pointer1, c)),
-        turned(load4(grains.orientation, j), load(contacts.pointer2, c)),
-        twist,
-    )
+    n1 = turned(load4(grains.orientation, i), load(contacts.pointer1, c))
+    n2 = turned(load4(grains.orientation, j), load(contacts.pointer2, c))
+    return pose_of(separation, n1, n2, twist)
 
 
 @loop
 def twist_increment(grains, contacts, c, pose, dt):
     """Increase of the twist [rad] in the step that led to this pose, from mid-step velocities and spins."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    transverse = across(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    rate = tangential.twisting_rate(pose.n, load(grains.spin, i), load(grains.spin, j), transverse, pose.distance, dt)
-    return dt * rate
+    turn = sub(load(grains.spin, i), load(grains.spin, j))
+    speed = sub(load(grains.velocity, i), load(grains.velocity, j))
+    return dt * tangential.twisting_rate(pose.n, turn, speed, pose.inverse_distance, dt)
 
 
 @loop
-def pose_at_step_end(grains, contacts, span, c, dt):
+def _pose_at_step_end(grains, contacts, separation, c, dt):
     """Relative pose at the end of a step of dt [s], with the twist accumulated in the step."""
-    pose = pose_at(grains, contacts, span, c, 0.0)
+    pose = _pose_apart(grains, contacts, separation, c, 0.0)
     twist = contacts.twist[c] + twist_increment(grains, contacts, c, pose, dt)
-    return Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
+    return Pose(pose.n, pose.distance, pose.inverse_distance, pose.n1, pose.n2, twist)
 
 
 @loop
@@ -142,16 +158,10 @@ def _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
     separation = axpy(-dt, relative_velocity, scale(pose.distance, pose.n))
-    distance = math.sqrt(dot(separation, separation))
-    start_pose = Pose(
-        scale(1.0 / distance, separation),
-        distance,
-        turned_by(scale(-dt, load(grains.spin, i)), pose.n1),
-        turned_by(scale(-dt, load(grains.spin, j)), pose.n2),
-        twist,
-    )
-    r1, r2 = grains.radius[i], grains.radius[j]
-    return displacements_of(start_pose, r1 + r2 - distance, r1, r2, constants)
+    n1 = turned_by(scale(-dt, load(grains.spin, i)), pose.n1)
+    n2 = turned_by(scale(-dt, load(grains.spin, j)), pose.n2)
+    start, r1, r2 = pose_of(separation, n1, n2, twist), grains.radius[i], grains.radius[j]
+    return displacements_of(start, r1 + r2 - start.distance, r1, r2, constants)
 
 
 @loop
@@ -172,7 +182,7 @@ def slipped_pose(displacements, pose, r1, r2, constants, reset):
     """Pose after slip: the pointers and the twist represent the displacements of `mechanics.after_slip`."""
     target = after_slip(displacements, pose.n, constants, reset)
     n1, n2 = tangential.pointers_for(target.slide, target.roll, pose.n, r1, r2)
-    return Pose(pose.n, pose.distance, n1, n2, target.twist)
+    return Pose(pose.n, pose.distance, pose.inverse_distance, n1, n2, target.twist)
 
 
 @loop
@@ -200,7 +210,8 @@ def _slip_contact(grains, contacts, c, reached, step):
     body1 = turned_back(load4(grains.orientation, i), slipped.n1)
     body2 = turned_back(load4(grains.orientation, j), slipped.n2)
     n1, n2 = _select(slips, slipped.n1, pose.n1), _select(slips, slipped.n2, pose.n2)
-    new_pose = Pose(pose.n, pose.distance, n1, n2, slipped.twist if slips else pose.twist)
+    twist = slipped.twist if slips else pose.twist
+    new_pose = Pose(pose.n, pose.distance, pose.inverse_distance, n1, n2, twist)
     left = displacements_of(new_pose, displacements.overlap, r1, r2, constants)
     lost = slip_losses(start, displacements, left, present)
     lost = _select(slips, lost, (0.0, 0.0, 0.0))
@@ -211,13 +222,16 @@ def _slip_contact(grains, contacts, c, reached, step):
 
 
 @functools.cache
-def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) -> Callable:
-    """The loop that updates a range of contacts, for a contact law, a rule for limits and a variant of damping.
+def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant) -> Callable:
+    """The loop that updates a range of contacts, for a contact law and a rule for limits.
 
-    The rule is `_flag_contact` or `_slip_contact`, the variant of `damping`: NONE, DASHPOTS or THERMAL.
+    The rule is `_flag_contact` or `_slip_contact`.
     """
-    load_constants, radius_root, normal_force = column_loops(law).load, law.fast_radius_root, law.force
-    contact_radius, damp = law.contact_radius, damping_loops(damping).update
+    load_constants, radius_root = column_loops(law).load, law.fast_radius_root
+    normal_force = (law.adhesive_force if variant.adhesive else None) or law.force
+    contact_radius = (law.adhesive_radius if variant.adhesive else None) or law.contact_radius
+    damp, follow = damping_loops(variant.damping).update, variant.follow
+    apart = _nearest_separation if variant.periodic else _separation
 
     @loop
     def update_contacts(grains, contacts, part, step):
@@ -246,10 +260,11 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
             i, j = contacts.pair[0, c], contacts.pair[1, c]
             constants = load_constants(contacts.constants, part.column + k)
             r1, r2 = grains.radius[i], grains.radius[j]
-            pose = pose_at_step_end(grains, contacts, step.span, c, step.dt)
+            separation = apart(grains, contacts, step.span, c)
+            pose = _pose_at_step_end(grains, contacts, separation, c, step.dt)
             overlap = r1 + r2 - pose.distance
             y, valid = radius_root(overlap, constants)
-            present = scaled_stiffness(constants, y, step.settings.follow)
+            present = scaled_stiffness(constants, y, True) if follow else constants
             displacements = displacements_of(pose, overlap, r1, r2, constants)
             reached = Reached(pose, displacements, constants, present, valid)
             pose, lost, flag = handle_limits(grains, contacts, c, reached, step)
@@ -267,7 +282,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
             contacts.flag[c] = flag
             pending += 1 if (flag == PENDING_FLAG) & (c < part.used) else 0
             slipped += 1 if flag == SLIPPED_FLAG else 0
-            deepest = max(deepest, float_bits(overlap_share(overlap, r1, r2) if c < part.used else 0.0))
+            deepest = max(deepest, float_bits(overlap * constants.derived.inverse_radius if c < part.used else 0.0))
             slid += lost[0]
             rolled += lost[1]
             twisted += lost[2]
@@ -290,10 +305,11 @@ def padded_contact_count(contacts, number):
 
 
 @functools.cache
-def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
-    """The pass over a range of contacts, block by block, for one contact law and variant of damping."""
-    flag_contacts = contact_loop(law, _flag_contact, damping)
-    slip_contacts = contact_loop(law, _slip_contact, damping)
+def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
+    """The pass over a range of contacts, block by block, for one contact law."""
+    flag_contacts = contact_loop(law, _flag_contact, variant)
+    slip_contacts = contact_loop(law, _slip_contact, variant)
+    follow = variant.follow
 
     @loop
     def contact_pass(grains, contacts, first, last, step):
@@ -311,7 +327,7 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
             slipped_before = 0.0
             for k in range(end - begin):
                 slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
-            if slipped_before > SLIP_FRACTION * (end - begin) and not step.settings.follow:
+            if not follow and slipped_before > SLIP_FRACTION * (end - begin):
                 part = slip_contacts(grains, contacts, ContactRange(begin, end, end, column), step)
                 slipped += part.slipped
                 slid += part.slid

@@ -51,6 +51,7 @@ from ..compiler.ahead import compile_ahead
 from ..compiler.program import Program
 from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
+from ..contact.constants_table import with_derived
 from ..contact.damping import THERMAL
 from ..contact.events import InitialContacts, forming_loops
 from ..contact.gather import resort_contacts_by_grain
@@ -694,7 +695,7 @@ class Engine:
     def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
         """Restore the regular state of a checkpoint, with `state` at a time of output [s]; sum loads, rebuild lists."""
         state, self._output_time = self.regular_state, output_time
-        state.from_arrays(self.stepper.with_missing(self, saved))
+        state.from_arrays(with_derived(self.law, self.stepper.with_missing(self, saved)))
         if self.cutoff is None:
             state.count[COMPARED] = -1
         if state.order.size:  # the order of the lists depends on it

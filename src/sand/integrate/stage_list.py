@@ -14,7 +14,8 @@ from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import DASHPOTS, NONE, THERMAL
 from ..contact.gather import resort_contacts_by_grain
-from ..contact.law import ContactLaw
+from ..contact.law import ContactLaw, Pairing
+from ..contact.update import PassVariant
 from ..forces.pair.long_range_loops import LongRangeSums
 from . import stages, taylor
 from .force_stages import (
@@ -101,12 +102,14 @@ def variant_of(settings: ContactParameters) -> str:
 
 def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[int, Stage]:
     """The stages of contacts by number."""
-    damping = variant_of(parameters.settings)
+    settings, damping = parameters.settings, variant_of(parameters.settings)
+    adhesive = bool((settings.pairings[Pairing._fields.index("surface_energy")] > 0.0).all())
+    variant = PassVariant(damping, any(parameters.span), settings.follow, adhesive)
     events = stages.contact_event_stages(given.law, damping)
     found: dict[int, Stage] = {
         StageNumber.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
         StageNumber.INNER_LIST: stages.inner_list,
-        StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, damping, given.wide),
+        StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, variant, given.wide),
         StageNumber.SLIP_AND_BREAK: events[StageNumber.SLIP_AND_BREAK],
         StageNumber.FORM: events[StageNumber.FORM],
         StageNumber.SORT: resort_contacts_by_grain,
@@ -115,9 +118,9 @@ def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[i
     }
     if damping == THERMAL:
         found[StageNumber.BATH_WORK] = stages.bath_work
-    if parameters.settings.follow:
+    if settings.follow:
         found[StageNumber.STIFFNESS_WORK] = events[StageNumber.STIFFNESS_WORK]
-    if parameters.settings.settling_time < math.inf:
+    if settings.settling_time < math.inf:
         found[StageNumber.SETTLE_CLUSTERS] = stages.settle
     return found
 

@@ -19,7 +19,7 @@ from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
-from ..contact.update import ContactStep, contact_pass_loop, contact_step, store_contact_sums
+from ..contact.update import ContactStep, PassVariant, contact_pass_loop, contact_step, store_contact_sums
 from ..forces.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
@@ -130,9 +130,9 @@ def inner_list(grains, pair_list, count, span, criteria):
 
 
 @factory
-def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Stage:
+def contact_pass_stage(law: ContactLaw, variant: PassVariant, long_vectors: bool) -> Stage:
     """Update of a block of contacts; stores its sums."""
-    contact_pass = contact_pass_loop(law, damping)
+    contact_pass = contact_pass_loop(law, variant)
 
     @stage("the contact forces", long_vectors=long_vectors, seconds=3.5)
     def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):
