@@ -29,7 +29,6 @@ import numpy as np
 
 import sand
 from sand.basics.arguments import checked
-from sand.basics.box import nearest_image
 from sand.basics.settings import Number, Table
 from sand.basics.state import FLIGHT, LONG_RANGE_SUMS, NEEDED, REJECTED, STEPS, TIME
 from sand.compiler.jit import caller, formula, loop, rare
@@ -46,7 +45,7 @@ from sand.integrate.stages import StageNumber
 from sand.integrate.step_control import is_close, is_past, quantise_step
 from sand.integrate.step_parts import MAX_TURN
 from sand.numerics.quaternion import turn, turned
-from sand.numerics.vec import add, axpy, dot, load, load4, norm, put, put4, scale, sub
+from sand.numerics.vec import add, axpy, dot, load, load4, nearest_image, norm, put, put4, scale, sub
 
 XI, LAMBDA, CHI = 0.1786178958448091, -0.2123418310626054, -0.06626458266981849
 DRIFTS = np.array([XI, CHI, 1.0 - 2.0 * (CHI + XI), CHI, XI])

@@ -27,10 +27,10 @@ _MODULES = {
     "FORSTERITE": "basics.material",
     "IRON": "basics.material",
     "MAGNETITE": "basics.material",
-    "SandError": "errors",
-    "BadInput": "errors",
-    "FilesFailed": "errors",
-    "Interrupted": "errors",
+    "SandError": "basics.errors",
+    "BadInput": "basics.errors",
+    "FilesFailed": "basics.errors",
+    "Interrupted": "basics.errors",
     **FORCES,
     "external_force": "forces.own",
     "pair_force": "forces.own",
@@ -61,6 +61,10 @@ if TYPE_CHECKING:
     from . import setup as setup
     from . import theory as theory
     from .basics.box import Box as Box
+    from .basics.errors import BadInput as BadInput
+    from .basics.errors import FilesFailed as FilesFailed
+    from .basics.errors import Interrupted as Interrupted
+    from .basics.errors import SandError as SandError
     from .basics.grains import Grains as Grains
     from .basics.material import FORSTERITE as FORSTERITE
     from .basics.material import GRAPHITE as GRAPHITE
@@ -75,10 +79,6 @@ if TYPE_CHECKING:
     from .components.walls import Wall as Wall
     from .config.build import resume as resume
     from .contact.model import Contact as Contact
-    from .errors import BadInput as BadInput
-    from .errors import FilesFailed as FilesFailed
-    from .errors import Interrupted as Interrupted
-    from .errors import SandError as SandError
     from .forces.electric_field import ElectricField as ElectricField
     from .forces.gas import Gas as Gas
     from .forces.gravity import Gravity as Gravity
@@ -107,7 +107,7 @@ def __getattr__(name: str) -> Any:
         return value
     if name in _PACKAGES:
         return importlib.import_module(f".{name}", __name__)
-    from .errors import NoSuchAttribute, did_you_mean
+    from .basics.errors import NoSuchAttribute, did_you_mean
 
     raise NoSuchAttribute(f"module 'sand' has no '{name}'; {did_you_mean(name, __all__)}")
 

@@ -14,11 +14,11 @@ import numpy as np
 from .analysis.clusters import cluster_labels
 from .analysis.ledger_columns import LedgerColumns
 from .basics.arguments import checked
+from .basics.errors import BadInput, ErrorCollector, import_optional, shown
 from .basics.paths import user_path
 from .basics.units import format_quantity, si
 from .config.build import simulate
 from .config.case import read_case
-from .errors import BadInput, ErrorCollector, import_optional, shown
 from .io import run_folder as files
 from .io.export import export_frames
 from .io.frame import FrameArrays

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.io.page_bundle import read_bundle
 
 from .chromium import FLAGS, find

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from sand.basics.box import Box
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 from sand.viewer.server import Server

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.viewer.dataset import RunDataset, run_dataset
 from sand.viewer.notebook import answer_message
 

@@ -6,7 +6,7 @@ import pytest
 from sand.analysis.clusters import aggregate_moments, cluster_labels, unwrapped
 from sand.analysis.fractal import FEWEST, correlation_dimension
 from sand.analysis.shape import gyration_radius
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 
 from .looking import SOURCES, View, agree, numbers, size
 

@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 
 import sand
 from sand.basics.constants import COULOMB
+from sand.basics.errors import BadInput
 from sand.basics.state import CONTACTS, FLIGHT, LONG_RANGE_SUMS, MADE, REJECTED, STEPS
 from sand.cli.main import main
 from sand.config.build import simulation_of
 from sand.config.case import check_case
-from sand.errors import BadInput
 from sand.integrate.registry import INTEGRATORS
 from sand.simulation.serialise import case_of
 

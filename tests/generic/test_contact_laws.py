@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sand
+from sand.basics.errors import BadInput
 from sand.basics.material import ICE, IRON, SILICA
 from sand.compiler.jit import formula
 from sand.compiler.user_code import code_digest
@@ -19,7 +20,6 @@ from sand.contact.law import LAWS, ContactLaw, contact_constants, register, ring
 from sand.contact.measure import contacts_stage, energies_stage
 from sand.contact.model import Contact
 from sand.contact.update import PassVariant
-from sand.errors import BadInput
 from sand.integrate.stages import contact_event_stages, contact_pass_stage, pair_list_stage
 from sand.numerics.quaternion import turn, turned
 from sand.numerics.vec import add, cross, dot, scale, sub

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import sand
 from sand.basics.arrays import empty_long_range_arrays
 from sand.basics.constants import MAGNETIC
+from sand.basics.errors import BadInput
 from sand.config.case import ForcesSection
-from sand.errors import BadInput
 from sand.forces import BUILT_IN
 from sand.forces.external_formulas import GrainState
 from sand.forces.pair import dipole_loops, generic_loops

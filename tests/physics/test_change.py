@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.errors import BadInput
 from sand.basics.state import CONTACTS
-from sand.errors import BadInput
 
 from .setups import struck_chain
 

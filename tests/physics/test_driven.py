@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 
 from ..plugins import ForestRuth
 from .test_ramps import BOTH, RADIUS, REST, normal_energy

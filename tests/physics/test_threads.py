@@ -10,9 +10,9 @@ import pytest
 
 import sand
 from sand.basics import threads
+from sand.basics.errors import BadInput
 from sand.basics.state import CONTACTS, OUTSIDE, SLIPPED
 from sand.engine import engine
-from sand.errors import BadInput
 from sand.integrate import task_queue
 from sand.integrate.task_queue import (
     ACTIVE,

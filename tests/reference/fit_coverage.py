@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from sand.analysis.fits import mean_interval, power_law
 from sand.analysis.fractal import ensemble_dimension
 from sand.analysis.growth_law import rate_law
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.experiments.growth import FIRST_SIZE, LARGEST_PART, _within
 from sand.io.table import write_table
 from sand.theory import kinetics

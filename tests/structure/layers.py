@@ -15,10 +15,9 @@ PLAN = TOP / "ARCHITECTURE.md"
 MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 
 LAYERS = (
-    ("errors",),
+    ("basics",),
     ("compiler",),
     ("numerics",),
-    ("basics",),
     ("contact",),
     ("neighbours", "forces"),
     ("integrate", "theory", "io"),

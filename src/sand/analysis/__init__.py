@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ..errors import NoSuchAttribute, did_you_mean
+from ..basics.errors import NoSuchAttribute, did_you_mean
 
 MODULES = (
     "body_motion", "clusters", "fits", "fractal", "frame_statistics", "internal_motion", "ledger_columns", "network",

@@ -12,7 +12,7 @@ import numpy as np
 from ..basics.arguments import checked
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
-from ..errors import refuse_other
+from ..basics.errors import refuse_other
 from .clusters import cluster_labels, in_one_piece
 
 __all__ = ["MEDIAN_ENERGY", "BodyMotion", "BodyTemperatures", "body_motion", "body_temperatures"]

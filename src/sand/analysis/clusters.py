@@ -8,8 +8,8 @@ import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.box import Box
+from ..basics.errors import BadInput, shown
 from ..basics.units import whole_number
-from ..errors import BadInput, shown
 
 FEW = 200
 """Grains plus contacts up to which a disjoint-set forest in Python is faster than SciPy's graph (130 µs)."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
-from ..errors import BadInput
+from ..basics.errors import BadInput
 
 SAME = 1e-9
 """Difference of two logarithms that is attributed to rounding."""

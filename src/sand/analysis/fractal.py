@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, shown
 from ..basics.units import seed_given, si
-from ..errors import BadInput, shown
 from .fits import power_law
 from .shape import gyration_radius
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
-from ..errors import refuse_other
+from ..basics.errors import refuse_other
 from .clusters import aggregate_moments, checked_labels, cluster_labels, percolating_clusters, unwrapped
 from .network import network
 from .shape import elongation, filling_factor, gyration_radius

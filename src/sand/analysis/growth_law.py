@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..theory.kernel_growth import CENTRAL, EXPONENTS, POINTS, GrowthCurves, kernel_curves, power_curves
 from .fits import SAME, jackknife
 

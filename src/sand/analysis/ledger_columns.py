@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..basics.state import DAMPING, LOST
-from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 DAMPED = tuple(f"lost_{name}" for name in DAMPING)

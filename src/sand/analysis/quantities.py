@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
-from ..errors import BadInput, did_you_mean, refuse_other
+from ..basics.errors import BadInput, did_you_mean, refuse_other
 from ..io.frame_chunks import MODES as SHARES
 from ..io.frame_chunks import REST
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.errors import BadInput, shown
 from ..basics.units import MOST, whole_number
-from ..errors import BadInput, shown
 from .clusters import checked_pairs
 from .projection import area_of_union
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from .clusters import cluster_labels
 
 SINGLE = 0xFFFFFFFF

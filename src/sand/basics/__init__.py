@@ -1,1 +1,4 @@
-"""Ground of all packages: units, constants, checks of arguments, materials, box, grains, and the state as arrays."""
+"""Ground of all packages: errors, units, checks of arguments, settings, materials, box, grains, the state as arrays.
+
+Nothing here is compiled.
+"""

@@ -20,8 +20,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from .descriptions import described, documented_units
+from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from .paths import checked_name
 
 MOST_GRAINS = 100_000_000
@@ -39,7 +39,12 @@ MOST_WHOLE = 10**300
 T = TypeVar("T")
 _LISTS = (collections.abc.Sequence, collections.abc.Iterable, list)
 _WORDS = {2: "two", 3: "three"}
-_CONSTRUCTORS = {"Generator": "numpy.random.default_rng(seed)", "Executor": "a concurrent.futures executor"}
+_CONSTRUCTORS = {
+    "Generator": "numpy.random.default_rng(seed)",
+    "Executor": "a concurrent.futures executor",
+    "StrainedContacts": "sand.setup.StrainedContacts(…)",
+}
+"""How users make objects of classes that are not at the top of SAND."""
 
 
 def checked(thing: T) -> T:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..numerics.simd import all_aligned, padded_size
+from .alignment import all_aligned, padded_size
 
 ALWAYS_RECORDED = 4
 """Loss channels recorded per contact with every contact law; the others only with damping or variable stiffnesses."""

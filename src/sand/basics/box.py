@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.jit import formula
-from ..errors import BadInput, shown
 from .arguments import checked
+from .errors import BadInput, shown
 from .units import dimensions, exact_quantity, format_quantity, is_word, si, si_array
 
 ALL_PAIRS_UP_TO = 200
@@ -27,7 +26,6 @@ class Span(NamedTuple):
     inverse_z: float
 
 
-@formula
 def nearest_image(v, span):
     """Shortest periodic image of a separation v [m]; components along open axes are unchanged.
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, shown
+from .errors import BadInput, shown
 from .unit_factors import is_unit, number_from_text, scale
 
 EXAMPLES = {

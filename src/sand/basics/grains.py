@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .arguments import checked
 from .box import Box
 from .constants import LIGHT
+from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
 from .own_quantities import OwnQuantities, read_own, refuse_same_letters
 from .schema import BY_NAME, CHANGEABLE, FIELDS, public, stored

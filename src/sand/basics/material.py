@@ -7,8 +7,8 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ..errors import BadInput, did_you_mean, shown
 from .arguments import checked
+from .errors import BadInput, did_you_mean, shown
 from .settings import Number, Settings, Word
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, shown
+from .errors import BadInput, shown
 from .own_units import with_own_unit
 from .schema import BY_NAME, GrainField, public, stored
 from .units import in_unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..errors import BadInput, shown
+from .errors import BadInput, shown
 
 LONGEST_NAME, LONGEST_PATH = 255, 4000
 """Bytes of one name, and characters of a whole path."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput
+from .errors import BadInput
 from .units import has_unit_within, si_array
 
 WRITERS = {

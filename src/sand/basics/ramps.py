@@ -11,8 +11,8 @@ import math
 from collections.abc import Iterator, Sequence, Set
 from typing import Annotated, Any, ClassVar, TypeVar
 
-from ..errors import BadInput, ErrorCollector, did_you_mean
 from .arguments import checked
+from .errors import BadInput, ErrorCollector, did_you_mean
 from .settings import List, Number, Setting, Settings, Whole, declared
 
 STEPS = 1000

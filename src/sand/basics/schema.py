@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BadInput
+from .errors import BadInput
 from .units import in_unit, not_a_quantity, too_large
 
 

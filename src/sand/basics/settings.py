@@ -18,7 +18,7 @@ import typing
 from collections.abc import Callable, Collection, Iterable, Set
 from typing import Any, ClassVar, NamedTuple
 
-from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
+from .errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
 from .units import is_word, si, whole_number
 from .vectors import along_z, components, three
 

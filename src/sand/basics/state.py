@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput
-from ..numerics.simd import aligned_copies, all_aligned
+from .alignment import aligned_copies, all_aligned
 from .arrays import (
     GROWTH,
     NOT_SAVED,
@@ -32,6 +31,7 @@ from .arrays import (
     wall_arrays,
 )
 from .box import Box
+from .errors import BadInput
 from .grains import GrainArrays, Grains
 from .material import Material
 from .own_quantities import OwnQuantities

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 
-from ..errors import BadInput, shown
 from .arguments import checked
+from .errors import BadInput, shown
 
 _requested: int | None = None
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, shown
 from .constants import LIGHT
 from .conversion import EXAMPLES, dimensions, has_unit_within, in_unit, not_a_quantity, si_array
+from .errors import BadInput, shown
 from .unit_factors import LONGEST_TEXT
 
 __all__ = ["EXAMPLES", "LONGEST_TEXT", "dimensions", "has_unit_within", "in_unit", "not_a_quantity", "si_array"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..errors import BadInput, shown
+from .errors import BadInput, shown
 from .units import si
 
 

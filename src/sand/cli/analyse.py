@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from . import options, parsing, report
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from . import options, parsing, report
 
 KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")

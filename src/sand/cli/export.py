@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput, warn
+from ..basics.errors import BadInput, warn
 from . import options, parsing, report
 
 SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}

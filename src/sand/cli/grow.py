@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
+from ..basics.errors import BadInput
 from ..basics.threads import set_threads
-from ..errors import BadInput
 from . import options, parsing, report
 
 

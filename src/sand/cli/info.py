@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
+from ..basics.errors import BadInput
 from ..config.commands import command_for
-from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger

@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..basics.errors import BadInput
 from ..basics.units import format_quantity
 from ..compiler.program import before_first_calls
-from ..errors import BadInput
 from ..experiments.executors import executor_for
 from ..simulation.observers import Observer
 from ..simulation.signals import STOPS, Signals

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..basics.errors import BadInput, FilesFailed, Interrupted
 from ..basics.units import format_quantity
 from ..config.case import with_absolute_files
 from ..config.commands import BODIES
-from ..errors import BadInput, FilesFailed, Interrupted
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml

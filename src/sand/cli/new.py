@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from . import options, parsing, report
 
 COMMANDS = ("run", "collide", "scatter", "grow")

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from ..basics.arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..basics.errors import BadInput
 from ..basics.paths import checked_name
-from ..errors import BadInput
 
 
 class PathName(click.ParamType):

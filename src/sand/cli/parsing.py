@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ..basics.descriptions import docstring
-from ..errors import BadInput
+from ..basics.errors import BadInput
 
 
 class OptionValues(dict[str, Any]):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from ..errors import BadInput, did_you_mean
+from ..basics.errors import BadInput, did_you_mean
 from . import options, parsing, report
 
 STILL = "still"

@@ -9,8 +9,8 @@ from collections.abc import Callable
 import click
 
 from ..basics.descriptions import docstring
+from ..basics.errors import SandError
 from ..basics.version import __version__
-from ..errors import SandError
 from . import (
     analyse,
     build,

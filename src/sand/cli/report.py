@@ -16,8 +16,8 @@ from typing import Any
 
 import click
 
+from ..basics.errors import BadInput, FilesFailed
 from ..config.commands import command_for
-from ..errors import BadInput, FilesFailed
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml

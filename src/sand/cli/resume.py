@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
+from ..basics.errors import BadInput
 from ..basics.threads import set_threads
-from ..errors import BadInput
 from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, read_json
 from . import options, parsing, report
 from .collide import collide

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
+from ..basics.errors import BadInput
 from ..basics.threads import set_threads
-from ..errors import BadInput
 from ..io.run_folder import CASE, TRAJECTORY
 from . import options, parsing, report
 

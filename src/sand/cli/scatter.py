@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..io.run_folder import FLIGHTS
 from . import options, parsing, report
 

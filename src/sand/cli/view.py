@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
 from . import options, parsing, report
 

@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from ..errors import warn
+from ..basics.errors import warn
 
 __all__ = ["WRITABLE_BY_OTHERS", "cache_folders", "private_folder", "read_record", "remade", "unsafe", "write_record"]
 

@@ -23,7 +23,7 @@ from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps, loads
 
-from ..errors import warn
+from ..basics.errors import warn
 from .cache import WRITABLE_BY_OTHERS, remade
 from .progress import Timeout, acquire_lock, free_lock
 

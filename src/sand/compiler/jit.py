@@ -126,9 +126,9 @@ def compiled_form(function: Callable) -> Callable:
 
 
 _COMPILED = (
-    "analysis/projection.py", "basics/arrays.py", "basics/box.py", "basics/grains.py", "basics/state.py", "compiler",
-    "components", "contact", "experiments/scattering", "forces", "integrate", "neighbours", "numerics",
-    "setup/_kernels",
+    "analysis/projection.py", "basics/alignment.py", "basics/arrays.py", "basics/box.py", "basics/grains.py",
+    "basics/state.py", "compiler", "components", "contact", "experiments/scattering", "forces", "integrate",
+    "neighbours", "numerics", "setup/_kernels",
 )  # fmt: skip
 """Packages and files with compiled functions, or with named tuples that compiled functions take."""
 

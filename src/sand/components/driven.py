@@ -9,11 +9,11 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.settings import List, Settings, Vector, Whole
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
-from ..errors import BadInput, shown
 from ..integrate.parts import ContactParameters
 from ..integrate.stages import StageNumber
 from .driven_stage import DrivenArrays, drive

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..basics.box import nearest_image
 from ..basics.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME, WALL_CONTACTS
 from ..compiler.jit import caller, loop, rare
 from ..contact.constants_table import column_loops, load_pairing
@@ -33,7 +32,7 @@ from ..contact.mechanics import (
 from ..contact.transitions import ZERO, Break, Touch, breaking_loop, clear_contact, touch_loop
 from ..contact.update import ContactStep
 from ..numerics.quaternion import turned, turned_back, turned_by
-from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, put, scale, sub
+from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, nearest_image, put, scale, sub
 from .wall_formulas import WallPose, wall_constants, wall_displacements, wall_load, wall_pointers
 
 FULL = -1

@@ -16,7 +16,9 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.arrays import empty_contact_arrays, wall_arrays
+from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
+from ..basics.initial_pairs import most_overlap
 from ..basics.material import Material, as_material
 from ..basics.ramps import ramps_of
 from ..basics.settings import Direction, Number, Reading, Settings, Vector
@@ -25,10 +27,8 @@ from ..contact.constants_table import constant_names
 from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
-from ..errors import BadInput, shown
 from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
-from ..setup.checks import most_overlap
 from .wall_loops import WallNumbers
 from .wall_stages import wall_stages
 

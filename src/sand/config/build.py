@@ -10,10 +10,10 @@ from typing import Any
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.paths import user_path
 from ..basics.state import grains_from_arrays
-from ..errors import BadInput
 from ..forces.own import import_modules
 from ..io.checkpoint import newest_checkpoint
 from ..io.checkpoint_files import checkpoint_files

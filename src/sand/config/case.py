@@ -12,10 +12,10 @@ from pydantic import Field, PrivateAttr, ValidationError, create_model, model_va
 
 from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
+from ..basics.errors import BadInput, ErrorCollector, did_you_mean
 from ..basics.material import PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
 from ..components.driven import Driven
-from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
 from ..integrate.integrator import INTEGRATORS, moves_bodies

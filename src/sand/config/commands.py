@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 
 OWN_TABLES = {
     "grow": {"grow"},

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import MOST_ERRORS, BadInput, did_you_mean, first_problems
+from ..basics.errors import MOST_ERRORS, BadInput, did_you_mean, first_problems
 from .sections import INTEGRATORS
 
 Model = TypeVar("Model", bound=BaseModel)

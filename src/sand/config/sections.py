@@ -20,10 +20,10 @@ from pydantic import (
 )
 
 from ..basics.arguments import MOST_SEED
+from ..basics.errors import did_you_mean
 from ..basics.grains import moment_size
 from ..basics.paths import checked_name
 from ..basics.settings import For, List, Reading, Setting, Whole
-from ..errors import did_you_mean
 from ..integrate.integrator import methods_of_clusters, moves_bodies
 from ..integrate.registry import INTEGRATORS
 from ..integrate.verlet import Verlet

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..basics.errors import BadInput, did_you_mean
 from ..basics.material import Material
 from ..components.walls import Wall, Walls, read_walls
-from ..errors import BadInput, did_you_mean
 from .sections import Section, with_keys
 
 

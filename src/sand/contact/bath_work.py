@@ -12,10 +12,9 @@ ledger include W, and where the next step has another length dt′, ⅛ (dt² �
 The sum of kicks is then exact: K changes by the recorded work of all forces, for any noise.
 """
 
-from ..basics.box import nearest_image
 from ..basics.state import CONTACTS
 from ..compiler.jit import formula, loop
-from ..numerics.vec import dot, load, scale, sub
+from ..numerics.vec import dot, load, nearest_image, scale, sub
 from .damping import relative_motion, stored_load, surface_rotation
 from .losses import DAMPING_ROW, add_damping_energies
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..basics.box import nearest_image
 from ..basics.state import (
     BREAKING,
     BROKEN,
@@ -23,7 +22,7 @@ from ..basics.state import (
 from ..compiler.jit import loop, rare
 from ..compiler.stage import Stage, stage
 from ..numerics.quaternion import turned_back
-from ..numerics.vec import accrue, dot, load, load4, put, scale, sub
+from ..numerics.vec import accrue, dot, load, load4, nearest_image, put, scale, sub
 from . import tangential
 from .constants_table import column_loops, load_pairing, uniform_contacts
 from .damping import NONE, Held, damping_loops

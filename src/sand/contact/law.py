@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from ..basics.errors import BadInput
 from ..compiler.jit import formula
-from ..errors import BadInput
 from . import tangential
 
 

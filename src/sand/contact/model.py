@@ -11,12 +11,12 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.ramps import rampable
 from ..basics.settings import RAMP, For, Number, Settings, Word
 from ..basics.units import format_quantity
-from ..errors import BadInput
 from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
 from .law import LAWS, ContactLaw, Pairing
 from .mixing import MIXING, pairing_between

@@ -9,9 +9,8 @@ Momentum and angular momentum of every cluster are unchanged: those of the rigid
 has none.  The internal kinetic energy, K − P²/2M − ½ Ω·J Ω, falls by the factor e^(−2t/τ).
 """
 
-from ..basics.box import nearest_image
 from ..compiler.jit import formula, loop
-from ..numerics.vec import add, axpy, cross, dot, load, put, scale, sub
+from ..numerics.vec import add, axpy, cross, dot, load, nearest_image, put, scale, sub
 
 PERIOD_FRACTION = 0.05
 """Time between two applications, in τ."""

@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arrays import CONTACTS_PER_BLOCK
-from ..basics.box import nearest_image
 from ..basics.state import (
     CONTACT_STEP,
     CONTACTS,
@@ -29,7 +28,7 @@ from ..basics.state import (
 from ..compiler.jit import COMPILED, formula, loop, rare
 from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
-from ..numerics.vec import axpy, load, load4, put, scale, sub
+from ..numerics.vec import axpy, load, load4, nearest_image, put, scale, sub
 from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads

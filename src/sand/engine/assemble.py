@@ -13,12 +13,13 @@ import numpy as np
 from ..basics.arrays import OVER_ALLOCATION
 from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import SILICA
 from ..basics.ramps import ramps_of
 from ..basics.state import COMPARED, CUT_RADIUS
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas import Gas
 from ..forces.gas_loops import VACUUM
@@ -38,7 +39,6 @@ from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.verlet import Verlet
 from ..limits.solid_limits import torn_clusters
 from ..neighbours.search import ChosenSearch, Neighbours
-from ..setup.from_frame import StrainedContacts
 from .cluster_cutoff import follow_clusters
 from .component import Component, Setup, check
 from .engine import Engine

@@ -9,10 +9,10 @@ import numpy as np
 from ..analysis.clusters import cluster_labels, unwrapped
 from ..basics.arrays import SAVED_LONG_RANGE
 from ..basics.box import Box
+from ..basics.errors import BadInput, first_problems
 from ..basics.grains import GrainArrays, Grains
 from ..basics.own_quantities import joined as joined_own
 from ..basics.state import CONTACT_STEP, CONTACTS, CUT_FIRST, CUT_SECOND, GRAIN1, GRAIN2, PAIRS, State
-from ..errors import BadInput, first_problems
 
 SAME_SEPARATION = 1e-9
 """Largest change of the separation of two grains in contact, in their radii, that counts as rounding."""

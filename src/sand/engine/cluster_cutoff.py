@@ -11,7 +11,9 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import (
     CONTACTS,
     CUT_CAPTURE,
@@ -26,11 +28,9 @@ from ..basics.state import (
 )
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity
-from ..errors import BadInput
 from ..forces.base import LongRangeForce
 from ..forces.pair.cutoff import HALF_BOX_RATIO, CutoffChoice
 from ..forces.pair.dipoles import CAPTURE_RADII, CapturingPair, Dipoles, capturing_pair
-from ..setup.from_frame import StrainedContacts
 
 GROWTH = 1.1
 """Growth of b_max since the last choice from which the cut-off is chosen anew; it is thus 1.36 to 1.5 b_max."""

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput, first_problems
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts, most_overlap
 from ..contact.model import Contact
-from ..errors import BadInput, first_problems
-from ..setup.checks import most_overlap
-from ..setup.from_frame import StrainedContacts
 from .engine import Engine
 
 NAMED = 10
@@ -86,7 +85,7 @@ def refuse_overlaps(
     Raises
     ------
     BadInput
-        If a pair overlaps by more than `setup.checks.most_overlap`; the first ten pairs are named.
+        If a pair overlaps by more than `basics.initial_pairs.most_overlap`; the first ten pairs are named.
     """
     (i, j), radius = found.pair.T, grains.radius
     count = np.int64(len(grains))

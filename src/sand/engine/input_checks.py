@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
+from ..basics.initial_pairs import at_same_place
 from ..basics.units import format_quantity
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
 from ..forces.pair.inverse_square import Charges
 from ..forces.pair.screened_charges import ScreenedCharges
 from ..limits.model_limits import limit_warnings
 from ..limits.solid_limits import fast_settling, grain_warnings
 from ..limits.truncation import truncation_warnings
-from ..setup.checks import at_same_place
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ..errors import NoSuchAttribute, did_you_mean
+from ..basics.errors import NoSuchAttribute, did_you_mean
 
 MODULES = ("chain_impact", "collision", "kernel_table", "scattering")
 """Public submodules; the others are used by these and by the command line."""

@@ -15,10 +15,10 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.errors import BadInput
 from ..basics.material import Material
 from ..basics.units import si, whole_number
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..integrate.verlet import Verlet
 from ..setup.aggregates import chain, rest_distance
 from ..setup.encounters import combined

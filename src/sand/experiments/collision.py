@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.paths import user_path
 from ..basics.units import seed_given, si
 from ..config.build import resume
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY

@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..basics.errors import BadInput
 from ..compiler.progress import announce
-from ..errors import BadInput
 from ..io.checkpoint_files import checkpoint_files
 from ..io.run_folder import COLLISION, FIGURE, ONE_COLLISION, OUTCOMES, write_json
 from .collision import prepare, resume_collision, run_to_end

@@ -17,8 +17,8 @@ from multiprocessing.connection import wait
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from ..basics.errors import BadInput, import_optional, warn
 from ..compiler.program import before_first_calls
-from ..errors import BadInput, import_optional, warn
 from ..forces.own import IMPORTED
 from ..simulation.signals import STOPS
 from .worker import LONGEST_STOP, SHIELDED, Item, Result, begin_worker, do_task, done_apart

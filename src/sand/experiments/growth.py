@@ -13,8 +13,8 @@ from ..analysis.fits import PowerLawFit, mean_interval, power_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..analysis.growth_law import LocalDegree, RateLaw, local_degrees, rate_law
+from ..basics.errors import BadInput
 from ..basics.paths import user_path
-from ..errors import BadInput
 from ..io import run_folder as files
 from ..results import Run
 from .growth_boxes import grow, run_box, shared_settings

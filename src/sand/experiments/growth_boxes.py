@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..basics.errors import BadInput, shown, warn
 from ..basics.paths import user_path
 from ..config.build import resume, simulation_of
 from ..config.case import check_case
-from ..errors import BadInput, shown, warn
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ..basics.errors import BadInput, ErrorCollector
 from ..config.case import check_case, with_absolute_files
 from ..config.commands import refuse_other_command
 from ..config.key_errors import validate
 from ..config.sections import Section, Seeds
-from ..errors import BadInput, ErrorCollector
 from ..io.run_folder import read_toml
 
 DEFAULT_SEEDS = list(range(1, 9))

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..analysis.body_motion import body_temperatures
 from ..analysis.fits import separation
+from ..basics.errors import BadInput
 from ..basics.paths import user_path
-from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
 from .growth import BoxResult, GrowthResult, Temperatures, all_aggregates, boxes_in, growth_of, joined, read_box

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
+from ..basics.errors import BadInput
 from ..config.case import with_absolute_files
-from ..errors import BadInput
 from ..io.lock import writing
 from ..io.run_folder import CASE, make_folder, read_toml, write_json, write_toml
 from ..io.table import GrowingOutcomes

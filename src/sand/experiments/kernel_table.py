@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput
 from ..basics.units import in_unit, si_array
-from ..errors import BadInput
 from ..io.run_folder import replace_file
 from ..io.table import write_table
 from ..theory.kinetics import CollisionKernel, KernelFunction

@@ -1,10 +1,9 @@
 """Loops of external forces: one formula over all grains."""
 
-from ..basics.box import nearest_image
 from ..compiler.jit import loop
 from ..compiler.recipes import factory
 from ..compiler.stage import stage
-from ..numerics.vec import accrue, dot, load
+from ..numerics.vec import accrue, dot, load, nearest_image
 from .external_formulas import GrainState
 
 

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.ramps import rampable
 from ..basics.settings import RAMP, Reading, Settings
 from ..basics.vectors import along_z, components
-from ..errors import BadInput, shown
 from .external_formulas import UniformGravity, uniform_gravity
 
 

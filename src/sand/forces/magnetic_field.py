@@ -10,11 +10,11 @@ from typing import Annotated, Any
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, AlongZ, Direction, For, Number, Reading, Settings, Word
 from ..basics.units import si
-from ..errors import BadInput
 from ..numerics.vec import across, add, cross, dot, norm, scale, sub
 from .external_formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
 

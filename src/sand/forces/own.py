@@ -18,11 +18,11 @@ from typing import Any
 
 from ..basics.box import Box
 from ..basics.descriptions import described
+from ..basics.errors import BadInput, did_you_mean
 from ..basics.grains import Grains
 from ..basics.units import finite_number
 from ..basics.vectors import components, three
 from ..compiler.jit import compile_error, formula
-from ..errors import BadInput, did_you_mean
 from .external_formulas import GrainState
 from .pair.cutoff import CutoffForce, cutoff_for
 from .pair.generic_loops import PairGrain, PairParameters, pair_sums

@@ -6,7 +6,7 @@ import dataclasses
 import importlib
 from typing import Any
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from . import BUILT_IN
 from .pair.pair_force import PairForce
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.settings import Settings
 from ..compiler.stage import Stage
-from ..errors import BadInput
 
 MEMBERS = ("name", "flight", "parameters", "contact_stepping", "resolved", "flight_limits")
 

@@ -5,12 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..basics.box import Span, nearest_image
+from ..basics.box import Span
 from ..compiler.jit import formula, loop
 from ..contact.gather import GRAINS_AT_ONCE, gather
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
-from ..numerics.vec import axpy, dot, load, load4, put, put4, scale
+from ..numerics.vec import axpy, dot, load, load4, nearest_image, put, put4, scale
 
 UNBOUNDED = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """A box without periodic boundaries, for drifts whose positions are wrapped afterwards."""

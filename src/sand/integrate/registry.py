@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ..errors import BadInput, shown
+from ..basics.errors import BadInput, shown
 from . import BUILT_IN
 from .integrator import INTEGRATORS, Integrator
 

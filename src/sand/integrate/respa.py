@@ -13,12 +13,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..basics.box import nearest_image
 from ..basics.state import CONTACTS
 from ..compiler.jit import loop
 from ..contact.transitions import BROKEN_FLAG
 from ..contact.update import padded_contact_count
-from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
+from ..numerics.vec import accrue, axpy, cross, dot, load, nearest_image, put, scale, sub
 
 CONSTANT_PART_CHANGE = 0.5
 """Relative change of a grain's long-range load at which its constant part is set to the present load.

@@ -3,7 +3,6 @@
 import math
 from typing import NamedTuple
 
-from ..basics.box import nearest_image
 from ..basics.state import (
     CALM,
     CHECKED,
@@ -28,7 +27,7 @@ from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
 from ..forces.external_formulas import stiffness_of_field
 from ..numerics.simd import float_bits, float_from_bits
-from ..numerics.vec import dot, load, sub
+from ..numerics.vec import dot, load, nearest_image, sub
 
 CHECK_INTERVAL = 16
 """Steps between two evaluations of the criteria while contacts determine the step."""

@@ -2,11 +2,10 @@
 
 import math
 
-from ..basics.box import nearest_image
 from ..basics.state import CONTACTS, GRAIN1, GRAIN2, LEFT, SQUARED_SPEED, SQUARED_SPIN, STEPS, TIME
 from ..compiler.jit import loop, rare
 from ..neighbours.skin import update_speeds
-from ..numerics.vec import dot, load, sub
+from ..numerics.vec import dot, load, nearest_image, sub
 from .parts import Stop
 from .step_control import CHECK_INTERVAL, choose_step
 

@@ -4,12 +4,11 @@ Stages and loops of `sand.Verlet(far="taylor")` and `"taylor-literal"`; the driv
 cycle and the stage `extrapolate` in its steps.  The rates of each pair are those of its force (`LongRangeSums.rates`).
 """
 
-from ..basics.box import nearest_image
 from ..basics.state import CYCLE
 from ..compiler.jit import loop, rare
 from ..compiler.program import call_stage
 from ..compiler.stage import stage
-from ..numerics.vec import accrue, axpy, cross, load, put, scale, sub
+from ..numerics.vec import accrue, axpy, cross, load, nearest_image, put, scale, sub
 from .force_stages import PAIR_STAGES, RATES
 from .parts import CYCLE_LENGTH, SINCE
 from .stages import StageNumber

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput, FilesFailed, did_you_mean
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
 from ..basics.paths import user_path
 from ..basics.units import format_quantity, si
-from ..errors import BadInput, FilesFailed, did_you_mean
 from .extended_xyz import xyz_text
 from .frame_chunks import MODES
 from .grain_files import FileBox, GrainData, GrainFile, is_gsd, open_grains

@@ -38,7 +38,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, FilesFailed
+from ..basics.errors import BadInput, FilesFailed
 from .checkpoint_files import META, checkpoint_files
 from .damage import set_aside
 from .run_folder import refuse_devices, replace_file

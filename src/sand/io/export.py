@@ -17,8 +17,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
+from ..basics.errors import BadInput, warn
 from ..basics.paths import user_path
-from ..errors import BadInput, warn
 from .extended_xyz import ANGSTROM, format_rows, listed, own_columns, row_form, symbol_of, xyz_frame
 from .frame import Frame, FrameSequence
 from .run_folder import replace_file, replacing

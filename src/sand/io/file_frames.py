@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, warn
 from ..basics.grains import ROUNDED
 from ..basics.material import PRESETS, SILICA, Material, as_material
-from ..errors import BadInput, warn
 from .bodies import contacts_of, read_frame
 from .frame import Frame, FrameSequence
 from .frame_chunks import stored_frame

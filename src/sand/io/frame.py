@@ -11,9 +11,9 @@ from typing import Any, overload
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..basics.own_quantities import OwnQuantities
 from ..basics.units import format_quantity
-from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from .frame_chunks import IDENTITY, IN_FULL, OWN, REST, code_of, crc32_of, material_name
 
 

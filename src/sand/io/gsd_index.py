@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from .damage import DAMAGED, set_aside
 from .frame import Frame
 from .frame_chunks import code_of, read_number, read_stored

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from ..errors import BadInput, FilesFailed, warn
+from ..basics.errors import BadInput, FilesFailed, warn
 from .damage import set_aside
 from .run_folder import LEDGER, SUMMARY, read_json, read_text, replace_file
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..basics.errors import BadInput
 from ..basics.paths import user_path
-from ..errors import BadInput
 from .frame import Frame, FrameSequence
 from .trajectory import Frames
 

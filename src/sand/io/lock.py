@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInput, FilesFailed
+from ..basics.errors import BadInput, FilesFailed
 
 LOCK = ".lock"
 """The lock file in a folder."""

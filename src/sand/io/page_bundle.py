@@ -6,7 +6,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from ..errors import BadInput, FilesFailed
+from ..basics.errors import BadInput, FilesFailed
 
 PAGE = Path(__file__).parents[1] / "viewer" / "page"
 """Folder in which `hatch_build.py` puts the bundle, or `missing.txt` with the reason why there is none."""

@@ -18,8 +18,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ..basics.errors import BadInput, FilesFailed, shown, warn
 from ..basics.paths import user_path
-from ..errors import BadInput, FilesFailed, shown, warn
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arrays import SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
+from ..basics.errors import BadInput
 from ..basics.schema import FIELDS
 from ..basics.state import (
     CLOCK,
@@ -28,7 +29,6 @@ from ..basics.state import (
     TIME,
     WALL_CONTACTS,
 )
-from ..errors import BadInput
 
 
 class ArraySpec(NamedTuple):

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInput, warn
+from ..basics.errors import BadInput, warn
 from .damage import DIGEST, digest_of, sealed
 from .run_folder import append_text, read_text, replace_file
 

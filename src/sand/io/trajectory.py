@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..basics.box import Box
+from ..basics.errors import BadInput, FilesFailed, shown, warn
 from ..basics.grains import Grains
 from ..basics.paths import user_path
 from ..basics.units import format_quantity, si
-from ..errors import BadInput, FilesFailed, shown, warn
 from . import gsd_index
 from .damage import set_aside
 from .frame import Frame, FrameSequence

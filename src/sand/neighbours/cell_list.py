@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.alignment import SIMD_WIDTH
 from ..basics.arrays import CELLS_PER_GRAIN
-from ..basics.box import nearest_image
 from ..basics.state import LISTED
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
-from ..numerics.simd import SIMD_WIDTH
-from ..numerics.vec import dot, load, put, sub
+from ..numerics.vec import dot, load, nearest_image, put, sub
 
 FULL = -1
 """Returned when the arrays of a list are too short."""

@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..basics.box import nearest_image
 from ..basics.state import INNER_COUNT, INNER_SKIN, PAIRS, REBUILT
 from ..compiler.jit import loop, rare
 from ..contact.law import ContactLaw
 from ..contact.pair_types import NO_PAIR_TYPE, pair_type_index, pair_type_loop
-from ..numerics.vec import dot, load, put, sub
+from ..numerics.vec import dot, load, nearest_image, put, sub
 from .cell_list import FULL, Grid, append_neighbours, build_grid
 from .skin import SKIN_SAFETY
 

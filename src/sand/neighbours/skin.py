@@ -12,12 +12,11 @@ separate anchors.
 
 import math
 
-from ..basics.box import nearest_image
 from ..basics.state import INNER_SKIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED, SQUARED_SPEED, SQUARED_SPIN
 from ..compiler.jit import loop
 from ..contact.pair_types import pair_type_count
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
-from ..numerics.vec import dot, load, sub
+from ..numerics.vec import dot, load, nearest_image, sub
 
 UNKNOWN = -1.0
 """Marks a speed that must be recomputed, and a skin that is used up."""

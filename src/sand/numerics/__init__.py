@@ -1,1 +1,1 @@
-"""Numerical tools: vectors, quaternions, random numbers, SIMD alignment and padding."""
+"""Numerical tools: vectors, quaternions, random numbers, and loops that vectorise."""

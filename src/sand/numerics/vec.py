@@ -5,7 +5,10 @@ Quaternions ϱ are tuples (vector part 1–3, scalar part 4), as in Eq. 30 of Do
 
 import math
 
+from ..basics import box
 from ..compiler.jit import formula
+
+nearest_image = formula(box.nearest_image)  # `basics` does not need the compiler
 
 
 @formula

@@ -14,7 +14,7 @@ from ..analysis.clusters import cluster_labels
 from ..analysis.frame_statistics import size_distribution
 from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import category_names, measured, quantity
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from .panels import (
     AxisUnit,
     draw_balance,

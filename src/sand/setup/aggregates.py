@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.errors import BadInput, did_you_mean, shown
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material, as_material
 from ..basics.units import dimensions, si
-from ..errors import BadInput, did_you_mean, shown
 from .deposit import rbd
 from .fractal import fractal
 from .growing import bcca, bpca, dla, dlca

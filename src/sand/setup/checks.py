@@ -6,32 +6,13 @@ import numpy as np
 
 from ..analysis.clusters import labels_of
 from ..basics.box import Box
+from ..basics.errors import BadInput, first_problems
 from ..basics.grains import ROUNDED, Grains
-from ..errors import BadInput, first_problems
+from ..basics.initial_pairs import MOST_MESSAGES, at_same_place, most_overlap
 from .population import grain_set_of, rest_distances
 
-MOST_OVERLAP = (2.0, 1e-3)
-"""Largest initial overlap: the larger of 2 δ0 and 1e-3 of the smaller radius."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of an overlap by the rounding of positions in double precision, relative to the largest coordinate."""
-SAME_PLACE = 1e-6
-"""Distance of centres, in radii of the smallest grain, up to which two grains are at the same place."""
-MOST_MESSAGES = 10
-"""Number of errors that are listed."""
-
-
-def most_overlap(rest: np.ndarray | float, smaller: np.ndarray | float) -> np.ndarray:
-    """Largest allowed initial overlap [m] for an equilibrium overlap and a smaller radius of the pair [m]."""
-    return np.maximum(MOST_OVERLAP[0] * np.asarray(rest), MOST_OVERLAP[1] * np.asarray(smaller))
-
-
-def at_same_place(grains: Grains, box: Box) -> list[str]:
-    """Messages about the first ten pairs of grains at the same place, between which no force has a direction."""
-    pairs = box.close_pairs(grains.position, SAME_PLACE * float(grains.radius.min()))
-    problems = [
-        f"grains {i} and {j} are at the same place; leave one of them out, or move it" for i, j in pairs[:MOST_MESSAGES]
-    ]
-    return first_problems(problems, len(pairs), "such pairs")
 
 
 def pairs_in_contact(grains: Grains, box: Box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import Material
-from ..errors import BadInput
 from ._kernels.deposition import deposit
 from .checks import largest_cluster
 from .growing import CELL, empty_hash_grid, require_all_placed

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.own_quantities import joined
 from ..basics.units import MOST, in_unit, si
-from ..errors import BadInput, shown
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

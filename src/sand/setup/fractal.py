@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.units import si
-from ..errors import BadInput
 from ._kernels.cluster_cluster import CHOICES
 from .growing import aggregate, halves, merge_clusters
 from .population import Population

@@ -11,14 +11,15 @@ import numpy as np
 
 from ..analysis.clusters import closes_through_boundary, in_one_piece
 from ..basics.box import Box
+from ..basics.errors import BadInput, warn
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import Material
 from ..basics.paths import user_path
 from ..basics.units import format_quantity
-from ..errors import BadInput, warn
 from ..io.run_folder import TRAJECTORY
 from .checks import ROUNDING, largest_cluster, pairs_in_contact, refuse_excess, refuse_pieces
-from .from_frame import Start, StrainedContacts, from_frame, restore_overlaps
+from .from_frame import Start, from_frame, restore_overlaps
 from .overlap_fit import fit_overlaps
 
 if TYPE_CHECKING:

@@ -9,24 +9,13 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.errors import BadInput, did_you_mean, refuse_other
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import Material, as_material
 from ..basics.units import format_quantity
-from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.bodies import SINGLE_PRECISION
 from .overlap_fit import APART, ITERATIONS, deficit, least_shift, overlapping, scaled_box
-
-
-class StrainedContacts(NamedTuple):
-    """Initial contacts with their displacements, in the laboratory frame.
-
-    Overlapping grains are in contact anyway, without displacements; bonds add stretched and strained contacts.
-    """
-
-    pair: np.ndarray  # (C, 2) grains
-    slide: np.ndarray  # (C, 3) sliding displacement ζ [m]
-    roll: np.ndarray  # (C, 3) rolling displacement ξ [m]
-    twist: np.ndarray  # (C,) twisting angle φ [rad]
 
 
 class Start(NamedTuple):

@@ -13,10 +13,10 @@ import numpy as np
 from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.box import Box, Span, as_box
 from ..basics.constants import BOLTZMANN, LIGHT
+from ..basics.errors import BadInput, ErrorCollector, did_you_mean, shown, warn
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
 from ..basics.units import MELTED, dimensions, format_quantity, in_unit, is_word, seed_given, si, whole_number
-from ..errors import BadInput, ErrorCollector, did_you_mean, shown, warn
 from .from_frame import Start
 from .grain_classes import GrainClass, Members, class_from, class_numbers, joined_members, members_of
 from .moments import directions

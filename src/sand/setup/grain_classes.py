@@ -10,16 +10,16 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.errors import BadInput, shown, warn
 from ..basics.grains import Grains, moment_size, vector_for_all
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import PRESETS, Material, as_material
 from ..basics.paths import checked_name
 from ..basics.settings import For, Number, Reading, Settings, Whole, Word
 from ..basics.units import dimensions, si
-from ..errors import BadInput, shown, warn
 from .aggregates import KINDS, build
 from .encounters import combined, turned
 from .from_file import body_from_file, from_trajectory, is_own_trajectory, largest_body
-from .from_frame import StrainedContacts
 from .population import divided, drawn, fractions_of, radii_of, refuse_sum
 
 BUILDERS = tuple(kind for kind in KINDS if kind != "grain")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
-from ..errors import BadInput
 from ._kernels.aggregation import grow_ballistic, grow_diffusing
 from ._kernels.cluster_cluster import join_ballistic, join_diffusing
 from ._kernels.hash_grid import EMPTY, TRIES, GrainSet, HashGrid, table_size

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.constants import MAGNETIC
+from ..basics.errors import BadInput, did_you_mean, warn
 from ..basics.grains import Grains, moment_size, vector_for_all
 from ..basics.units import si
-from ..errors import BadInput, did_you_mean, warn
 from ._kernels.moment_relaxation import alignment_energy, relax
 
 MOMENT_MODES = ("random", "aligned", "relaxed")

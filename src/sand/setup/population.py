@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains, materials_of
 from ..basics.material import Material, as_material
 from ..basics.units import dimensions, format_quantity, in_unit, not_a_quantity, seed_given, si, whole_number
 from ..contact.jkr import rest_overlap, rest_radius
 from ..contact.mixing import pairing_between
-from ..errors import BadInput, shown
 from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0

@@ -9,8 +9,8 @@ from time import monotonic
 from typing import Any, Literal, NamedTuple
 
 from ..basics.arguments import MOST_STEPS
+from ..basics.errors import BadInput
 from ..basics.units import LONGEST_TEXT, format_quantity, si, whole_number
-from ..errors import BadInput
 
 SHORTEST_DURATION = 1e-21
 """Shortest accepted time span [s]; light travels less than a picometre in it."""

@@ -12,7 +12,9 @@ import numpy as np
 from ..analysis.clusters import unwrapped
 from ..basics.arrays import SAVED_LONG_RANGE
 from ..basics.box import Box, as_box
+from ..basics.errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..basics.grains import Grains
+from ..basics.initial_pairs import at_same_place
 from ..basics.own_quantities import own_values
 from ..basics.quantity_array import QuantityArray
 from ..basics.schema import BY_NAME, CHANGEABLE, stored
@@ -43,12 +45,10 @@ from ..engine.component import Component, in_use
 from ..engine.engine import Engine
 from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
-from ..errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force, LongRangeForce
 from ..forces.gas import Gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
-from ..setup.checks import at_same_place
 from .settings import read_forces
 
 QUANTITIES = CHANGEABLE

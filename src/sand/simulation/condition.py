@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..analysis.ledger_columns import AWAKE
+from ..basics.errors import BadInput, did_you_mean, shown
 from ..basics.units import si
-from ..errors import BadInput, did_you_mean, shown
 from .ledger import MOMENTA, NUMBERS
 
 EVERY, EVERY_LONG = 100, 1

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..basics.state import CONTACTS, RECORDED, State
 from ..contact.law import ContactLaw
 from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, contacts_stage
-from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 
 COLUMNS = (
     ("pair", "", "the two grains"),

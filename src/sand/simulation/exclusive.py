@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 
 LONG = "run"
 """The call that may take long: others are refused at once while it goes on, and wait for the end of all others."""

@@ -13,12 +13,12 @@ from ..analysis.body_motion import temperatures_of
 from ..analysis.clusters import labels_of, mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
 from ..basics.constants import BOLTZMANN
+from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from ..contact.measure import ENERGIES
 from ..engine.component import Component
 from ..engine.engine import Engine
-from ..errors import BadInput
 from ..io.ledger_table import TEMPERATURES
 
 KINETIC = "translation", "rotation"

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.errors import Interrupted
 from ..basics.state import LATE
-from ..errors import Interrupted
 from ..integrate.integrator import moves_bodies
 from ..integrate.parts import Stop
 from .cadence import Cadence, Chosen, Schedule, read_cadence

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ..basics.errors import warn
 from ..engine.engine import Engine
-from ..errors import warn
 from ..limits.solid_limits import extreme_warnings
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.errors import BadInput, FilesFailed
 from ..basics.paths import user_path
 from ..basics.state import (
     CLOCK,
@@ -25,7 +26,6 @@ from ..basics.state import (
 )
 from ..basics.version import __version__
 from ..compiler.jit import cache_folder
-from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
 from ..io.checkpoint import write_checkpoint
 from ..io.checkpoint_files import checkpoint_files

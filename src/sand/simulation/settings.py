@@ -9,8 +9,8 @@ from operator import attrgetter
 from typing import Any, ClassVar
 
 from ..basics.arguments import objects_with
+from ..basics.errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..basics.schema import CHANGEABLE, FIELDS
-from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
 from ..forces.registry import FORCES
 from .cadence import read_cadence

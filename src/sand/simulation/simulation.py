@@ -13,7 +13,9 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box, as_box
+from ..basics.errors import BadInput, FilesFailed
 from ..basics.grains import Grains
+from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import CONTACTS, OUTSIDE, State
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
@@ -23,7 +25,6 @@ from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.component import Component, in_use
-from ..errors import BadInput, FilesFailed
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
@@ -31,7 +32,6 @@ from ..integrate.verlet import Verlet
 from ..limits.solid_limits import grain_warnings
 from ..limits.truncation import truncation_warnings
 from ..neighbours.search import Neighbours
-from ..setup.from_frame import StrainedContacts
 from .cadence import Chosen, chosen_cadence
 from .change import Change, as_chosen, changed_engine
 from .condition import GIVEN, Condition

@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 from ..basics.arguments import MOST_STEPS
+from ..basics.errors import BadInput, shown
 from ..basics.units import si, whole_number
-from ..errors import BadInput, shown
 from .cadence import SHORTEST_DURATION, duration
 from .condition import GIVEN, Condition, OwnCondition, read_condition
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..basics.arguments import objects_with
-from ..errors import BadInput, shown, warn
+from ..basics.errors import BadInput, shown, warn
 from .cadence import Cadence, Schedule, read_cadence
 
 Simulation = Any

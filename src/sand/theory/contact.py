@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, did_you_mean
 from ..basics.material import Material, as_material
 from ..basics.units import si
 from ..contact import jkr
 from ..contact.dmt import tabor_parameter
 from ..contact.law import contact_constants, contact_periods
 from ..contact.mixing import MIXING, pairing_between
-from ..errors import BadInput, did_you_mean
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 
 MAX_SUMS = 10
 """Upper limit of the number of sums over all sizes whose rounding errors enter S or dS/dt."""

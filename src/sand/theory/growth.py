@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, did_you_mean
 from ..basics.units import si
-from ..errors import BadInput, did_you_mean
 
 REMANENCE = 0.63
 """γ of Eq. 16, from the paper's simulations of accretional remanence."""

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.constants import BOLTZMANN
+from ..basics.errors import BadInput, did_you_mean
 from ..basics.units import si, si_array
-from ..errors import BadInput, did_you_mean
 from . import growth, magnetic
 
 SPEEDS = ("impact", "thermal")

@@ -10,9 +10,9 @@ from typing import Any
 
 from ..basics.arguments import checked
 from ..basics.constants import BOLTZMANN, MAGNETIC
+from ..basics.errors import BadInput
 from ..basics.units import si
 from ..basics.vectors import three
-from ..errors import BadInput
 from ..forces.pair import dipole_formulas as dipole
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from ..basics.arguments import checked
 from ..basics.constants import BOLTZMANN, MAGNETIC
+from ..basics.errors import BadInput
 from ..basics.material import Material, as_material
 from ..basics.units import si
-from ..errors import BadInput
 
 ATTEMPT_TIME = 1e-9
 """τ₀ [s] of Néel relaxation, between 1e-11 and 1e-9 s in the literature."""

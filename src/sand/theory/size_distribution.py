@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.errors import BadInput
 from ..basics.units import si
-from ..errors import BadInput
 from .exponents import ExponentFit, Outputs, exponent_fit
 
 COMPLETED, SIZE_REACHED, MASS_LOST = (

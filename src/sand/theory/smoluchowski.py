@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.errors import BadInput, SandError, did_you_mean, shown
 from ..basics.units import si, si_array
-from ..errors import BadInput, SandError, did_you_mean, shown
 from .kinetics import KernelFunction
 from .size_distribution import COMPLETED, MASS_LOST, SIZE_REACHED, SizeDistribution
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.errors import BadInput
 from ..basics.own_quantities import OwnQuantities
-from ..errors import BadInput
 
 CONSTANT = ("radius", "mass")
 """Quantities of a grain that the page takes as constant."""

@@ -12,9 +12,9 @@ import numpy as np
 from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import own_label
 from ..analysis.tracking import SINGLE, Lineage
+from ..basics.errors import BadInput, NoSuchKey
 from ..basics.paths import user_path
 from ..basics.version import __version__
-from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes

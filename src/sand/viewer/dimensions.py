@@ -9,7 +9,7 @@ import numpy as np
 from ..analysis.clusters import unwrapped
 from ..analysis.fractal import FEWEST, Dimension, correlation_dimension
 from ..analysis.tracking import SINGLE
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..io.run_folder import plain
 
 MAX_CLUSTERS = 8

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from math import hypot
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..basics.errors import BadInput
 from ..basics.ramps import ramps_of
 from ..basics.units import format_quantity
-from ..errors import BadInput
 from ..forces.magnetic_field import Field
 from ..io.run_folder import CASE, read_toml
-from ..numerics.vec import norm
 
 
 class FieldDescription(NamedTuple):
@@ -54,16 +54,16 @@ def read_field(folder: Path) -> FieldDescription | None:
 
 
 def _field_text(field: Field) -> str:
-    constant = format_quantity(norm(field.flux_density), "T")
+    constant = format_quantity(hypot(*field.flux_density), "T")
     if ramps_of(field):
         return f"{constant} at first, {field.shape}, changing with a ramp"
     if field.shape == "constant":
         return f"{constant}, constant"
     if field.shape == "ramp":
         return (
-            f"from {constant} at {format_quantity(field.start, 's')} to {format_quantity(norm(field.final), 'T')} at "
+            f"from {constant} at {format_quantity(field.start, 's')} to {format_quantity(hypot(*field.final), 'T')} at "
             + format_quantity(field.end, "s")
         )
-    amplitude = format_quantity(norm(field.amplitude), "T")
+    amplitude = format_quantity(hypot(*field.amplitude), "T")
     varying = f"{amplitude}, {field.shape} at {format_quantity(field.frequency, 'Hz')}"
-    return f"{constant}, constant, and {varying}" if norm(field.flux_density) > 0.0 else varying
+    return f"{constant}, constant, and {varying}" if hypot(*field.flux_density) > 0.0 else varying

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.fractal import FEWEST
+from ..basics.errors import BadInput
 from ..basics.paths import user_path
-from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import replacing
 from .dataset import RunDataset

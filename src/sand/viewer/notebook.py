@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from typing import Any
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import plain
 from .dataset import REQUESTS, RunDataset

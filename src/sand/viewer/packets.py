@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..io.frame_chunks import REST
 from ..io.run_folder import plain
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.ledger_columns import LedgerColumns
+from ..basics.errors import BadInput
 from ..basics.paths import user_path
-from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_rows
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import AWAKE, LedgerColumns
 from ..analysis.quantities import measured
-from ..errors import BadInput
+from ..basics.errors import BadInput
 from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import plain
 from ..plotting.panels import (

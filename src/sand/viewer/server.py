@@ -18,7 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from typing import Any
 
-from ..errors import BadInput, NoSuchKey
+from ..basics.errors import BadInput, NoSuchKey
 from ..io.page_bundle import read_bundle
 from .dataset import RunDataset
 from .html import SERVED_POLICY, served_page

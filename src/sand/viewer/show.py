@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.ledger_columns import LedgerColumns
+from ..basics.errors import BadInput
 from ..basics.paths import user_path
-from ..errors import BadInput
 from ..io.frame import Frame
 from ..io.frame_chunks import stored_frame
 from ..io.page_bundle import read_bundle

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import t
 
 from sand.analysis.fits import mean_interval
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from tests.reference.fit_coverage import CASES, ENSEMBLES, TABLE, coverage
 
 SYMMETRIC = "mean S, lognormal, symmetric interval"

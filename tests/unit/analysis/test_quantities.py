@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.quantities import GRAIN_NAMES, cluster_rank, measured, quantity
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 
 from ..synthetic_frames import R, frame_of
 

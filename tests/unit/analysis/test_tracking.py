@@ -10,7 +10,7 @@ import pytest
 from sand.analysis import tracking as lineage
 from sand.analysis.clusters import cluster_labels
 from sand.analysis.tracking import SINGLE, Lineage, inherit_names
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 
 
 def ids_of(before, count, pairs):

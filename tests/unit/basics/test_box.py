@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sand.basics.box import Box, as_box
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 
 coordinate = st.floats(-30, 30)
 triple = st.tuples(coordinate, coordinate, coordinate)

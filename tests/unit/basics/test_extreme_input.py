@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
+from sand.basics.errors import BadInput
 from sand.basics.units import in_unit, si
 from sand.cli.main import main
 from sand.config.case import read_case
-from sand.errors import BadInput
 from sand.io.run_folder import read_json, read_text, read_toml
 from sand.simulation.cadence import Cadence, Schedule
 

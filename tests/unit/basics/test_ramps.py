@@ -5,9 +5,9 @@ import math
 import pytest
 
 import sand
+from sand.basics.errors import BadInput
 from sand.basics.ramps import force_at, ramps_of
 from sand.config.case import ForcesSection
-from sand.errors import BadInput
 
 LINE = sand.Ramp([0.0, 10.0, 4.0], ["1 us", "2 us", "3 us"], steps=10)
 

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 import sand
 from sand.basics.arguments import checked
 from sand.basics.descriptions import documented_units
+from sand.basics.errors import BadInput
 from sand.basics.settings import (
     AlongZ,
     Direction,
@@ -26,7 +27,6 @@ from sand.basics.settings import (
 from sand.config.case import WallSection
 from sand.config.sections import Section, with_keys
 from sand.config.template import REQUIRED, keys_of
-from sand.errors import BadInput
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
 from sand.setup import GrainClass

@@ -7,8 +7,8 @@ import sys
 import pint
 import pytest
 
+from sand.basics.errors import BadInput
 from sand.basics.units import format_quantity, in_unit, si
-from sand.errors import BadInput
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import sand
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.setup import GrainClass
 
 OSCILLATING = {"shape": "oscillating", "amplitude": "1 mT", "frequency": "1 MHz"}

@@ -10,12 +10,12 @@ import time
 
 import pytest
 
+from sand.basics.errors import FilesFailed
 from sand.cli import report
 from sand.cli.main import main
 from sand.cli.progress import Progress
 from sand.config.build import simulation_of
 from sand.config.case import read_case
-from sand.errors import FilesFailed
 from sand.io.checkpoint import newest_checkpoint, read_checkpoint
 from sand.simulation.simulation import Simulation
 

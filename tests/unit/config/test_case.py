@@ -8,10 +8,10 @@ import pytest
 import tomli_w
 
 import sand
+from sand.basics.errors import BadInput
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.config.key_errors import validate
-from sand.errors import BadInput
 from sand.experiments.growth_case import GrowSection
 from sand.simulation.serialise import case_of
 

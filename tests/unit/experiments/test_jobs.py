@@ -15,11 +15,11 @@ import pytest
 import tomli_w
 
 import sand
+from sand.basics.errors import warn
 from sand.cli.job import InterruptObserver
 from sand.cli.main import main
 from sand.cli.streams import Output
 from sand.compiler.stage import Stage
-from sand.errors import warn
 from sand.experiments import executors
 from sand.experiments.executors import results_of
 from sand.experiments.growth_boxes import grow

@@ -10,7 +10,7 @@ from scipy.special import erfc
 
 import sand
 from sand.basics.constants import COULOMB
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.forces.pair.ewald import DEGREES, half_of_vectors
 from sand.forces.pair.ewald_fit import CHARGES, fitted, screened, smeared
 

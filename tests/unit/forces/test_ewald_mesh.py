@@ -9,9 +9,9 @@ from scipy.interpolate import BSpline
 
 import sand
 from sand.basics.constants import COULOMB, MAGNETIC
+from sand.basics.errors import BadInput
 from sand.compiler.program import Program
 from sand.compiler.stage import PythonStage, stage
-from sand.errors import BadInput
 from sand.forces.pair import ewald
 from sand.forces.pair.ewald_fit import CHARGES
 from sand.forces.pair.long_range_loops import all_blocks

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sand
+from sand.basics.errors import BadInput
 from sand.compiler.jit import kernel
 from sand.config.case import check_case
-from sand.errors import BadInput
 from sand.forces import external_formulas as surroundings
 from sand.forces.base import ExternalForce
 from sand.forces.external_formulas import GrainState, field_in_time, flux_density_at, uniform_field

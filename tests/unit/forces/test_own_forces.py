@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.errors import BadInput
 from sand.cli.main import main
 from sand.cli.report import resume_line
 from sand.config.case import ForcesSection
-from sand.errors import BadInput
 from sand.forces.own import IMPORTED, OWN
 from sand.forces.registry import FORCES
 

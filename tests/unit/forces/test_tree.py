@@ -7,7 +7,7 @@ import pytest
 
 import sand
 from sand.basics.constants import MAGNETIC
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.forces.pair import tree, tree_cells, tree_loops
 from sand.forces.pair.dipole_formulas import pair_load
 from sand.forces.pair.multipoles import (

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.errors import FilesFailed
+from sand.basics.errors import FilesFailed
 from sand.experiments.executors import MOST_ON_WINDOWS, executor_for
 from sand.io.bodies import contacts_of
 from sand.io.checkpoint import write_checkpoint

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.errors import FilesFailed
 from sand.basics.state import STEPS
-from sand.errors import FilesFailed
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.ledger_table import LedgerFile, read_ledger
 from sand.io.run_folder import make_folder, read_toml, replace_file, shows_a_run, write_json, write_toml

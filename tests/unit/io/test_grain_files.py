@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.basics.errors import BadInput
 from sand.cli.main import main
-from sand.errors import BadInput
 from sand.io.bodies import read_body, read_grains, write_body
 from sand.io.file_frames import open_frames
 from sand.setup.checks import pairs_in_contact

@@ -8,8 +8,8 @@ import warnings
 import pytest
 
 import sand
+from sand.basics.errors import FilesFailed
 from sand.cli.main import main
-from sand.errors import FilesFailed
 from sand.io import lock as lock_files
 from sand.io.lock import LOCK, FolderLock, writing
 from sand.io.run_folder import make_folder

@@ -9,10 +9,10 @@ from scipy.constants import e as ELEMENTARY_CHARGE
 from scipy.constants import k as BOLTZMANN
 
 import sand
+from sand.basics.errors import BadInput
 from sand.config.build import simulation_of
 from sand.config.case import read_case
 from sand.engine.input_checks import check_system
-from sand.errors import BadInput
 from sand.limits.truncation import motion_temperature, truncation_warnings
 
 BOX = sand.Box.periodic("2 um")

@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.analysis.ledger_columns import LedgerColumns
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.io.ledger_table import read_ledger
 from sand.plotting.plots import HISTORY, grains_figure, history_figure
 

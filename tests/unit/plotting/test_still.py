@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.plotting.render.scene import camera_rotation
 from sand.plotting.render.still import contact_share, still_picture
 from sand.plotting.style import rgb

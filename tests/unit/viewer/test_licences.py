@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.io.page_bundle import PAGE, read_bundle
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.io import page_bundle as page
 
 

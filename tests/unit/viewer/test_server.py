@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from sand.errors import BadInput
+from sand.basics.errors import BadInput
 from sand.viewer import server as servers
 from sand.viewer.dataset import run_dataset
 from sand.viewer.server import Server

@@ -11,12 +11,12 @@ import numpy as np
 
 from ...basics.arrays import body_arrays
 from ...basics.box import Box
+from ...basics.errors import BadInput
 from ...basics.grains import Grains
 from ...basics.ramps import ramps_of
 from ...basics.state import CONTACT_STEPS, SUBSTEPS
 from ...contact.law import ContactLaw, Pairing, contact_constants
 from ...contact.model import Contact
-from ...errors import BadInput
 from ...forces.base import Force
 from ...forces.pair.ewald_force import EwaldForce
 from ...integrate.parts import ContactParameters, StepParameters

@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ...errors import NoSuchAttribute, did_you_mean
+from ...basics.errors import NoSuchAttribute, did_you_mean
 
 _MODULES = {
     "CrossSection": "cross_sections",

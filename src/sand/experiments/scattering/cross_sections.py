@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ...basics.arguments import checked
+from ...basics.errors import BadInput, warn
 from ...basics.units import si
-from ...errors import BadInput, warn
 from ..executors import results_of
 from .encounters import Flight
 from .flight_driver import BOUND, FLIGHT_FAILED, HIT

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ...basics.errors import BadInput
 from ...basics.grains import Grains
 from ...basics.units import si
-from ...errors import BadInput
 from .encounters import Flight
 from .flight_driver import FLIGHT_RESULTS, HIT, Flights, allocate_workspace, flights_of
 from .initial_conditions import R, U

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...basics.arguments import checked
-from ...errors import BadInput, shown, warn
+from ...basics.errors import BadInput, shown, warn
 from .cross_sections import rows_by_flight, run_flights, seed_of
 from .encounters import Flight
 from .flight_driver import HIT

@@ -10,11 +10,11 @@ import numpy as np
 
 from ...basics.arguments import checked
 from ...basics.constants import BOLTZMANN
+from ...basics.errors import BadInput, ErrorCollector, did_you_mean
 from ...basics.grains import Grains
 from ...basics.material import Material, as_material
 from ...basics.units import dimensions, format_quantity, in_unit, is_word, si
 from ...basics.vectors import three
-from ...errors import BadInput, ErrorCollector, did_you_mean
 from ...theory.magnetic import thermal_speed
 from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM

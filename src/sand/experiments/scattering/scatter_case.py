@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
+from ...basics.errors import BadInput, ErrorCollector
 from ...basics.material import PRESETS
 from ...basics.settings import For, Number, Whole
 from ...config.case import MaterialSection, material_errors, with_absolute_files
 from ...config.commands import refuse_other_command
 from ...config.key_errors import validate
 from ...config.sections import PathName, Section, Seed, with_keys
-from ...errors import BadInput, ErrorCollector
 from ...io.run_folder import read_toml
 from ..collision_case import BodyKind, BodySection
 from .encounters import Flight

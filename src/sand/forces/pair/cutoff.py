@@ -6,10 +6,10 @@ import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ...basics.box import Box
+from ...basics.errors import BadInput
 from ...basics.grains import Grains
 from ...basics.settings import Number, Settings, Word
 from ...basics.units import format_quantity, is_word
-from ...errors import BadInput
 from .dipole_formulas import Cutoff
 
 SHELL = 0.2

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
 from ...numerics.simd import round_up_to_simd_width
-from ...numerics.vec import accrue, add, cross, load, put, sub
+from ...numerics.vec import accrue, add, cross, load, nearest_image, put, sub
 from .dipole_formulas import pair_load, pair_load_cut
 from .dipole_rates import pair_rates
 from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks

@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...basics.alignment import padded_size
 from ...basics.box import Box
-from ...errors import BadInput
-from ...numerics.simd import padded_size
+from ...basics.errors import BadInput
 from .ewald_fit import DIPOLES, Sources, erfc, fitted
 from .ewald_loops import UNUSED, Buffers, EwaldParameters, MeshEwaldParameters, Waves
 from .long_range_loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM

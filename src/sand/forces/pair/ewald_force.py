@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 from typing import Annotated, Any, ClassVar
 
 from ...basics.box import Box
+from ...basics.errors import BadInput, ErrorCollector, shown
 from ...basics.grains import Grains
 from ...basics.settings import Number, Word
-from ...errors import BadInput, ErrorCollector, shown
 from .cutoff import CutoffChoice, CutoffForce
 from .ewald import EwaldChoice, choose_ewald, sides
 from .ewald_fit import Sources

@@ -22,11 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
 from ...numerics.turns import cosine_and_sine
-from ...numerics.vec import accrue, add, cross, load, put, scale, sub
+from ...numerics.vec import accrue, add, cross, load, nearest_image, put, scale, sub
 from .dipole_formulas import pair_load
 from .dipole_loops import (
     COPIES,

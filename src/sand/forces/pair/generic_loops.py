@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...basics.box import nearest_image
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
-from ...numerics.vec import accrue, axpy, dot, load, put, scale, sub
+from ...numerics.vec import accrue, axpy, dot, load, nearest_image, put, scale, sub
 from .dipole_formulas import cut_weight
 from .dipole_rates import cut_curvature
 from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...numerics.simd import SIMD_WIDTH
+from ...basics.alignment import SIMD_WIDTH
 from .ewald_fit import DIPOLES, Sources
 from .mesh_loops import ORDERS, Mesh
 

@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...basics.alignment import SIMD_WIDTH
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
-from ...numerics.simd import SIMD_WIDTH
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
 from .long_range_loops import Round

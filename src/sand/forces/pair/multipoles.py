@@ -26,8 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...basics.alignment import SIMD_WIDTH
 from ...compiler.jit import loop
-from ...numerics.simd import SIMD_WIDTH
 
 LANES = SIMD_WIDTH
 """Pairs of cells, or grains, that are processed together."""

@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...basics.alignment import padded_size
 from ...basics.constants import MAGNETIC
-from ...numerics.simd import padded_size
 from .long_range_loops import PARALLEL_FROM
 from .multipoles import LANES, tables
 from .tree_cells import LARGE_FROM, LEAF, MOST_BLOCKS, SOME_BLOCKS, Cells

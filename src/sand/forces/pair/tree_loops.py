@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...basics.alignment import SIMD_WIDTH
 from ...compiler.jit import loop
-from ...numerics.simd import SIMD_WIDTH, round_up_to_simd_width
+from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load
 from .dipole_loops import COPIES, MAX_REMAINDER, energy_shares, separation_if

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...basics.box import nearest_image
 from ...basics.constants import MAGNETIC
 from ...basics.state import CONTACTS
 from ...compiler.recipes import factory
@@ -17,7 +16,7 @@ from ...contact.settling import list_cluster, rigid_motion, solve_symmetric
 from ...contact.update import pose_at
 from ...forces.pair.dipole_formulas import pair_load
 from ...numerics.quaternion import turned_back
-from ...numerics.vec import accrue, across, add, cross, dot, load, load4, norm, put, scale, sub
+from ...numerics.vec import accrue, across, add, cross, dot, load, load4, nearest_image, norm, put, scale, sub
 from ..parts import DT
 from .rigid_body import store_loads
 

@@ -1,9 +1,8 @@
 """Which bodies may touch within a step."""
 
-from ...basics.box import nearest_image
 from ...basics.state import LATE, PAIRS
 from ...compiler.jit import formula, loop
-from ...numerics.vec import dot, load, norm, sub
+from ...numerics.vec import dot, load, nearest_image, norm, sub
 from .body_friction import gas_displacement
 
 TOUCH_SPEED = 1.2

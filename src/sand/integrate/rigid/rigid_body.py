@@ -18,11 +18,10 @@ for symmetric bodies such as straight chains.  One step of a body is kick, drift
 
 import math
 
-from ...basics.box import nearest_image
 from ...basics.state import BODIES
 from ...compiler.jit import formula, loop
 from ...numerics.quaternion import normalised, turned, turned_back
-from ...numerics.vec import accrue, add, axpy, cross, dot, load, load4, norm, put, put4, scale, sub
+from ...numerics.vec import accrue, add, axpy, cross, dot, load, load4, nearest_image, norm, put, put4, scale, sub
 from ..motion import count_crossings
 
 LARGEST_PIECE = 0.1

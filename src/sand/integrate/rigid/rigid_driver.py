@@ -9,7 +9,6 @@ grains of awake clusters take their contact steps (`AWAKE_STEPS`), and at the en
 
 import math
 
-from ...basics.box import nearest_image
 from ...basics.state import (
     BODIES,
     BROKEN,
@@ -34,7 +33,7 @@ from ...compiler.program import call_stage
 from ...compiler.stage import stage
 from ...neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
 from ...numerics.quaternion import turned
-from ...numerics.vec import accrue, dot, load, load4, norm, put, sub
+from ...numerics.vec import accrue, dot, load, load4, nearest_image, norm, put, sub
 from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
 from ..motion import wrap_all

@@ -17,11 +17,10 @@ come to rest as in any step.  Contacts at rest carry all loads: the slow ones ar
 
 import math
 
-from ...basics.box import nearest_image
 from ...basics.state import BODIES, PAIRS, STEP
 from ...compiler.jit import caller, formula, loop
 from ...compiler.stage import stage
-from ...numerics.vec import add, load, norm, sub
+from ...numerics.vec import add, load, nearest_image, norm, sub
 from .body_touches import reach_of_pair
 from .rigid_body import kick_bodies, move_velocities, sum_body_loads
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...errors import BadInput
+from ...basics.errors import BadInput
 from ..run_folder import read_text
 from .columns import read_columns
 from .data import FileBox, GrainData, GrainFile

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...basics.arguments import MOST_GRAINS
+from ...basics.errors import BadInput
 from ...basics.units import in_unit
-from ...errors import BadInput
 from .data import LENGTHS, NAMED, GrainData, GrainFile, data_of, known_as, numbers
 
 COMMENTS = "#%!"

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...basics.errors import BadInput
 from ...basics.units import in_unit
-from ...errors import BadInput
 
 NAMED = 10
 """Lines that are named one by one in a message."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import BadInput
+from ...basics.errors import BadInput
 from ..extended_xyz import unlisted
 from .data import NAMED, FileBox, GrainData, GrainFile, data_of, number
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import BadInput
+from ...basics.errors import BadInput
 from ..trajectory import Frames
 from .data import FileBox, GrainData, GrainFile
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...basics.errors import BadInput
 from ...basics.units import in_unit
-from ...errors import BadInput
 from ..extended_xyz import unlisted
 from .data import NAMED, FileBox, GrainData, GrainFile, data_of, known_as, numbers
 

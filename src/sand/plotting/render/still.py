@@ -13,8 +13,8 @@ from PIL import Image
 from ...analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, quantity
 from ...basics.arguments import checked
 from ...basics.box import Box
+from ...basics.errors import BadInput, did_you_mean, refuse_other, shown
 from ...basics.units import in_unit, si_array
-from ...errors import BadInput, did_you_mean, refuse_other, shown
 from ..run_figure import DPI, RunFigure, figure_bytes, headline
 from ..style import DARK_BACKGROUND, LIGHT_BACKGROUND, MUTED, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, plot_style, rgb
 from .colouring import ColourKey, coloured

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.numerics.simd import CACHE_LINE, SIMD_WIDTH, aligned, padded_size
+from sand.basics.alignment import CACHE_LINE, SIMD_WIDTH, aligned, padded_size
 
 
 def is_aligned(array):
