@@ -58,10 +58,10 @@ def pair_loads(moved: np.ndarray, rates: np.ndarray, distance: float, constants)
     law, overlap = LAWS[CONTACT.law], 2 * RADIUS - apart
     y = law.radius_root(overlap, constants)
     elastic = contact_load(pose, law.force(overlap, y, constants), RADIUS, RADIUS, constants)
-    rolling = surface_rotation(tuple(w[0]), tuple(w[1]), RADIUS, RADIUS)
+    rolling = surface_rotation(tuple(w[0]), tuple(w[1]), 0.5)
     n, motion = pose.n, relative_motion(tuple(separation), tuple(v[0] - v[1]), rolling, tuple(w[0]), tuple(w[1]))
     dashpots = dashpots_of(law.contact_radius(overlap, y, constants), constants)
-    damped = loads_on_grains(damping_load(motion, n, dashpots), tuple(separation), RADIUS, RADIUS)
+    damped = loads_on_grains(damping_load(motion, n, dashpots), tuple(separation), 0.5)
     force, torque1, torque2 = (np.add(a, b) for a, b in zip(elastic, damped, strict=True))
     return np.concatenate([force, torque1, -force, torque2])
 

@@ -17,6 +17,10 @@ DAMPING_ROWS = 12
 """Rows of `ContactArrays.damping`: relative velocity and spin of the last step, force and torque of the dashpots."""
 
 
+KEPT_ROWS = 7
+"""Rows of `ContactArrays.kept`."""
+
+
 class ContactArrays(NamedTuple):
     """Contacts, one column each; the first count[CONTACTS] columns are in use.
 
@@ -32,6 +36,9 @@ class ContactArrays(NamedTuple):
     constants: np.ndarray  # (K, C) constants of the law; (K, CONTACTS_PER_BLOCK) identical columns if uniform
     lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 losses of state.RECORDED
     damping: np.ndarray  # (12, C) motion and loads of the dashpots, rows of contact.damping; (12, 0) without damping
+    # (7, C) ζ and R (n1 + n2) [m] at the end of a step, and the step after it for which they are kept, plus 1; rows of
+    # contact.slip_rules
+    kept: np.ndarray
     force: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
@@ -249,6 +256,7 @@ def empty_contact_arrays(
     c = padded_size(max(int(capacity), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "force", "torque1", "torque2")}
     numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damping": np.zeros((DAMPING_ROWS, c if damped else 0))}
+    numbers["kept"] = np.zeros((KEPT_ROWS, c))
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         constants=np.zeros((constant_count, CONTACTS_PER_BLOCK if uniform_contacts else c)),

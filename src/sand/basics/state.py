@@ -13,6 +13,7 @@ import numpy as np
 from .alignment import aligned_copies, all_aligned
 from .arrays import (
     GROWTH,
+    KEPT_ROWS,
     NOT_SAVED,
     SAVED_BODIES,
     SAVED_LONG_RANGE,
@@ -285,6 +286,8 @@ class State:
             self.grow_pairs(int(self.count[PAIRS]))
         if "grains/image" not in saved:  # of a checkpoint of an earlier version, which counted no crossings
             saved = saved | {"grains/image": np.zeros_like(self.grains.arrays.image)}
+        if "contacts/kept" not in saved:  # likewise; displacements are then computed in the next step
+            saved = saved | {"contacts/kept": np.zeros((KEPT_ROWS, int(self.count[CONTACTS])))}
         for name in GrainArrays._fields:
             _copy_into(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "pair_list"):

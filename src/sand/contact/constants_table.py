@@ -40,13 +40,14 @@ def with_derived(law: ContactLaw, saved: Mapping[str, np.ndarray]) -> dict[str, 
     """Arrays of a checkpoint, with the derived constants of contacts, which earlier versions did not store."""
     names, found = constant_names(law), dict(saved)
     needed = ("reduced_radius", "roll_stiffness", "slide_limit", "roll_limit", "break_overlap")
-    for group, sides in (("contacts", 2), ("wall_contacts", 1)):
+    for group in ("contacts", "wall_contacts"):
         table = found.get(f"{group}/constants")
         if table is not None and len(table) == len(names) - len(Derived._fields):
-            radius = saved["grains/radius"]
-            smaller = radius[saved[f"{group}/pair"][:sides]].min(axis=0)
-            smaller = np.resize(smaller if smaller.size else radius, table.shape[1])  # one column serves equal contacts
-            given = zip(*(table[names.index(name)] for name in needed), smaller, strict=True)
+            radius, (first, second) = saved["grains/radius"], saved[f"{group}/pair"]
+            radii = radius[first], radius[second] if group == "contacts" else np.full(first.size, np.inf)
+            # one column serves equal contacts
+            radii = [np.resize(own if first.size else radius, table.shape[1]) for own in radii]
+            given = zip(*(table[names.index(name)] for name in needed), *radii, strict=True)
             derived = np.array([derived_constants(*column) for column in given])
             found[f"{group}/constants"] = np.concatenate([table, derived.reshape(-1, len(Derived._fields)).T])
     return found

@@ -97,18 +97,28 @@ class Derived(NamedTuple):
     squared_slide_limit: float  # ζ_c² [m²]
     squared_roll_limit: float  # ξ_c² [m²]
     inverse_break_overlap: float  # −1/δ where a contact breaks [1/m]; 1/R if it breaks at δ = 0
+    radius1: float  # r1 [m]
+    radius2: float  # r2 [m]; infinite at a wall
+    inverse_radius1: float  # 1/r1 [1/m]
+    inverse_radius2: float  # 1/r2 [1/m]
     inverse_radius: float  # 1/r of the smaller grain [1/m]
+    inverse_sum: float  # 1/(r1 + r2) [1/m]
 
 
 @formula
-def derived_constants(reduced, roll_stiffness, slide_limit, roll_limit, break_overlap, smaller):
-    """`Derived` of one contact, from R [m], k_r [N/m], limits [m], −δ where it breaks [m] and the smaller r [m]."""
+def derived_constants(reduced, roll_stiffness, slide_limit, roll_limit, break_overlap, r1, r2):
+    """`Derived` of one contact, from R [m], k_r [N/m], limits [m], −δ where it breaks [m] and radii [m]."""
     return Derived(
         reduced * reduced * roll_stiffness,
         slide_limit * slide_limit,
         roll_limit * roll_limit,
         1.0 / (break_overlap if break_overlap > 0.0 else reduced),
-        1.0 / smaller,
+        r1,
+        r2,
+        1.0 / r1,
+        1.0 / r2,
+        1.0 / min(r1, r2),
+        1.0 / (r1 + r2),
     )
 
 
@@ -152,16 +162,16 @@ def contact_constants(law: ContactLaw) -> Callable:
     @formula
     def constants_of_pair(pairing, r1, r2, m1, m2):
         inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
-        return constants_of(pairing, r1 * r2 / (r1 + r2), min(r1, r2), 1.0 / m1 + 1.0 / m2, inverse_inertia)
+        return constants_of(pairing, r1 * r2 / (r1 + r2), (r1, r2), 1.0 / m1 + 1.0 / m2, inverse_inertia)
 
     return constants_of_pair
 
 
 @functools.cache
 def reduced_constants(law: ContactLaw) -> Callable:
-    """The formula `(pairing, reduced, smaller, inverse_mass, inverse_inertia)` → `ContactConstants` of a law.
+    """The formula `(pairing, reduced, radii, inverse_mass, inverse_inertia)` → `ContactConstants` of a law.
 
-    The arguments are R [m], the smaller radius [m], 1/m1 + 1/m2 [1/kg] and 1/I1 + 1/I2 [1/(kg m²)].
+    The arguments are R [m], (r1, r2) [m], 1/m1 + 1/m2 [1/kg] and 1/I1 + 1/I2 [1/(kg m²)].
     `max_squared_frequency` is that of the fastest of the four modes of the free pair, or of their damping.  A damping
     ratio ζ gives each mode of stiffness k and effective mass m the coefficient 2ζ√(k m): 1/m = 1/m1 + 1/m2 for the
     normal mode, 7/2 of it for sliding, 1/I1 + 1/I2 for rolling (stiffness k_r R²) and for twisting.
@@ -169,7 +179,7 @@ def reduced_constants(law: ContactLaw) -> Callable:
     normal_mode = law.normal_mode
 
     @formula
-    def constants_of(pairing, reduced, smaller, inverse_mass, inverse_inertia):
+    def constants_of(pairing, reduced, radii, inverse_mass, inverse_inertia):
         adhesive = pairing.surface_energy > 0.0
         normal = normal_mode(pairing.surface_energy, pairing.modulus, reduced)
         a0 = normal.rest_radius
@@ -208,7 +218,7 @@ def reduced_constants(law: ContactLaw) -> Callable:
             c_t,
             max(squared_frequency, (DAMPING_FACTOR * fastest_decay) ** 2),
             normal.constants,
-            derived_constants(reduced, k_r, slide_limit, pairing.roll_limit, normal.break_overlap, smaller),
+            derived_constants(reduced, k_r, slide_limit, pairing.roll_limit, normal.break_overlap, *radii),
         )
 
     return constants_of

@@ -41,11 +41,15 @@ def pointers_for(slide, roll, n, r1, r2):
 
     t1 = ξ/r1 + ζ/(r1+r2), t2 = ξ/r2 − ζ/(r1+r2), n1 = −n√(1−t1²) + t1, n2 = n√(1−t2²) + t2
     """
-    both = r1 + r2
-    inverse = 1.0 / (r1 * r2 * both)  # one division for three
-    shared = scale(inverse * r1 * r2, slide)
-    t1 = axpy(inverse * r2 * both, roll, shared)
-    t2 = sub(scale(inverse * r1 * both, roll), shared)
+    return pointers_by(slide, roll, n, 1.0 / r1, 1.0 / r2, 1.0 / (r1 + r2))
+
+
+@formula
+def pointers_by(slide, roll, n, inverse1, inverse2, inverse_sum):
+    """As `pointers_for`, from 1/r1, 1/r2 and 1/(r1 + r2) [1/m]."""
+    shared = scale(inverse_sum, slide)
+    t1 = axpy(inverse1, roll, shared)
+    t2 = sub(scale(inverse2, roll), shared)
     return pointer(-1.0, n, t1), pointer(1.0, n, t2)
 
 

@@ -7,7 +7,7 @@ import copy
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, unwrapped
-from ..basics.arrays import SAVED_LONG_RANGE
+from ..basics.arrays import KEPT_ROWS, SAVED_LONG_RANGE
 from ..basics.box import Box
 from ..basics.errors import BadInput, first_problems
 from ..basics.grains import GrainArrays, Grains
@@ -128,9 +128,10 @@ def regrouped_arrays(state: State, kept: np.ndarray, grains: Grains, target: Sta
     columns, pair = kept_contacts(state, kept)
     for name in state.contacts._fields:
         array = saved.get(f"contacts/{name}")
-        if array is not None and name not in ("pair", "constants", "side", "start"):
+        if array is not None and name not in ("pair", "constants", "kept", "side", "start"):
             out[f"contacts/{name}"] = array[..., columns] if array.shape[-1] else array
     out["contacts/pair"] = pair
+    out["contacts/kept"] = np.zeros((KEPT_ROWS, len(columns)))  # grains may have been moved: computed in the next step
     constants, uniform = saved["contacts/constants"], target.uniform_contacts
     if not state.uniform_contacts:
         constants = constants[:, columns]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..basics.arrays import SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
+from ..basics.arrays import KEPT_ROWS, SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
 from ..basics.errors import BadInput
 from ..basics.schema import FIELDS
 from ..basics.state import (
@@ -63,6 +63,7 @@ STORED = {
     "contacts/constants": ArraySpec("f8", (None, (1, "C"))),
     "contacts/lost": ArraySpec("f8", ((4, 6), "C")),
     "contacts/damping": ArraySpec("f8", (12, (0, "C"))),
+    "contacts/kept": ArraySpec("f8", (KEPT_ROWS, "C"), required=False),  # earlier versions kept no displacements
     "contacts/flag": ArraySpec("u1", ("C",), "any"),
     "contacts/every_step": ArraySpec("u1", ("C",), "boolean"),
     "contacts/side": ArraySpec("u4", ("2C",), "order"),
@@ -82,7 +83,7 @@ STORED = {
         for name in ("pointer1", "pointer2", "force", "torque1")
     },
     **{f"wall_contacts/{name}": ArraySpec("f8", ("K",), required=False) for name in ("twist", "formed")},
-    "wall_contacts/constants": ArraySpec("f8", (None, "K"), required=False),
+    "wall_contacts/constants": ArraySpec("f8", (None, "K"), "no nan", required=False),  # a wall has an infinite radius
     "wall_contacts/lost": ArraySpec("f8", ((4, 6), "K"), required=False),
     "wall_contacts/damping": ArraySpec("f8", (12, (0, "K")), required=False),
     "wall_contacts/flag": ArraySpec("u1", ("K",), "any", required=False),
