@@ -184,16 +184,17 @@ def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
             begin = first + b * BLOCK_SIZE
             end = begin + BLOCK_SIZE if begin + BLOCK_SIZE < last else last
             column = np.uint64(0) if uniform_contacts(contacts) else begin
-            beyond = others = 0.0
+            beyond = 0.0
             for k in range(end - begin):
-                flag = contacts.flag[begin + k]
-                beyond += 1.0 if flag > 0 else 0.0
-                others += 1.0 if (flag > 0) & (flag != SLIPPED_FLAG) else 0.0
+                beyond += 1.0 if contacts.flag[begin + k] > 0 else 0.0
             block = ContactRange(begin, padded_contact_count(contacts, end), end, column)
             if beyond <= fraction * (end - begin):
                 part = flag_contacts(grains, contacts, block, step)
             else:
                 complete_kept(grains, contacts, ContactRange(begin, end, end, column), step)
+                others = beyond
+                for k in range(end - begin):
+                    others -= 1.0 if contacts.flag[begin + k] == SLIPPED_FLAG else 0.0
                 if others <= OTHER_FRACTION * (end - begin):
                     part = roll_contacts(grains, contacts, block, step)
                 else:
