@@ -96,8 +96,8 @@ def bytes_of(thing: Any) -> int:
     """Of all arrays in it."""
     if isinstance(thing, np.ndarray):
         return thing.nbytes
-    if isinstance(thing, tuple):
-        return sum(bytes_of(part) for part in thing)
+    if isinstance(thing, (tuple, dict)):
+        return sum(bytes_of(part) for part in (thing.values() if isinstance(thing, dict) else thing))
     if dataclasses.is_dataclass(thing):
         return sum(bytes_of(getattr(thing, part.name)) for part in dataclasses.fields(thing))
     return bytes_of(thing.arrays) if isinstance(thing, sand.Grains) else 0

@@ -120,11 +120,11 @@ def test_restart_with_an_old_pair_list_is_bit_for_bit():
 @pytest.mark.compiled("contacts")
 def test_array_sizes_change_no_bit():
     """Initial room for 16 or 4096 contacts and pairs, constants shared or per contact: the same bits."""
-    from sand.basics.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
+    from sand.basics.arrays import empty_contact_arrays, empty_pair_list
     from sand.contact.constants_table import constant_names
     from sand.contact.jkr import LAW
 
-    ends = []
+    ends, shared = [], ("constants", "step", "break_overlap")
     for room, uniform in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
@@ -134,7 +134,7 @@ def test_array_sizes_change_no_bit():
         sim._engine.parameters = sim._engine.parameters._replace(settings=settings)
         sim._engine._table.set("settings", settings)
         sim.run(until=1e-9)
-        ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in UNIFORM_ARRAYS})
+        ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in shared})
     assert sim.state.count[CONTACTS] > 16
     assert all(end == ends[0] for end in ends)
 

@@ -1,13 +1,14 @@
-"""Arrays of contacts, candidate pairs, long-range forces, clusters, walls and bodies, and their allocation."""
+"""Arrays of contacts, candidate pairs, long-range forces, clusters and bodies, and their allocation."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from .alignment import all_aligned, padded_size
+from .alignment import padded_size
+from .array_groups import FEWEST_COLUMNS, GRAINS, INNER, SIDES, USED, Array, new_group, saved_in
 
 ALWAYS_RECORDED = 4
 """Loss channels recorded per contact with every contact law; the others only with damping or variable stiffnesses."""
@@ -17,10 +18,8 @@ DAMPING_ROWS = 12
 """Rows of `ContactArrays.damping`: relative velocity and spin of the last step, force and torque of the dashpots."""
 
 
-KEPT_ROWS = 7
-"""Rows of `ContactArrays.kept`."""
-
-
+# sizes besides those of `array_groups`: "grains + 1" starts of rows, "sorted" grains by sorted index, "padded" those in
+# whole SIMD vectors
 class ContactArrays(NamedTuple):
     """Contacts, one column each; the first count[CONTACTS] columns are in use.
 
@@ -28,92 +27,95 @@ class ContactArrays(NamedTuple):
     contacts per grain in compressed sparse row form: the entries of grain g are side[start[g] : start[g + 1]].
     """
 
-    pair: np.ndarray  # (2, C) uint32: grains 1 and 2
-    pointer1: np.ndarray  # (3, C) contact pointer of grain 1: unit vector to the contact, body frame
-    pointer2: np.ndarray  # (3, C) contact pointer of grain 2
-    twist: np.ndarray  # (C,) φ [rad]
-    formed: np.ndarray  # (C,) time of formation [s]; the start time for initial contacts
-    constants: np.ndarray  # (K, C) constants of the law; (K, CONTACTS_PER_BLOCK) identical columns if uniform
-    lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 losses of state.RECORDED
-    damping: np.ndarray  # (12, C) motion and loads of the dashpots, rows of contact.damping; (12, 0) without damping
-    # (7, C) ζ and R (n1 + n2) [m] at the end of a step, and the step after it for which they are kept, plus 1; rows of
-    # contact.slip_rules
-    kept: np.ndarray
-    force: np.ndarray  # (3, C) force on grain 1 [N]
-    torque1: np.ndarray  # (3, C) [N m]
-    torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) uint8: 0 within all limits, else one of the flags of contact.transitions
-    every_step: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts in every step
-    side: np.ndarray  # (2C,) uint32: 2 × contact, plus 1 for grain 2; sorted by grain
-    start: np.ndarray  # (N+1,) uint32: first entry of each grain in `side`
-    # (N + GATHER_CLASSES,) uint32: grains in the order of contact.gather; (0,) for the order of their indices
-    gather_order: np.ndarray
+    # grains 1 and 2
+    pair: Annotated[np.ndarray, Array((2, USED), dtype="u4", rule="two grains", names=(GRAINS, GRAINS))]
+    pointer1: Annotated[np.ndarray, Array((3, USED))]  # contact pointer of grain 1: unit vector, body frame
+    pointer2: Annotated[np.ndarray, Array((3, USED))]  # contact pointer of grain 2
+    twist: Annotated[np.ndarray, Array((USED,), "rad")]  # φ
+    formed: Annotated[np.ndarray, Array((USED,), "s")]  # time of formation; the start time for initial contacts
+    # constants of the law; CONTACTS_PER_BLOCK identical columns if uniform, one of them in a checkpoint
+    constants: Annotated[np.ndarray, Array(("constants", USED), fewer=1)]
+    # energy dissipated so far, the first 4 or all 6 losses of state.RECORDED
+    lost: Annotated[np.ndarray, Array(("channels", USED), "J", summed=True)]
+    # motion and loads of the dashpots, rows of contact.damping; no columns without damping
+    damping: Annotated[np.ndarray, Array((DAMPING_ROWS, USED), fewer=0)]
+    # ζ and R (n1 + n2) [m] at the start of a step, and which step, see contact.slip_rules
+    kept: Annotated[np.ndarray, Array((7, USED), required=False)]
+    force: Annotated[np.ndarray, Array((3, USED), "N")]  # force on grain 1
+    torque1: Annotated[np.ndarray, Array((3, USED), "N m")]
+    torque2: Annotated[np.ndarray, Array((3, USED), "N m")]
+    # 0 within all limits, else one of the flags of contact.transitions
+    flag: Annotated[np.ndarray, Array((USED,), dtype="u1", rule="any")]
+    # 1 where the long-range force of the pair acts in every step
+    every_step: Annotated[np.ndarray, Array((USED,), dtype="u1", rule="boolean")]
+    side: Annotated[np.ndarray, Array((SIDES,), dtype="u4", rule="order")]  # 2 × contact, plus 1 for grain 2; by grain
+    start: Annotated[np.ndarray, Array(("grains + 1",), dtype="u4", rule="starts")]  # first entry of each grain in side
+    # grains in the order of contact.gather, then GATHER_CLASSES counters; no columns for the order of their indices
+    gather_order: Annotated[np.ndarray, Array(("gather",), dtype="u4", saved=False)]
 
 
 class PairList(NamedTuple):
     """Candidate pairs for contacts: pairs that may touch soon; the first count[PAIRS] columns are in use."""
 
-    pair: np.ndarray  # (2, P) uint32: grains
-    in_contact: np.ndarray  # (P,) uint8: 1 for pairs in contact
-    step: np.ndarray  # (P,) time step that the contact needs [s]; (1,) if uniform
-    break_overlap: np.ndarray  # (P,) −δ at which the contact breaks [m]: δ_c, 0 without adhesion; (1,) if uniform
-    anchor: np.ndarray  # (3, N) positions when the list was built [m]; a buffer while it is built from cells
-    # (P/8,) uint32: inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
-    inner: np.ndarray
-    skin: np.ndarray  # (7,) remaining skins, largest speeds: indices in basics.state, explained in neighbours.skin
+    pair: Annotated[np.ndarray, Array((2, USED), dtype="u4", rule="two grains", names=(GRAINS, GRAINS))]
+    in_contact: Annotated[np.ndarray, Array((USED,), dtype="u1", rule="boolean")]  # 1 for pairs in contact
+    # time step that the contact needs; one column if uniform, as of the next
+    step: Annotated[np.ndarray, Array((USED,), "s", rule="no nan", fewer=1)]
+    # −δ at which the contact breaks: δ_c, 0 without adhesion
+    break_overlap: Annotated[np.ndarray, Array((USED,), "m", fewer=1)]
+    # positions when the list was built; a buffer while it is built from cells
+    anchor: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan", initial=np.inf)]
+    # inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
+    inner: Annotated[np.ndarray, Array((INNER,), dtype="u4", saved=False)]
+    # remaining skins, largest speeds: indices in basics.state, explained in neighbours.skin
+    skin: Annotated[np.ndarray, Array((7,), initial=-1.0, saved=False)]
 
 
 class LongRangeArrays(NamedTuple):
-    """Verlet list for long-range forces, and the loads of their last summation.
+    """Verlet list for long-range forces, and the loads of their last summation; no columns where an array is not used.
 
     The list is a full neighbour list in compressed sparse row form, sorted by cell (see neighbours.cell_list): grain
     order[s] has the sorted index s.
     """
 
-    anchor: np.ndarray  # (3, N) positions when the list was built [m]
-    order: np.ndarray  # (N,) uint32: grain of each sorted index
-    start: np.ndarray  # (N+1,) uint32: first entry of each row in `neighbour`
-    neighbour: np.ndarray  # (P,) uint32: sorted indices of the neighbours
-    cell_of: np.ndarray  # (N,) uint32: cell of each grain
-    cell_start: np.ndarray  # (M+1,) uint32: first sorted index of each cell
-    packed_position: np.ndarray  # (3, V) positions by sorted index [m]; by grain in sums over all pairs
-    packed_moment: np.ndarray  # (3, V) moments, likewise
-    squared_distance: np.ndarray  # (V,) squared distances of the candidates of one grain, while a list is built [m²]
-    packed_grain: np.ndarray  # (9, N) position, moment, charge, mass, radius by sorted index, for generic pair forces
-    force: np.ndarray  # (3, N) long-range forces [N]; (3, 0) if there are none
-    torque: np.ndarray  # (3, N) long-range torques [N m]; likewise
-    constant_force: np.ndarray  # (3, N) constant force: the part that acts in every step of an r-RESPA cycle [N]
-    constant_torque: np.ndarray  # (3, N) [N m]
-    force_rate: np.ndarray  # (3, N) time derivatives of the loads (Taylor scheme) [N/s]
-    torque_rate: np.ndarray  # (3, N) [N m/s]
-    past_position: np.ndarray  # (3, N) positions at the last summation, or the one before [m]
-    past_moment: np.ndarray  # (3, N) [A m²]
-    path: np.ndarray  # (3, N) time integral of the displacement since the last summation [m s]
-    block_sums: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
-
-
-class WallArrays(NamedTuple):
-    """Walls, one column each."""
-
-    position: np.ndarray  # (3, W) a point of the plane [m]
-    normal: np.ndarray  # (3, W) unit vector towards the grains
-    velocity: np.ndarray  # (3, W) [m/s]
-    force: np.ndarray  # (3, W) force of the grains on the wall at the end of the last step [N]
-    impulse: np.ndarray  # (3, W) its integral over time since the start [N s]
-    work: np.ndarray  # (W,) energy that the wall has given to grains and contacts by its motion [J]
-    # used within a step
-    velocity_before: np.ndarray  # (3, W) velocity and impulse at the start of the step
-    impulse_before: np.ndarray  # (3, W)
-    contacts: np.ndarray  # (W,) number of contacts
-    touching: np.ndarray  # (W, N) uint8: 1 for grains in contact with the wall
+    # positions when the list was built
+    anchor: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan", initial=np.inf, fewer=0)]
+    order: Annotated[np.ndarray, Array(("sorted",), dtype="u4", names=(GRAINS,), saved=False)]  # grain
+    start: Annotated[np.ndarray, Array(("grains + 1",), dtype="u4", saved=False)]  # first entry of rows in neighbour
+    neighbour: Annotated[np.ndarray, Array(("neighbours",), dtype="u4", saved=False)]  # sorted indices
+    cell_of: Annotated[np.ndarray, Array(("sorted",), dtype="u4", saved=False)]  # cell of each grain
+    cell_start: Annotated[np.ndarray, Array(("cells",), dtype="u4", saved=False)]  # first sorted index of each cell
+    # positions and moments by sorted index; by grain in sums over all pairs
+    packed_position: Annotated[np.ndarray, Array((3, "padded"), "m", saved=False)]
+    packed_moment: Annotated[np.ndarray, Array((3, "padded"), "A m^2", saved=False)]
+    # squared distances of the candidates of one grain, while a list is built
+    squared_distance: Annotated[np.ndarray, Array(("padded",), "m^2", saved=False)]
+    # position, moment, charge, mass, radius by sorted index, for generic pair forces
+    packed_grain: Annotated[np.ndarray, Array((9, "sorted"), saved=False)]
+    force: Annotated[np.ndarray, Array((3, GRAINS), "N", fewer=0)]  # long-range forces
+    torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", fewer=0)]
+    # constant force: the part that acts in every step of an r-RESPA cycle
+    constant_force: Annotated[np.ndarray, Array((3, GRAINS), "N", fewer=0)]
+    constant_torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", fewer=0)]
+    # time derivatives of the loads (Taylor scheme)
+    force_rate: Annotated[np.ndarray, Array((3, GRAINS), "N/s", saved=False)]
+    torque_rate: Annotated[np.ndarray, Array((3, GRAINS), "N m/s", saved=False)]
+    # positions and moments at the last summation, or the one before
+    past_position: Annotated[np.ndarray, Array((3, GRAINS), "m", fewer=0)]
+    past_moment: Annotated[np.ndarray, Array((3, GRAINS), "A m^2", fewer=0)]
+    # time integral of the displacement since the last summation
+    path: Annotated[np.ndarray, Array((3, GRAINS), "m s", fewer=0)]
+    # forces and flux densities of each block of a sum over all pairs
+    block_sums: Annotated[np.ndarray, Array(("blocks", 3, "padded"), saved=False)]
 
 
 class ClusterArrays(NamedTuple):
     """Memory for the settling of clusters, one at a time.  Not saved."""
 
-    member: np.ndarray  # (N,) uint32: grains of the cluster
-    listed: np.ndarray  # (N,) uint8: 1 for grains whose cluster has been listed
-    offset: np.ndarray  # (3, N) vectors from the first grain, then from the centre of mass [m]
+    member: Annotated[np.ndarray, Array((GRAINS,), dtype="u4", saved=False)]  # grains of the cluster
+    listed: Annotated[np.ndarray, Array((GRAINS,), dtype="u1", saved=False)]  # 1 for grains whose cluster was listed
+    # vectors from the first grain, then from the centre of mass
+    offset: Annotated[np.ndarray, Array((3, GRAINS), "m", saved=False)]
 
 
 class BodyArrays(NamedTuple):
@@ -122,56 +124,60 @@ class BodyArrays(NamedTuple):
     Columns of a body are those of its first grain.  Vectors "in the body" are in the frame of its principal axes.
     """
 
-    first: np.ndarray  # (N,) uint32: first grain of the body of each grain
-    asleep: np.ndarray  # (N,) uint8: 1 for grains of bodies that move as rigid bodies
-    mass: np.ndarray  # (N,) of a body [kg]
-    inertia: np.ndarray  # (3, N) principal moments of inertia of a body [kg m²]
-    centre: np.ndarray  # (3, N) centre of mass of a body [m]
-    momentum: np.ndarray  # (3, N) of a body [kg m/s]
-    orientation: np.ndarray  # (4, N) of a body: rotation from its principal axes to the laboratory frame
-    angular_momentum: np.ndarray  # (3, N) of a body, in the body [J s]
-    reserve: np.ndarray  # (N,) growth of the bound of contact loads after which the loads of a body are looked at anew
-    changed: np.ndarray  # (N,) largest change of a contact load since the body came to rest, when last looked at
-    strength: np.ndarray  # (2, N) smallest force [N] and torque [N m] at which a contact of a body slips or breaks
-    event: np.ndarray  # (N,) time at which the contacts of a body last changed [s]
-    vibration: np.ndarray  # (N,) time at which the vibrational energy of a body was last above the limit [s]
-    offset: np.ndarray  # (3, N) of a grain from the centre of its body, in the body [m]
-    turn: np.ndarray  # (4, N) orientation of a grain, in the body
-    rest_force: np.ndarray  # (3, N) force on a grain, less its inertia, when its body came to rest, in the body [N]
-    rest_torque: np.ndarray  # (3, N) likewise [N m]
-    known_force: np.ndarray  # (3, N) likewise, when the loads of the contacts were last looked at [N]
-    known_torque: np.ndarray  # (3, N) likewise [N m]
-    inner_field: np.ndarray  # (3, N) flux density of the other grains of its body at a grain, in the body [T]
+    first: Annotated[np.ndarray, Array((GRAINS,), dtype="u4", rule="bodies")]  # first grain of the body of each grain
+    asleep: Annotated[np.ndarray, Array((GRAINS,), dtype="u1", rule="boolean")]  # 1 in bodies that move as rigid bodies
+    mass: Annotated[np.ndarray, Array((GRAINS,), "kg", rule="no nan")]  # of a body
+    inertia: Annotated[np.ndarray, Array((3, GRAINS), "kg m^2", rule="no nan")]  # principal moments of a body
+    centre: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan")]  # centre of mass of a body
+    momentum: Annotated[np.ndarray, Array((3, GRAINS), "kg m/s", rule="no nan")]  # of a body
+    # of a body: rotation from its principal axes to the laboratory frame
+    orientation: Annotated[np.ndarray, Array((4, GRAINS), rule="no nan")]
+    angular_momentum: Annotated[np.ndarray, Array((3, GRAINS), "J s", rule="no nan")]  # of a body, in the body
+    # growth of the bound of contact loads after which the loads of a body are looked at anew
+    reserve: Annotated[np.ndarray, Array((GRAINS,), rule="no nan")]
+    # largest change of a contact load since the body came to rest, when last looked at
+    changed: Annotated[np.ndarray, Array((GRAINS,), rule="no nan")]
+    # smallest force [N] and torque [N m] at which a contact of a body slips or breaks
+    strength: Annotated[np.ndarray, Array((2, GRAINS), rule="no nan")]
+    event: Annotated[np.ndarray, Array((GRAINS,), "s", rule="no nan")]  # time at which contacts of a body last changed
+    # time at which the vibrational energy of a body was last above the limit
+    vibration: Annotated[np.ndarray, Array((GRAINS,), "s", rule="no nan")]
+    offset: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan")]  # of a grain from the centre, in the body
+    turn: Annotated[np.ndarray, Array((4, GRAINS), rule="no nan")]  # orientation of a grain, in the body
+    # load on a grain, less its inertia, when its body came to rest, in the body
+    rest_force: Annotated[np.ndarray, Array((3, GRAINS), "N", rule="no nan")]
+    rest_torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", rule="no nan")]
+    # likewise, when the loads of the contacts were last looked at
+    known_force: Annotated[np.ndarray, Array((3, GRAINS), "N", rule="no nan")]
+    known_torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", rule="no nan")]
+    # flux density of the other grains of its body at a grain, in the body
+    inner_field: Annotated[np.ndarray, Array((3, GRAINS), "T", rule="no nan")]
     # not saved: they follow from the others, or are used within a step
-    member: np.ndarray  # (N,) uint32: grains, sorted by body
-    start: np.ndarray  # (N+1,) uint32: first entry of each body in `member`
-    force: np.ndarray  # (3, N) of all other grains and external forces on a body [N]
-    torque: np.ndarray  # (3, N) likewise, about its centre of mass [N m]
-    decay: np.ndarray  # (6, N) rates of the modes of friction of a body in a gas [1/s]; (6, 0) without gas
-    mode: np.ndarray  # (36, N) these modes, one after the other, see rigid.body_friction; (36, 0) likewise
-    load: np.ndarray  # (N,) bound of the change of the loads of the contacts of a body, in units of their limits
-    near: np.ndarray  # (N,) uint8: what the first grain of a body says of the next step, see `rigid.body_touches`
-    rate: np.ndarray  # (N,) square of the largest rate that limits the step of a body [1/s²]
-    quick: np.ndarray  # (N,) uint8: whether a body takes substeps within the present step, see `rigid.substeps`
-    excluded_force: np.ndarray  # (3, N) force on a grain that does not kick its body, see `rigid.substeps` [N]
-    excluded_torque: np.ndarray  # (3, N) likewise [N m]
+    member: Annotated[np.ndarray, Array((GRAINS,), dtype="u4", saved=False)]  # grains, sorted by body
+    start: Annotated[np.ndarray, Array(("grains + 1",), dtype="u4", saved=False)]  # first entry of bodies in member
+    # load of all other grains and external forces on a body, about its centre of mass
+    force: Annotated[np.ndarray, Array((3, GRAINS), "N", saved=False)]
+    torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", saved=False)]
+    # rates of the modes of friction of a body in a gas; no columns without gas, as of the next
+    decay: Annotated[np.ndarray, Array((6, GRAINS), "1/s", saved=False)]
+    # these modes, one after the other, see rigid.body_friction
+    mode: Annotated[np.ndarray, Array((36, GRAINS), saved=False)]
+    # bound of the change of the loads of the contacts of a body, in units of their limits
+    load: Annotated[np.ndarray, Array((GRAINS,), saved=False)]
+    # what the first grain of a body says of the next step, see `rigid.body_touches`
+    near: Annotated[np.ndarray, Array((GRAINS,), dtype="u1", saved=False)]
+    # square of the largest rate that limits the step of a body
+    rate: Annotated[np.ndarray, Array((GRAINS,), "1/s^2", saved=False)]
+    # whether a body takes substeps within the present step, see `rigid.substeps`
+    quick: Annotated[np.ndarray, Array((GRAINS,), dtype="u1", saved=False)]
+    # load on a grain that does not kick its body, see `rigid.substeps`
+    excluded_force: Annotated[np.ndarray, Array((3, GRAINS), "N", saved=False)]
+    excluded_torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", saved=False)]
 
 
 LOADS_OF_BODIES = ("rest_force", "rest_torque", "known_force", "known_torque")
-FLAGS_OF_BODIES = ("asleep", "near", "quick")
-SAVED_BODIES = BodyArrays._fields[: BodyArrays._fields.index("member")]
-"""Arrays of the bodies in a checkpoint."""
-SAVED_LONG_RANGE = (
-    "anchor",
-    "force",
-    "torque",
-    "constant_force",
-    "constant_torque",
-    "past_position",
-    "past_moment",
-    "path",
-)
-"""Long-range arrays in a checkpoint; the others follow from them."""
+SAVED_BODIES, SAVED_LONG_RANGE = tuple(saved_in(BodyArrays)), tuple(saved_in(LongRangeArrays))
+"""Arrays of bodies and long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
 CELL_ARRAYS = ("order", "cell_of", "cell_start", "squared_distance")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
@@ -180,20 +186,14 @@ RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
 """Long-range arrays needed only with long-range forces, cells, a Verlet list, copies for some pair forces
 (`LongRangeSums.arrays`), r-RESPA cycles or Taylor series."""
-UNIFORM_ARRAYS = ("constants", "step", "break_overlap")
-"""Arrays of contacts and candidate pairs with identical columns if all grains are equal."""
-SAVED_WALLS = ("position", "normal", "velocity", "force", "impulse", "work")
-"""Arrays of the walls in a checkpoint."""
-NOT_SAVED = ("inner", "skin", "gather_order")
-"""Arrays of contacts and candidate pairs that are not in a checkpoint, but recomputed."""
 GATHER_CLASSES = 64
 """Classes of grains by contact count; as many entries of `gather_order`, behind those of the grains, are counters."""
 GATHER_ORDER_FROM = 4000
 """Fewest grains for which contact.gather sorts grains by contact count; branch predictors learn the counts of fewer."""
 CONTACTS_PER_BLOCK = 128
 """Contacts per block of the pass over contacts, a multiple of the SIMD width."""
-OVER_ALLOCATION, GROWTH = 1.1, 1.25
-"""Initial over-allocation (×1.1), and growth factor on overflow (×1.25)."""
+OVER_ALLOCATION = 1.1
+"""Initial over-allocation of tables."""
 PAIRS_PER_INNER_ENTRY = 8
 """Candidate pairs per entry of the inner list; if the inner list is too short, all candidate pairs are searched."""
 CELLS_PER_GRAIN = 4
@@ -216,15 +216,10 @@ def empty_long_range_arrays(
     unused : Collection[str], optional
         Arrays that no kernel of this simulation accesses; they get no columns.
     """
-    vectors: dict[str, np.ndarray] = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
-    vectors["anchor"], vectors["packed_grain"] = np.full((3, grains), np.inf), np.zeros((9, grains))
-    v, p = padded_size(grains), max(int(capacity), 16)
-    vectors |= {name: np.zeros((3, v)) for name in ("packed_position", "packed_moment")}
-    vectors |= {"squared_distance": np.zeros(v), "block_sums": np.zeros((2 * blocks, 3, v))}
-    sizes = {"order": grains, "start": grains + 1, "neighbour": p, "cell_of": grains}
-    sizes["cell_start"] = CELLS_PER_GRAIN * grains + 28
-    arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
-    return LongRangeArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in unused}))
+    sizes = {GRAINS: grains, "sorted": grains, "grains + 1": grains + 1, "padded": padded_size(grains)}
+    sizes |= {"cells": CELLS_PER_GRAIN * grains + 28, "neighbours": max(int(capacity), FEWEST_COLUMNS)}
+    sizes |= {"blocks": 2 * blocks}
+    return new_group(LongRangeArrays, sizes, dict.fromkeys(unused, 0))
 
 
 def empty_contact_arrays(
@@ -253,67 +248,25 @@ def empty_contact_arrays(
     damped : bool, optional
         Whether contacts have dashpots.
     """
-    c = padded_size(max(int(capacity), 16))
-    vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "force", "torque1", "torque2")}
-    numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damping": np.zeros((DAMPING_ROWS, c if damped else 0))}
-    numbers["kept"] = np.zeros((KEPT_ROWS, c))
-    return ContactArrays(
-        pair=np.zeros((2, c), np.uint32),
-        constants=np.zeros((constant_count, CONTACTS_PER_BLOCK if uniform_contacts else c)),
-        flag=np.zeros(c, np.uint8),
-        every_step=np.zeros(c, np.uint8),
-        lost=np.zeros((channels, c)),
-        side=np.zeros(2 * c, np.uint32),
-        start=np.zeros(grains + 1, np.uint32),
-        gather_order=np.zeros(grains + GATHER_CLASSES if grains >= GATHER_ORDER_FROM else 0, np.uint32),
-        **(vectors | numbers),
-    )
+    used = padded_size(max(int(capacity), FEWEST_COLUMNS))
+    gather = grains + GATHER_CLASSES if grains >= GATHER_ORDER_FROM else 0
+    sizes = {USED: used, SIDES: 2 * used, "constants": constant_count, "channels": channels, "gather": gather}
+    columns = ({} if damped else {"damping": 0}) | ({"constants": CONTACTS_PER_BLOCK} if uniform_contacts else {})
+    return new_group(ContactArrays, sizes | {"grains + 1": grains + 1}, columns)
 
 
 def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = False) -> PairList:
     """Allocate a pair list.  The anchors are at infinity, so that the first step builds the list."""
-    p, anchor = padded_size(max(int(capacity), 16)), np.full((3, grains), np.inf)
-    pair, in_contact = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8)
-    inner = np.zeros(p // PAIRS_PER_INNER_ENTRY, np.uint32)
-    types = np.zeros((2, 1 if uniform_contacts else p))
-    return PairList(pair, in_contact, types[0], types[1], anchor, inner, np.full(7, -1.0))
-
-
-def wall_arrays(walls: int, grains: int) -> WallArrays:
-    """Allocate the arrays of the walls."""
-    vectors = {name: np.zeros((3, walls)) for name in WallArrays._fields[:8] if name != "work"}
-    return WallArrays(
-        work=np.zeros(walls), contacts=np.zeros(walls), touching=np.zeros((walls, grains), np.uint8), **vectors
-    )
+    used = padded_size(max(int(capacity), FEWEST_COLUMNS))
+    columns = {"step": 1, "break_overlap": 1} if uniform_contacts else {}
+    return new_group(PairList, {USED: used, GRAINS: grains, INNER: used // PAIRS_PER_INNER_ENTRY}, columns)
 
 
 def cluster_arrays(grains: int) -> ClusterArrays:
     """Allocate the memory for the settling of clusters; `grains` is 0 without it."""
-    return ClusterArrays(np.zeros(grains, np.uint32), np.zeros(grains, np.uint8), np.zeros((3, grains)))
+    return new_group(ClusterArrays, {GRAINS: grains})
 
 
 def body_arrays(grains: int, *, in_gas: bool = False) -> BodyArrays:
     """Allocate the arrays of rigid bodies; `grains` is 0 without them."""
-    vectors = ("inertia", "centre", "momentum", "angular_momentum", "offset")
-    widths = dict.fromkeys((*vectors, *LOADS_OF_BODIES, "inner_field", "force", "torque"), 3)
-    widths |= {"excluded_force": 3, "excluded_torque": 3}
-    widths |= {"orientation": 4, "turn": 4, "strength": 2}
-    found = {name: np.zeros((widths[name], grains) if name in widths else grains) for name in BodyArrays._fields}
-    for name, kind in {"first": np.uint32, "member": np.uint32, **dict.fromkeys(FLAGS_OF_BODIES, np.uint8)}.items():
-        found[name] = np.zeros(grains, kind)
-    found |= {name: np.zeros((rows, grains if in_gas else 0)) for name, rows in (("decay", 6), ("mode", 36))}
-    return BodyArrays(**(found | {"start": np.zeros(grains + 1, np.uint32)}))
-
-
-def grown(arrays: Any, unchanged: Collection[str], minimum: int) -> Any:
-    """Arrays with more columns, for at least `minimum` contacts or pairs; the `unchanged` ones keep theirs."""
-    columns = arrays.pair.shape[1]
-    capacity, longer = padded_size(max(int(GROWTH * columns) + 1, minimum)), {}
-    for name, old in arrays._asdict().items():
-        if name in unchanged:
-            longer[name] = old
-            continue
-        new = np.zeros((*old.shape[:-1], capacity * old.shape[-1] // columns), old.dtype)
-        new[..., : old.shape[-1]] = old
-        longer[name] = new
-    return all_aligned(type(arrays)(**longer))
+    return new_group(BodyArrays, {GRAINS: grains, "grains + 1": grains + 1}, {} if in_gas else {"decay": 0, "mode": 0})

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from .arguments import checked
+from .array_groups import GRAINS, Array
 from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
@@ -27,26 +28,33 @@ SMALLEST = 1e-10
 """Smallest radius [m] of a grain, that of an atom."""
 
 
+def _of(name: str, rule: str = "finite") -> Array:
+    """Declaration of the array of a quantity in the field table."""
+    field = BY_NAME[name]
+    return Array((GRAINS,) if field.width == 1 else (field.width, GRAINS), field.unit, rule=rule)
+
+
 class GrainArrays(NamedTuple):
     """Arrays of the field table in stored shape, (N,) or (width, N), on which kernels work."""
 
-    radius: np.ndarray
-    mass: np.ndarray
-    inertia: np.ndarray
-    charge: np.ndarray
-    body_moment: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    orientation: np.ndarray
-    spin: np.ndarray
-    moment: np.ndarray
-    force: np.ndarray
-    torque: np.ndarray
-    field: np.ndarray
-    own: np.ndarray  # own quantities, (K, N); their names and units are those of Grains.own
-    material: np.ndarray  # index into Grains.materials, uint32
-    id: np.ndarray  # the user's index of the grain, uint32
-    image: np.ndarray  # (3, N) how often it has crossed the periodic box along each axis, int32
+    radius: Annotated[np.ndarray, _of("radius", "above 0")]
+    mass: Annotated[np.ndarray, _of("mass", "above 0")]
+    inertia: Annotated[np.ndarray, _of("inertia", "above 0")]
+    charge: Annotated[np.ndarray, _of("charge")]
+    body_moment: Annotated[np.ndarray, _of("body_moment")]
+    position: Annotated[np.ndarray, _of("position")]
+    velocity: Annotated[np.ndarray, _of("velocity")]
+    orientation: Annotated[np.ndarray, _of("orientation")]
+    spin: Annotated[np.ndarray, _of("spin")]
+    moment: Annotated[np.ndarray, _of("moment")]
+    force: Annotated[np.ndarray, _of("force")]
+    torque: Annotated[np.ndarray, _of("torque")]
+    field: Annotated[np.ndarray, _of("field")]
+    own: Annotated[np.ndarray, Array(("own", GRAINS))]  # own quantities; names and units are those of Grains.own
+    material: Annotated[np.ndarray, Array((GRAINS,), dtype="u4", rule="any")]  # index into Grains.materials
+    id: Annotated[np.ndarray, Array((GRAINS,), dtype="u4", rule="ascending")]  # the user's index of the grain
+    # how often it has crossed the periodic box along each axis; earlier versions did not count this
+    image: Annotated[np.ndarray, Array((3, GRAINS), dtype="i4", rule="any", required=False)]
 
 
 NAMES = tuple(name for name in GrainArrays._fields if name != "own")

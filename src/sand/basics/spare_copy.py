@@ -6,7 +6,7 @@ from operator import is_
 from sys import getrefcount
 from typing import Any
 
-from .state import IN_GROUPS, OTHERS, State
+from .state import OTHERS, State
 
 
 class SpareCopy:
@@ -71,7 +71,7 @@ def _bytes_of(copy: Any, state: State) -> list[tuple[memoryview, memoryview]] | 
 
 def _groups_of(state: State) -> list[Any]:
     """Objects that hold the arrays of a state; if they are the same, so are the arrays."""
-    return [state.grains, state.grains.arrays, *IN_GROUPS(state), *OTHERS(state)]
+    return [state.grains, *state.in_groups(), *OTHERS(state)]
 
 
 def _are_same(some: list[Any], others: list[Any]) -> bool:
@@ -82,4 +82,4 @@ def _parts_of(state: State) -> list[Any]:
     """What can be referred to: grains, groups, arrays, and the memory of arrays, to which views refer."""
     arrays = [array for array in state.arrays() if array.size]  # empty ones may be those of other states
     memory = [array.base for array in arrays if array.base is not None]
-    return [state.grains, state.grains.arrays, *IN_GROUPS(state), *arrays, *memory]
+    return [state.grains, *state.in_groups(), *arrays, *memory]

@@ -11,29 +11,19 @@ from typing import Any
 import numpy as np
 
 from .alignment import aligned_copies, all_aligned
+from .array_groups import GROWTH, SIDES, USED, Array, arrays_of, grown, new_group, reorder_group, saved_in, table_in
 from .arrays import (
-    GROWTH,
-    KEPT_ROWS,
-    NOT_SAVED,
-    SAVED_BODIES,
-    SAVED_LONG_RANGE,
-    SAVED_WALLS,
-    UNIFORM_ARRAYS,
     BodyArrays,
     ClusterArrays,
     ContactArrays,
     LongRangeArrays,
     PairList,
-    WallArrays,
     body_arrays,
     cluster_arrays,
-    empty_contact_arrays,
-    grown,
-    wall_arrays,
 )
 from .box import Box
 from .errors import BadInput
-from .grains import GrainArrays, Grains
+from .grains import Grains
 from .material import Material
 from .own_quantities import OwnQuantities
 
@@ -50,7 +40,7 @@ KICKED = 8  # time of the last kick by the gas [s]
 FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
 SETTLED = 11  # time at which settling was last applied to clusters [s]
-WALL_STEP = 12  # longest step allowed by walls [s]; 0 without walls
+COMPONENT_STEP = 12  # longest step allowed by components, such as walls [s]; 0 if none limits it
 SOME_AWAKE = 13  # time with any cluster awake [s], of rigid clusters
 GRAINS_AWAKE = 14  # mean time awake of a grain [s]
 LARGEST_LOAD = 15  # largest change of the loads of the contacts of a cluster at rest, in units of their limits
@@ -59,7 +49,7 @@ LARGEST_IMPACT = 17  # largest speed of an impact in units of `contact.impact.im
 IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
-    *("corrected", "settled", "wall_step", "some_awake", "grains_awake", "largest_load"),
+    *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
     *("largest_overlap", "largest_impact", "impact_speed"),
 )
 LEAST_CLOCK = LARGEST_OVERLAP
@@ -84,7 +74,7 @@ REJECTED = 14  # rejected steps without contacts, of integrators other than Verl
 NEEDED = 15  # step at which a time step as short as LEVEL, or as FLIGHT, was last needed
 ORDERED = 16  # step of the last spatial sort
 COMPARED = 17  # contacts formed and broken when the cut-off was last compared with the clusters; −1: it is fixed
-WALL_CONTACTS = 18  # contacts with walls in use
+# 18 is not used; earlier versions counted the contacts with walls here
 BODIES = 19  # bodies in use, single grains included; 0 without rigid clusters
 CONTACT_STEPS = 20  # steps of grains of clusters that are awake
 WOKEN = 21  # bodies woken
@@ -93,7 +83,7 @@ LATE = 23  # pairs that overlapped before their bodies were woken
 SUBSTEPS = 24  # steps of bodies that take several within a step of all bodies
 COUNT = (
     *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
-    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "wall_contacts"),
+    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "unused"),
     *("bodies", "contact_steps", "woken", "rested", "late", "substeps"),
 )
 
@@ -124,15 +114,11 @@ RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
 contact does not exist."""
 
 
-GROUPS = ("contacts", "pair_list", "long_range", "clusters", "walls", "wall_contacts", "bodies")
-"""Groups of arrays of a state, besides its grains."""
+GROUPS = ("contacts", "pair_list", "long_range", "clusters", "bodies")
+"""Groups of arrays of a state, besides its grains and the groups of components."""
 SINGLE = ("clock", "count", "lost", "cutoff", "order")
 """Its other arrays."""
 IN_GROUPS, OTHERS = attrgetter(*GROUPS), attrgetter(*SINGLE)
-WALL_CONTACT_ARRAYS = (
-    *("pair", "pointer1", "pointer2", "twist", "formed", "constants", "lost", "damping", "force", "torque1", "flag"),
-)
-"""Arrays of the contacts with walls in a checkpoint."""
 
 
 @dataclass
@@ -149,9 +135,9 @@ class State:
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     cutoff: np.ndarray = field(default_factory=lambda: np.zeros(len(CUTOFF)))
     clusters: ClusterArrays = field(default_factory=lambda: cluster_arrays(0))
-    walls: WallArrays = field(default_factory=lambda: wall_arrays(0, 0))
-    wall_contacts: ContactArrays = field(default_factory=lambda: empty_contact_arrays(0, 0, 0))
     bodies: BodyArrays = field(default_factory=lambda: body_arrays(0))
+    # groups of the components in use, by name
+    of_components: dict[str, Any] = field(default_factory=dict)
     # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
     order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
     # equal radii, masses and materials, so that one set of constants serves all contacts
@@ -161,6 +147,22 @@ class State:
         self.grains.arrays = all_aligned(self.grains.arrays)
         for group in GROUPS:
             setattr(self, group, all_aligned(getattr(self, group)))
+
+    def add_groups(
+        self, groups: Mapping[str, type], sizes: Mapping[str, int], columns: Mapping[str, int] | None = None
+    ) -> None:
+        """Add the groups of a component, see `array_groups.new_group`."""
+        sizes = {"grains": len(self.grains)} | dict(sizes)
+        for name, group in groups.items():
+            self.of_components[name] = all_aligned(new_group(group, sizes, columns))
+
+    def in_groups(self) -> list[Any]:
+        """All groups of arrays."""
+        return [self.grains.arrays, *IN_GROUPS(self), *self.of_components.values()]
+
+    def group_names(self) -> tuple[str, ...]:
+        """Their names: parts of a simulation, and in checkpoints."""
+        return "grains", *GROUPS, *self.of_components
 
     @property
     def time(self) -> float:
@@ -198,6 +200,7 @@ class State:
         other.grains = self.grains.with_arrays(copied(self.grains.arrays))
         for name in GROUPS:
             setattr(other, name, copied(getattr(self, name)))
+        other.of_components = {name: copied(group) for name, group in self.of_components.items()}
         for name in SINGLE:
             array = getattr(self, name)
             setattr(other, name, next(copies) if array.size else array)
@@ -210,59 +213,77 @@ class State:
 
     def arrays(self) -> list[np.ndarray]:
         """All arrays of the state."""
-        return [*self.grains.arrays, *chain.from_iterable(IN_GROUPS(self)), *OTHERS(self)]
+        return [*chain.from_iterable(self.in_groups()), *OTHERS(self)]
 
-    def _uniform_arrays(self) -> tuple[str, ...]:
-        """Names of arrays with identical columns."""
-        return UNIFORM_ARRAYS if self.uniform_contacts else ()
+    def _saved(self) -> list[tuple[str, str, np.ndarray, Array]]:
+        """Group and name of each array of a group that a checkpoint has, the array and its declaration."""
+        groups = zip(self.group_names(), self.in_groups(), strict=True)
+        return [
+            (name, key, getattr(group, key), each)
+            for name, group in groups
+            for key, each in saved_in(group).items()
+            if name != "bodies" or self.bodies.mass.size
+        ]
 
-    def _columns(self, group: str, name: str) -> int | None:
-        """Number of columns of an array of contacts or candidate pairs in a checkpoint; None for all."""
-        used = int(self.count[CONTACTS if group == "contacts" else PAIRS])
-        n = 1 if name in self._uniform_arrays() else 2 * used if name == "side" else used
-        return None if name in ("start", "anchor") else n
+    def _used(self, name: str) -> int:
+        """Columns in use of the table of a group; 0 without a table."""
+        if name in ("contacts", "pair_list"):
+            return int(self.count[CONTACTS if name == "contacts" else PAIRS])
+        return int(self.of_components[name].used[0]) if hasattr(self.of_components.get(name), "used") else 0
 
-    def grow_contacts(self, minimum: int = 0) -> None:
-        """Allocate more contacts, at least `minimum`."""
-        self.contacts = grown(self.contacts, ("start", "gather_order", *self._uniform_arrays()), minimum)
+    def _columns(self, name: str, each: Array) -> int | None:
+        """Number of columns in a checkpoint of an array of a group; None for all."""
+        if each.fewer == 1 and self.uniform_contacts:
+            return 1
+        return {USED: self._used(name), SIDES: 2 * self._used(name)}.get(str(each.shape[-1]))
 
-    def grow_component_contacts(self) -> None:
-        """Allocate more contacts with walls."""
-        self.wall_contacts = grown(self.wall_contacts, ("start", "gather_order"), 0)
+    def grow(self, name: str, minimum: int = 0) -> None:
+        """Allocate more columns, at least `minimum`, in the table of contacts, candidate pairs or a component."""
+        group = self.of_components.get(name) or getattr(self, name)
+        uniform = [key for key, each in arrays_of(group).items() if each.fewer == 1 and self.uniform_contacts]
+        self._put(name, grown(group, minimum, uniform))
 
-    def grow_pairs(self, minimum: int = 0) -> None:
-        """Allocate more candidate pairs, at least `minimum`."""
-        self.pair_list = grown(self.pair_list, ("anchor", "skin", *self._uniform_arrays()), minimum)
+    def _put(self, name: str, group: Any) -> None:
+        """Replace a group."""
+        if name in GROUPS:
+            setattr(self, name, group)
+        else:
+            self.of_components[name] = group
+
+    def grow_of_components(self) -> None:
+        """Allocate more columns in the tables of components, one of which is full."""
+        for name, group in tuple(self.of_components.items()):
+            if hasattr(group, "used"):
+                self.grow(name)
 
     def grow_rows(self) -> None:
         """Allocate a longer Verlet list; its content is discarded."""
         capacity = int(GROWTH * self.long_range.neighbour.size) + 1
         self.long_range = all_aligned(self.long_range._replace(neighbour=np.zeros(capacity, np.uint32)))
 
-    def all_losses(self) -> tuple[np.ndarray, ...]:
-        """Arrays of losses: of all, and of each contact, also with walls."""
-        return self.lost, self.contacts.lost, self.wall_contacts.lost
+    def sums(self) -> list[np.ndarray]:
+        """Arrays of sums over time since the start: all losses, and those of contacts and components."""
+        groups = (self.contacts, *self.of_components.values())
+        summed = (getattr(g, name) for g in groups for name, each in arrays_of(g).items() if each.summed)
+        return [self.lost, *summed]
 
-    def forget_losses(self) -> None:
-        """Set losses, and impulses on walls, to 0."""
-        for array in (*self.all_losses(), self.walls.impulse):
+    def forget_sums(self) -> None:
+        """Set losses, and the other sums over time, to 0."""
+        for array in self.sums():
             array[:] = 0.0
+
+    def reorder(self, rows: np.ndarray, new_index: np.ndarray) -> None:
+        """Permute the grains: grain k becomes the former grain rows[k], and the former grain i is new_index[i]."""
+        for group in self.in_groups():
+            reorder_group(group, rows, new_index)
+        for index in (GRAIN1, GRAIN2):
+            if self.count[index] >= 0:
+                self.count[index] = new_index[self.count[index]]
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of the state by name, for a checkpoint; unused columns are omitted."""
         out = {"clock": self.clock, "count": self.count, "lost": self.lost, "cutoff": self.cutoff}
-        out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
-        for group in ("contacts", "pair_list"):
-            for name, array in getattr(self, group)._asdict().items():
-                if name not in NOT_SAVED:
-                    out[f"{group}/{name}"] = array[..., : self._columns(group, name)]
-        out |= {f"long_range/{name}": getattr(self.long_range, name) for name in SAVED_LONG_RANGE}
-        if self.walls.work.size:
-            out |= {f"walls/{name}": getattr(self.walls, name) for name in SAVED_WALLS}
-            for name in WALL_CONTACT_ARRAYS:
-                out[f"wall_contacts/{name}"] = getattr(self.wall_contacts, name)[..., : self.count[WALL_CONTACTS]]
-        if self.bodies.mass.size:
-            out |= {f"bodies/{name}": getattr(self.bodies, name) for name in SAVED_BODIES}
+        out |= {f"{name}/{key}": array[..., : self._columns(name, each)] for name, key, array, each in self._saved()}
         return out | ({"order": self.order} if self.order.size else {})
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
@@ -280,38 +301,32 @@ class State:
         if "order" in saved:
             self.order = np.zeros(len(self.grains), np.uint32)
             _copy_into(self.order, saved, "order")
-        if self.contacts.pair.shape[1] < self.count[CONTACTS]:
-            self.grow_contacts(int(self.count[CONTACTS]))
-        if self.pair_list.pair.shape[1] < self.count[PAIRS]:
-            self.grow_pairs(int(self.count[PAIRS]))
-        if "grains/image" not in saved:  # of a checkpoint of an earlier version, which counted no crossings
-            saved = saved | {"grains/image": np.zeros_like(self.grains.arrays.image)}
-        if "contacts/kept" not in saved:  # likewise; displacements are then computed in the next step
-            saved = saved | {"contacts/kept": np.zeros((KEPT_ROWS, int(self.count[CONTACTS])))}
-        for name in GrainArrays._fields:
-            _copy_into(getattr(self.grains.arrays, name), saved, f"grains/{name}")
-        for group in ("contacts", "pair_list"):
-            for name, array in getattr(self, group)._asdict().items():
-                if name in NOT_SAVED or (name == "damping" and not array.size):
-                    continue
-                key, n = f"{group}/{name}", self._columns(group, name)
-                if name in self._uniform_arrays() and key in saved:  # one column is stored for all
-                    saved = saved | {key: np.repeat(saved[key][..., :1], array.shape[-1], axis=-1)}
-                    n = array.shape[-1]
-                _copy_into(array[..., :n], saved, key)
-        for name in SAVED_LONG_RANGE:
-            if name == "anchor" and saved.get("long_range/anchor", self.long_range.anchor).size == 0:
-                continue  # saved without a Verlet list: Engine.load_state builds one
-            _copy_into(getattr(self.long_range, name), saved, f"long_range/{name}")
-        for name in SAVED_BODIES if self.bodies.mass.size else ():
-            _copy_into(getattr(self.bodies, name), saved, f"bodies/{name}")
-        for name in SAVED_WALLS if self.walls.work.size else ():
-            _copy_into(getattr(self.walls, name), saved, f"walls/{name}")
-        used = int(self.count[WALL_CONTACTS])
-        while self.wall_contacts.flag.size < used:
-            self.grow_component_contacts()
-        for name in WALL_CONTACT_ARRAYS if self.walls.work.size else ():
-            _copy_into(getattr(self.wall_contacts, name)[..., :used], saved, f"wall_contacts/{name}")
+        self._make_room(saved)
+        for name, key, array, each in self._saved():
+            self._load(array, saved, f"{name}/{key}", each)
+
+    def _make_room(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Take over the columns in use of the tables of components, and enlarge tables that are too small."""
+        for name, group in zip(self.group_names(), self.in_groups(), strict=True):
+            table = table_in(group)
+            if name in self.of_components and f"{name}/{table}" in saved:  # `_load` says if it is missing
+                group.used[0] = saved[f"{name}/{table}"].shape[-1]
+            if table and getattr(group, table).shape[-1] < self._used(name):
+                self.grow(name, self._used(name))
+
+    def _load(self, array: np.ndarray, saved: Mapping[str, np.ndarray], name: str, each: Array) -> None:
+        """Load one array of a group, `name` as in a checkpoint."""
+        group, found = name.split("/")[0], saved.get(name)
+        if found is None and not each.required:  # of an earlier version
+            array[...] = each.initial
+        elif name.endswith("/damping") and not array.size:
+            return
+        elif name == "long_range/anchor" and found is not None and not found.size:
+            return  # saved without a Verlet list: Engine.load_state builds one
+        elif found is not None and each.fewer == 1 and self.uniform_contacts:  # one column is stored for all
+            _copy_into(array, {name: np.repeat(found[..., :1], array.shape[-1], axis=-1)}, name)
+        else:
+            _copy_into(array[..., : self._columns(group, each)], saved, name)
 
 
 def grains_from_arrays(
@@ -351,7 +366,7 @@ def grains_from_arrays(
     )
 
 
-def _copy_into(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
+def _copy_into(target: np.ndarray, saved: Mapping[str, np.ndarray], name: str) -> None:
     """Copy the saved array `name` into `target`."""
     if name not in saved:
         raise BadInput(f"the saved state has no '{name}'")

@@ -343,9 +343,9 @@ def describe_trajectory(path: Path) -> Description:
 def describe_checkpoint(path: Path) -> Description:
     """Describe the state in a checkpoint."""
     from ..basics.units import format_quantity
-    from ..io.checkpoint import read_checkpoint
+    from ..config.build import read_state
 
-    arrays, meta = read_checkpoint(path)
+    arrays, meta = read_state(path)
     grains, contacts = len(arrays["grains/radius"]), arrays["contacts/pair"].shape[1]
     end = meta.get("until")
     rows = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from ..engine.component import Component
@@ -15,3 +16,8 @@ READERS = {"walls": (read_walls, Walls), "driven": (read_driven, DrivenGrains)}
 def read_components(**given: Any) -> dict[str, Component]:
     """The components of a simulation by keyword.  Raises BadInput."""
     return {name: component(read(given[name])) for name, (read, component) in READERS.items()}
+
+
+def groups() -> list[Mapping[str, type]]:
+    """Groups of arrays of each component, of which checkpoints have those of the components in use."""
+    return [component.groups for _, component in READERS.values()]

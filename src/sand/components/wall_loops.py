@@ -1,9 +1,8 @@
 """Loops over the contacts of grains with walls: form, slip, break, loads, and the motion of walls.
 
-These contacts are few.  They are kept in a table of their own, `ContactArrays` with the grain in pair[0], the wall in
-pair[1], and in `pointer2` the anchor relative to the point of the wall [m], laboratory frame; `torque2` and the lists
-per grain are not used.  Forming, slip, breaking, dashpots and losses are those of contacts of grains (`transitions`,
-`mechanics`, `damping`): these loops load what they take, and apply the impulses.
+These contacts are few, and kept in a table of their own (`wall_arrays.WallContactArrays`).  Forming, slip, breaking,
+dashpots and losses are those of contacts of grains (`transitions`, `mechanics`, `damping`): these loops load what they
+take, and apply the impulses.
 """
 
 import functools
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..basics.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME, WALL_CONTACTS
+from ..basics.state import BREAKING, LARGEST_OVERLAP, STEP, STEPS, TIME
 from ..compiler.jit import caller, loop, rare
 from ..contact.constants_table import column_loops, load_pairing
 from ..contact.damping import Held, Surfaces, damping_loops, relative_motion, store_loads
@@ -122,12 +121,12 @@ def _start_walls(walls, numbers, dt):
 
 
 @loop
-def _finish_walls(walls, contacts, count, numbers, dt):
+def _finish_walls(walls, contacts, numbers, dt):
     """Force on each wall, the second half kick of walls with a mass, impulse and work in this step."""
     for w in range(walls.work.size):
         n, start = load(walls.normal, w), load(walls.force, w)
         force = ZERO
-        for c in range(count[WALL_CONTACTS]):
+        for c in range(contacts.used[0]):
             if contacts.pair[1, c] == w:
                 force = sub(force, load(contacts.force, c))
         put(walls.force, w, force)
@@ -147,12 +146,12 @@ def _finish_walls(walls, contacts, count, numbers, dt):
 
 
 @rare
-def count_new_wall_contacts(grains, walls, contacts, count, numbers, dt):
+def count_new_wall_contacts(grains, walls, contacts, numbers, dt):
     """Mark grains in contact in `walls.touching`; number of grains that touch a wall after it has moved for dt [s]."""
     for w in range(walls.work.size):
         for g in range(grains.mass.size):
             walls.touching[w, g] = 0
-    for c in range(count[WALL_CONTACTS]):
+    for c in range(contacts.used[0]):
         walls.touching[contacts.pair[1, c], contacts.pair[0, c]] = 1
     found = 0
     for w in range(walls.work.size):
@@ -166,9 +165,9 @@ def count_new_wall_contacts(grains, walls, contacts, count, numbers, dt):
 
 
 @loop
-def _note_overlaps(grains, walls, contacts, clock, count):
+def _note_overlaps(grains, walls, contacts, clock):
     """Keep the largest overlap with a wall, in radii of the grain, in `State.clock` if it is the largest so far."""
-    for c in range(count[WALL_CONTACTS]):
+    for c in range(contacts.used[0]):
         g = contacts.pair[0, c]
         overlap = grains.radius[g] - wall_height(grains, walls, g, contacts.pair[1, c])
         clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], overlap / grains.radius[g])
@@ -234,8 +233,8 @@ def wall_loop(law: ContactLaw, damping: str) -> Callable:
     @rare
     def form_contact(s, numbers, g, w, step):
         """Form the contact of a grain and a wall that began to touch within the step."""
-        contacts, c = s.wall_contacts, s.count[WALL_CONTACTS]
-        s.count[WALL_CONTACTS] = c + 1
+        contacts, c = s.wall_contacts, s.wall_contacts.used[0]
+        contacts.used[0] = c + 1
         contacts.pair[0, c], contacts.pair[1, c] = g, w
         n, constants = load(s.walls.normal, w), constants_of(s.grains, numbers, g, w)
         from_point = sub(load(s.grains.position, g), load(s.walls.position, w))
@@ -257,24 +256,24 @@ def wall_loop(law: ContactLaw, damping: str) -> Callable:
     @rare
     def update(s, numbers):
         """Move the walls, and update their contacts at the end of a step; returns FULL or the number of contacts."""
-        grains, walls, contacts, count = s.grains, s.walls, s.wall_contacts, s.count
-        step = ContactStep(s.span, s.settings, count[STEPS], s.clock[STEP])
-        formed = count_new_wall_contacts(grains, walls, contacts, count, numbers, step.dt)
-        if count[WALL_CONTACTS] + formed > contacts.pair.shape[1]:
+        grains, walls, contacts, used = s.grains, s.walls, s.wall_contacts, s.wall_contacts.used
+        step = ContactStep(s.span, s.settings, s.count[STEPS], s.clock[STEP])
+        formed = count_new_wall_contacts(grains, walls, contacts, numbers, step.dt)
+        if used[0] + formed > contacts.pair.shape[1]:
             return FULL
         _start_walls(walls, numbers, step.dt)
         broken = 0
-        for c in range(count[WALL_CONTACTS]):
+        for c in range(used[0]):
             broken += update_contact(s, numbers, c, step)
         for w in range(walls.work.size):
             for g in range(grains.mass.size if formed > 0 else 0):
                 touches = walls.touching[w, g] == 0 and wall_height(grains, walls, g, w) <= grains.radius[g]
-                if touches and count[WALL_CONTACTS] < contacts.pair.shape[1]:
+                if touches and used[0] < contacts.pair.shape[1]:
                     form_contact(s, numbers, g, w, step)
-        _finish_walls(walls, contacts, count, numbers, step.dt)
-        _note_overlaps(grains, walls, contacts, s.clock, count)
+        _finish_walls(walls, contacts, numbers, step.dt)
+        _note_overlaps(grains, walls, contacts, s.clock)
         if broken > 0:
-            count[WALL_CONTACTS] = compact_contacts(contacts, count[WALL_CONTACTS])
-        return count[WALL_CONTACTS]
+            used[0] = compact_contacts(contacts, used[0])
+        return used[0]
 
     return update

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.state import GRAIN1, STEP, STEPS, WALL_CONTACTS, WALL_STEP
+from ..basics.state import GRAIN1, STEP
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import accelerations, half_kick_weight, record_half_kick
@@ -17,9 +17,9 @@ from ..contact.law import ContactLaw
 from ..contact.measure import ENERGIES
 from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
-from ..integrate.parts import DT, Stop
+from ..integrate.parts import DT, LIMIT, Stop
 from ..integrate.stages import NEXT_STEP, StageNumber
-from ..integrate.step_control import CLOSING_FRACTION, HOLD_STEPS, quantise_step
+from ..integrate.step_control import CLOSING_FRACTION, quantise_step
 from ..numerics.vec import accrue, dot, load, scale, sub
 from .wall_formulas import wall_displacements
 from .wall_loops import (
@@ -42,7 +42,7 @@ def contacts_stage(law: ContactLaw, damping: str) -> Stage:
     @stage("the contacts with walls", seconds=4.0, parts=WALL_PARTS)
     def update_walls(s, parameters):
         """Move the walls, and form, slip and break their contacts; returns a `Stop`."""
-        return Stop.FURTHER_CONTACTS_FULL.value if update(s, parameters) == FULL else Stop.NONE.value
+        return Stop.TABLES_FULL.value if update(s, parameters) == FULL else Stop.NONE.value
 
     return update_walls
 
@@ -52,30 +52,28 @@ def step_stage(law: ContactLaw) -> Stage:
     """The longest step that walls allow, for one contact law."""
     constants_of, constants_at = constants_loop(law), column_loops(law).at
 
-    @stage("the time step of walls", parts=(*WALL_PARTS, "criteria"))
+    @stage("the time step of walls", parts=(*WALL_PARTS, "criteria", "scratch"))
     def wall_step(s, parameters):
-        """Set the longest step that contacts with walls allow, and that grains approaching a wall allow.
+        """Lower `scratch[LIMIT]` to what contacts with walls, and grains approaching a wall, allow.
 
         The rules are those of pairs of grains (`integrate.step_control.pair_step`): the fastest mode is resolved by
         `settings.per_period` steps, an impact by steps of at most `criteria.impact` δ_c, and in one step a grain closes
-        at most CLOSING_FRACTION of its gap; this step of approach is rounded down to a power of two of a second.  The
-        result falls at once and rises at every HOLD_STEPS-th step only, so that it does not follow the phase of
-        oscillations.
+        at most CLOSING_FRACTION of its gap; this step of approach is rounded down to a power of two of a second.
 
         Returns
         -------
         int
             `Stop.OVERCOMPRESSED`, with GRAIN1, if the centre of a grain is behind a wall that it touches.
         """
-        grains, walls, contacts, count, numbers = s.grains, s.walls, s.wall_contacts, s.count, parameters
+        grains, walls, contacts, numbers = s.grains, s.walls, s.wall_contacts, parameters
         impact, per_period = s.criteria.impact, s.settings.per_period
         bound = approach = s.criteria.longest
         stop = Stop.NONE.value
         for w in range(walls.work.size):
             walls.contacts[w] = 0.0
-        for c in range(count[WALL_CONTACTS]):
+        for c in range(contacts.used[0]):
             walls.contacts[contacts.pair[1, c]] += 1.0
-        for c in range(count[WALL_CONTACTS]):
+        for c in range(contacts.used[0]):
             g, w = contacts.pair[0, c], contacts.pair[1, c]
             speed = abs(dot(relative_velocity(grains, walls, g, w), load(walls.normal, w)))
             # all contacts of a wall with a mass M share it, z m/M times
@@ -86,7 +84,7 @@ def step_stage(law: ContactLaw) -> Stage:
             if overlap > 0.0 and speed * required > impact * overlap:
                 approach = min(approach, impact * overlap / speed)
             if wall_height(grains, walls, g, w) < 0.0:
-                stop, count[GRAIN1] = Stop.OVERCOMPRESSED.value, g
+                stop, s.count[GRAIN1] = Stop.OVERCOMPRESSED.value, g
         for w in range(walls.work.size):
             n = load(walls.normal, w)
             for g in range(grains.mass.size):
@@ -103,8 +101,7 @@ def step_stage(law: ContactLaw) -> Stage:
             step = np.float64(np.float32(bound))  # as in contact.update.contact_step
         if approach < step:
             step = quantise_step(1.0, approach, True)
-        if s.clock[WALL_STEP] == 0.0 or step < s.clock[WALL_STEP] or count[STEPS] % HOLD_STEPS == 0:
-            s.clock[WALL_STEP] = step
+        s.scratch[LIMIT] = min(s.scratch[LIMIT], step)
         return stop
 
     return wall_step
@@ -119,7 +116,7 @@ def energies_stage(law: ContactLaw) -> Stage:
     def measure_wall_energies(s, parameters):
         """Add the energies [J] listed in ENERGIES to the array parameters[0]."""
         contacts = s.wall_contacts
-        for c in range(s.count[WALL_CONTACTS]):
+        for c in range(s.wall_contacts.used[0]):
             constants, radius = constants_at(contacts, c), s.grains.radius[contacts.pair[0, c]]
             found = wall_displacements(wall_pose(s, c, contacts.twist[c]), radius)
             y = radius_root(found.overlap, constants)
@@ -133,9 +130,9 @@ def energies_stage(law: ContactLaw) -> Stage:
 
 
 @stage("the forces of walls")
-def wall_loads(grains, wall_contacts, count):
+def wall_loads(grains, wall_contacts):
     """Add the loads of contacts with walls to the loads of the grains."""
-    for c in range(count[WALL_CONTACTS]):
+    for c in range(wall_contacts.used[0]):
         g = wall_contacts.pair[0, c]
         accrue(grains.force, g, load(wall_contacts.force, c))
         accrue(grains.torque, g, load(wall_contacts.torque1, c))
@@ -146,7 +143,7 @@ def wall_loads(grains, wall_contacts, count):
 def bath_wall_work(s, parameters, block):
     """As `integrate.stages.bath_work`, of contacts with walls; a wall with a mass is accelerated along its normal."""
     weight = half_kick_weight(s.clock[STEP], s.scratch[DT] if block == NEXT_STEP else 0.0)
-    for c in range(s.count[WALL_CONTACTS]):
+    for c in range(s.wall_contacts.used[0]):
         g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
         n = load(s.walls.normal, w)
         of_grain, turn = accelerations(s.grains, g)

@@ -15,20 +15,20 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.arrays import empty_contact_arrays, wall_arrays
 from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.initial_pairs import most_overlap
 from ..basics.material import Material, as_material
 from ..basics.ramps import ramps_of
 from ..basics.settings import Direction, Number, Reading, Settings, Vector
-from ..basics.state import WALL_CONTACTS, State
+from ..basics.state import State
 from ..contact.constants_table import constant_names
 from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
 from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
+from .wall_arrays import WallArrays, WallContactArrays
 from .wall_loops import WallNumbers
 from .wall_stages import wall_stages
 
@@ -139,6 +139,7 @@ class Walls(Component):
 
     name = "walls"
     noun = "walls"
+    groups: ClassVar = {"walls": WallArrays, "wall_contacts": WallContactArrays}
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""
@@ -181,15 +182,12 @@ class Walls(Component):
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state its walls, and memory for their contacts."""
-        channels = state.contacts.lost.shape[0]
-        arrays = wall_arrays(len(self.items), len(state.grains))
+        sizes = {"walls": len(self.items), "constants": len(constant_names(law))}
+        columns = {} if settings.damped else {"damping": 0}
+        state.add_groups(self.groups, sizes | {"channels": len(state.contacts.lost)}, columns)
         for name in ("position", "normal", "velocity"):
             given = [getattr(wall, "point" if name == "position" else name) for wall in self.items]
-            getattr(arrays, name)[...] = np.array(given).T
-        state.walls = arrays
-        columns = len(constant_names(law))
-        state.wall_contacts = empty_contact_arrays(0, 0, columns, channels=channels, damped=settings.damped)
-        state.__post_init__()  # aligns the arrays
+            getattr(state.of_components["walls"], name)[...] = np.array(given).T
 
     def problems_of_arrays(self) -> list[str]:
         """As `Component.problems_of_arrays`."""
@@ -213,10 +211,10 @@ class Walls(Component):
 
     def row(self, state: State) -> dict[str, float]:
         """As `Component.row`."""
-        arrays = state.walls
+        arrays = state.of_components["walls"]
         along = (arrays.position * arrays.normal).sum(axis=0)
         values = [float(v) for v in np.vstack([arrays.force, along]).T.ravel()]
-        found = dict(zip(self.columns(), [*values, int(state.count[WALL_CONTACTS])], strict=True))
+        found = dict(zip(self.columns(), [*values, int(state.of_components["wall_contacts"].used[0])], strict=True))
         return {LOST: -math.fsum(arrays.work)} | found
 
     def materials(self) -> list[Material]:
@@ -272,7 +270,10 @@ def _grain_problems(wall: Wall, grains: Grains, contact: Contact) -> list[str]:
 
 def wall_states(walls: Sequence[Wall], state: State) -> tuple[WallState, ...]:
     """The walls in a state."""
-    arrays, on = state.walls, state.wall_contacts.pair[1, : state.count[WALL_CONTACTS]]
+    if not walls:
+        return ()
+    arrays, contacts = state.of_components["walls"], state.of_components["wall_contacts"]
+    on = contacts.pair[1, : contacts.used[0]]
     return tuple(
         WallState(
             wall.name,

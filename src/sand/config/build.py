@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from .. import components
 from ..basics.arguments import checked
 from ..basics.box import Box
 from ..basics.errors import BadInput
@@ -15,7 +16,7 @@ from ..basics.grains import Grains
 from ..basics.paths import user_path
 from ..basics.state import grains_from_arrays
 from ..forces.own import import_modules
-from ..io.checkpoint import newest_checkpoint
+from ..io.checkpoint import newest_checkpoint, read_checkpoint
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
@@ -25,6 +26,11 @@ from ..setup.gas import gas_with_contacts
 from ..simulation.condition import GIVEN
 from ..simulation.simulation import Simulation
 from .case import THERMAL, Case, check_case
+
+
+def read_state(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read and check a checkpoint, as `io.checkpoint.read_checkpoint`, with the arrays of all components."""
+    return read_checkpoint(path, components.groups())
 
 
 def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Simulation:
@@ -210,7 +216,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
             advice = f"; to start the run: sand run {shlex.quote(str(place / CASE))}"
         raise BadInput(f"{place} holds no checkpoint to resume from{advice}")
     with writing(place):
-        arrays, meta = newest_checkpoint(place)
+        arrays, meta = newest_checkpoint(place, components.groups())
     case = _case_of_checkpoint(place, meta)
     names = list(meta["case"]["materials"])  # in the order of the indices in the checkpoint
     library = case.materials_by_name()

@@ -7,7 +7,7 @@ import copy
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, unwrapped
-from ..basics.arrays import KEPT_ROWS, SAVED_LONG_RANGE
+from ..basics.array_groups import kept_arrays, saved_in
 from ..basics.box import Box
 from ..basics.errors import BadInput, first_problems
 from ..basics.grains import GrainArrays, Grains
@@ -90,21 +90,6 @@ def scaled_positions(grains: Grains, pair: np.ndarray, box: Box, factors: np.nda
     return whole + (factors - 1.0) * centre[labels]
 
 
-def kept_contacts(state: State, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of the contacts whose grains stay, and their pairs (2, C) in the new numbers.
-
-    Parameters
-    ----------
-    kept : ndarray
-        Indices of the grains that stay, ascending; they become grains 0, 1, …
-    """
-    number = np.full(len(state.grains), -1, np.int64)
-    number[kept] = np.arange(len(kept))
-    pair = number[state.contacts.pair[:, : state.count[CONTACTS]]]
-    columns = np.flatnonzero((pair >= 0).all(axis=0))
-    return columns, pair[:, columns].astype(np.uint32)
-
-
 def regrouped_arrays(state: State, kept: np.ndarray, grains: Grains, target: State) -> dict[str, np.ndarray]:
     """Arrays, as of `State.to_arrays`, of a state with other grains or another box.
 
@@ -125,28 +110,25 @@ def regrouped_arrays(state: State, kept: np.ndarray, grains: Grains, target: Sta
     saved, fresh = state.to_arrays(), target.to_arrays()
     out = {name: saved[name].copy() for name in ("clock", "count", "lost", "cutoff")}
     out |= {f"grains/{name}": array.copy() for name, array in grains.arrays._asdict().items()}
-    columns, pair = kept_contacts(state, kept)
-    for name in state.contacts._fields:
-        array = saved.get(f"contacts/{name}")
-        if array is not None and name not in ("pair", "constants", "kept", "side", "start"):
-            out[f"contacts/{name}"] = array[..., columns] if array.shape[-1] else array
-    out["contacts/pair"] = pair
-    out["contacts/kept"] = np.zeros((KEPT_ROWS, len(columns)))  # grains may have been moved: computed in the next step
-    constants, uniform = saved["contacts/constants"], target.uniform_contacts
-    if not state.uniform_contacts:
-        constants = constants[:, columns]
-    elif not uniform:
-        constants = np.repeat(constants[:, :1], len(columns), axis=1)
-    # one column of uniform constants, also without contacts
-    out["contacts/constants"] = constants if constants.size or not uniform else np.zeros((len(constants), 1))
+    new_index = np.full(len(state.grains), -1, np.int64)
+    new_index[kept] = np.arange(len(kept))
+    for group, arrays in (("contacts", state.contacts), *state.of_components.items()):
+        declared = {f"{group}/{name}": each for name, each in saved_in(arrays).items()}
+        out |= kept_arrays(declared, saved, fresh, new_index)
+    pair, constants, uniform = out["contacts/pair"], out["contacts/constants"], target.uniform_contacts
+    if state.uniform_contacts and not uniform:
+        constants = np.repeat(saved["contacts/constants"][:, :1], pair.shape[1], axis=1)
+    elif uniform:  # one column, also without contacts
+        constants = saved["contacts/constants"][:, :1] if constants.size else np.zeros((len(constants), 1))
+    out["contacts/constants"] = constants
+    out["contacts/kept"][:] = 0.0  # grains may have been moved: displacements are computed in the next step
     owner = pair.T.ravel()  # entry 2c + k is grain k of contact c
     out["contacts/side"] = np.argsort(owner, kind="stable").astype(np.uint32)
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(grains)))])
     out["contacts/start"] = starts.astype(np.uint32)
-    out |= {name: array for name, array in fresh.items() if name.startswith("pair_list/")}
-    out |= {f"long_range/{name}": fresh[f"long_range/{name}"] for name in SAVED_LONG_RANGE}
+    out |= {name: array for name, array in fresh.items() if name.startswith(("pair_list/", "long_range/"))}
     count, clock, cutoff = out["count"], out["clock"], out["cutoff"]
-    count[CONTACTS], count[PAIRS] = len(columns), 0
+    count[CONTACTS], count[PAIRS] = pair.shape[1], 0
     count[GRAIN1] = count[GRAIN2] = -1
     clock[CONTACT_STEP] = np.inf
     cutoff[[CUT_FIRST, CUT_SECOND]] = 0.0  # chosen anew before the next step

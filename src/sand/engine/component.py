@@ -51,6 +51,9 @@ class Component:
         Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
     own_columns : bool
         Whether each contact needs its own constants, also between equal grains.
+    groups : Mapping[str, type]
+        Groups of its arrays (`basics.array_groups`) by name: parts of a simulation that stages take by this name,
+        `State.of_components`, and its arrays in a checkpoint.
     items : Sequence
         What the user gave, such as `sand.Wall` objects.
     """
@@ -60,6 +63,7 @@ class Component:
     keeps_order: ClassVar[bool] = False
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
+    groups: ClassVar[Mapping[str, type]] = {}
 
     def __init__(self, items: Sequence[Any]):
         self.items = tuple(items)
@@ -80,7 +84,8 @@ class Component:
         return []
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
-        """Give a new state the arrays that it needs."""
+        """Give a new state the arrays of `groups`; a class whose shapes name sizes of its own has to do it itself."""
+        state.add_groups(self.groups, {})
 
     def kept(self, kept: np.ndarray) -> Component:
         """What is left of it after a change; `kept` (K,) are the earlier indices of grains 0 … K − 1."""

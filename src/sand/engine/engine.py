@@ -27,7 +27,6 @@ from ..basics.state import (
     CYCLE,
     GRAIN1,
     GRAIN2,
-    GROUPS,
     LEFT,
     LISTED,
     LONG_RANGE_SUMS,
@@ -88,17 +87,23 @@ from .ramped import RampedForces
 
 CONTACT = Contact.name
 """Name of the contact model among the forces."""
-ARRAYS = operator.attrgetter(*GROUPS, "clock", "count", "lost")
-"""The arrays of a state that stages take, besides those of the grains."""
 ALONE = 2000
 """Grains from which on several threads take the shorter step to a time of output."""
-OF_STATE = ("grains", *GROUPS, "clock", "count", "lost")
-"""The parts of a table that these are."""
 
 
-def _set_arrays(table: Table, present: tuple) -> None:
+def _arrays(state: State) -> tuple:
+    """The arrays of a state that stages take."""
+    return *state.in_groups(), state.clock, state.count, state.lost
+
+
+def _names(state: State) -> tuple[str, ...]:
+    """The parts of a table that these are."""
+    return *state.group_names(), "clock", "count", "lost"
+
+
+def _set_arrays(table: Table, state: State, present: tuple) -> None:
     """Give a table the arrays of a state."""
-    for name, value in zip(OF_STATE, present, strict=True):
+    for name, value in zip(_names(state), present, strict=True):
         table.set(name, value)
 
 
@@ -205,11 +210,11 @@ class Engine:
     _output_state: State | None = field(init=False, default=None)  # made from the regular state when first needed
 
     def __post_init__(self) -> None:
-        self._table = Table(PARTS)
+        names = *PARTS, *self._state.of_components
+        self._table, self._copy_table = Table(names), Table(names)
         for name, value in self.parameters._asdict().items():
             self._table.set(name, value)
         self._table.set("scratch", np.zeros(SCRATCH))
-        self._copy_table = Table(PARTS)
         if uses_task_queue(len(self._state.grains)):
             self._workers = WorkerThreads(take_blocks)
 
@@ -294,9 +299,9 @@ class Engine:
         """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
         is_sorted, self._output_state = self._is_sorted, None
         table, (self._state, is_same) = self.table_of(regular), self._spare.of(regular)
-        self._copy_table.follow(table, OF_STATE if is_same else ())
-        self._copy_present = (self._state.grains.arrays, *ARRAYS(self._state))
-        _set_arrays(self._copy_table, self._copy_present)
+        self._copy_table.follow(table, _names(self._state) if is_same else ())
+        self._copy_present = _arrays(self._state)
+        _set_arrays(self._copy_table, self._state, self._copy_present)
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
         try:
             stop = self.drive(time, regular.steps + most_steps, shorten=True)
@@ -507,11 +512,11 @@ class Engine:
 
     def table_of(self, state: State) -> Table:
         """The table with the present arrays of the state."""
-        present = (state.grains.arrays, *ARRAYS(state))
+        present = _arrays(state)
         if all(map(operator.is_, present, self._copy_present)):
             return self._copy_table
         if not all(map(operator.is_, present, self._present)):
-            _set_arrays(self._table, present)
+            _set_arrays(self._table, state, present)
             self._present = present
         return self._table
 
@@ -579,12 +584,12 @@ class Engine:
         while True:
             stop = self._call_driver(driver, until, last, shorten)
             if stop is Stop.CONTACTS_FULL:
-                state.grow_contacts()
-            elif stop is Stop.FURTHER_CONTACTS_FULL:
-                state.grow_component_contacts()
+                state.grow("contacts")
+            elif stop is Stop.TABLES_FULL:
+                state.grow_of_components()
             elif stop is Stop.PAIRS_FULL:
                 found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
-                state.grow_pairs(int(OVER_ALLOCATION * found))
+                state.grow("pair_list", int(OVER_ALLOCATION * found))
             elif stop is Stop.LIST_FULL:
                 state.grow_rows()
             else:
@@ -620,7 +625,7 @@ class Engine:
         """
         state = self.state
         if state.contacts.pair.shape[1] < len(pair):
-            state.grow_contacts(len(pair))
+            state.grow("contacts", len(pair))
         vectors = (np.ascontiguousarray(array.T, dtype=np.float64) for array in (slide, roll, twist))
         initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
         arrays, settings = (state.grains.arrays, state.contacts, state.count), self.parameters.settings
@@ -635,7 +640,7 @@ class Engine:
         state = self.state
         if variant_of(self.parameters.settings) != THERMAL:
             return state.lost
-        arrays = state.all_losses()
+        arrays = state.sums()
         kept = [array.copy() for array in arrays]
         self._record_bath_work(state)
         found = state.lost.copy()
@@ -672,7 +677,7 @@ class Engine:
         self.drive(-math.inf, 1)
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)
-        state.forget_losses()
+        state.forget_sums()
         self.stepper.begin(self)
 
     def refresh_loads(self) -> None:

@@ -183,7 +183,7 @@ class Part:
         """Copy the contacts to the state of the part."""
         used, contacts = len(self.columns), state.contacts
         if own.contacts.pair.shape[1] < used:
-            own.grow_contacts(used)
+            own.grow("contacts", used)
         own.contacts.pair[:, :used] = np.searchsorted(self.index, contacts.pair[:, self.columns])
         for name in CONTACT_COLUMNS:
             if getattr(own.contacts, name).shape[-1]:
@@ -210,7 +210,7 @@ class Part:
         kept = np.setdiff1d(np.arange(state.count[CONTACTS]), self.columns)
         first, end = len(kept), len(kept) + used
         if state.contacts.pair.shape[1] < end:
-            state.grow_contacts(end)
+            state.grow("contacts", end)
         contacts, pairs = state.contacts, self.index[own.contacts.pair[:, :used]]
         for name in ("pair", *CONTACT_COLUMNS, "constants"):
             array = getattr(contacts, name)

@@ -52,7 +52,7 @@ from .force_calls import (
 )
 from .force_stages import ENERGY, WRAPPING
 from .motion import kick, wrap_all
-from .parts import DRIVER_PARTS, DT, SINCE, Stop
+from .parts import DRIVER_PARTS, DT, LIMIT, SINCE, Stop
 from .respa import (
     add_constant_loads,
     add_long_range_loads,
@@ -62,7 +62,7 @@ from .respa import (
     update_constant_loads,
 )
 from .stages import HOLD, HOLD_IN_EVENTS, NEXT_STEP, RELEASE, RELEASE_FROM_EVENTS, RESET, StageNumber
-from .step_control import cycle_steps, is_close, is_past
+from .step_control import cycle_steps, hold_step, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 from .taylor import sum_rates
@@ -211,7 +211,11 @@ def first_half(s):
 
     A cycle that would pass `until` [s] is not begun, or, with `shorten`, ends at this time.
     """
-    further = call_stage(s, StageNumber.COMPONENT_STEP) if has_stage(s, StageNumber.COMPONENT_STEP) else Stop.NONE.value
+    further = Stop.NONE.value
+    if has_stage(s, StageNumber.COMPONENT_STEP):
+        s.scratch[LIMIT] = s.criteria.longest
+        further = call_stage(s, StageNumber.COMPONENT_STEP)
+        hold_step(s.clock, s.count, s.scratch[LIMIT])
     grain = s.count[GRAIN1]
     dt, stop = possible_step(s.grains, s.contacts, s.pair_list, s.long_range, s.clock, s.count, s.span, s.criteria)
     if stop == Stop.NONE.value and further != Stop.NONE.value:

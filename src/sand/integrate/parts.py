@@ -11,14 +11,13 @@ from typing import Any, NamedTuple
 
 PARTS = (
     # arrays of the state
-    *("grains", "contacts", "pair_list", "long_range", "clusters", "walls", "wall_contacts"),
-    *("bodies", "clock", "count", "lost"),
+    *("grains", "contacts", "pair_list", "long_range", "clusters", "bodies", "clock", "count", "lost"),
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
     # data of one call of the driver
     *("program", "queue", "scratch", "until", "last", "shorten"),
 )
-"""Names of the parts of a simulation, in the order of the table of addresses."""
+"""Names of the parts of a simulation, in the order of the table of addresses; the groups of its components follow."""
 DRIVER_PARTS = (
     *("program", "grains", "pair_list", "long_range", "clock", "count", "lost", "scratch", "span", "search"),
     *("external_work", "criteria", "forces", "queue", "until", "last", "shorten"),
@@ -31,7 +30,8 @@ LOAD_TIME = 1  # time at which external forces are evaluated [s]
 EXTERNAL = 2  # energy, power or work of external forces, summed over grains [J, W]
 CYCLE_LENGTH = 3  # length of the cycle for which rates are computed [s]; 0 for a single step
 SINCE = 4  # time since the last sum of the long-range forces [s]
-SCRATCH = 5
+LIMIT = 5  # longest step that components allow now [s]
+SCRATCH = 6
 
 HEAVY = 2.0**30
 """Factor of masses that count as infinite in contact events, whose impulses are read from the changes of velocity."""
@@ -51,7 +51,7 @@ class Stop(IntEnum):
     SPINS_TOO_FAST = 8
     LIST_FULL = 9
     CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
-    FURTHER_CONTACTS_FULL = 11  # contacts of components, such as those with walls
+    TABLES_FULL = 11  # a table of a component, such as contacts with walls
     HAS_TO_WAKE = 12  # bodies may touch within the next step, or the loads of their contacts are near a limit
     AWAKE_STEPS = 13  # awake clusters have to take their contact steps
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from ..basics.state import (
     CALM,
     CHECKED,
+    COMPONENT_STEP,
     CONTACT_STEP,
     CONTACTS,
     CYCLE,
@@ -21,7 +22,6 @@ from ..basics.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
-    WALL_STEP,
 )
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
@@ -235,7 +235,17 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
     if criteria.fixed > 0.0:
         return criteria.fixed
     chosen_step = min(clock[LEVEL], clock[CONTACT_STEP])
-    return min(chosen_step, clock[WALL_STEP]) if clock[WALL_STEP] > 0.0 else chosen_step
+    return min(chosen_step, clock[COMPONENT_STEP]) if clock[COMPONENT_STEP] > 0.0 else chosen_step
+
+
+@loop
+def hold_step(clock, count, step):
+    """Set the step [s] that components allow: it falls at once and rises at every HOLD_STEPS-th step only.
+
+    So it does not follow the phase of oscillations.
+    """
+    if clock[COMPONENT_STEP] == 0.0 or step < clock[COMPONENT_STEP] or count[STEPS] % HOLD_STEPS == 0:
+        clock[COMPONENT_STEP] = step
 
 
 @formula

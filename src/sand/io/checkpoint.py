@@ -14,10 +14,9 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
 | pair_list/… | the list of candidate pairs, and the positions at its last rebuild |
 | order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
-| walls/… | position, velocity, force, impulse and work of each wall; only with walls, as the next |
-| wall_contacts/… | contacts with walls: grain and wall, pointer and anchor, twist, constants, losses, loads |
 | bodies/… | bodies, their momenta, and what is at rest; only with rigid clusters |
 | long_range/… | loads of the last long-range summation, state of the cycle, positions at the last rebuild of the list |
+| GROUP/… | arrays of the components in use, such as `walls/…`: those that they declare as `Component.groups` |
 
 `io.state_arrays` checks each array.
 
@@ -33,6 +32,7 @@ import json
 import os
 import warnings
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ from ..basics.errors import BadInput, FilesFailed
 from .checkpoint_files import META, checkpoint_files
 from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
-from .state_arrays import check_state
+from .state_arrays import Groups, check_state
 
 VERSION = 10
 """Version of the file format; other versions are refused. Versions before 9 were never released."""
@@ -95,8 +95,13 @@ class OtherFormat(BadInput):
     """A checkpoint of another version of the format; the file is not damaged."""
 
 
-def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def read_checkpoint(path: Path, components: Collection[Groups] = ()) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Read and check one checkpoint.
+
+    Parameters
+    ----------
+    components : Collection[Mapping[str, type]], optional
+        Groups of arrays of each component, `components.groups()`; arrays of other groups are not checked.
 
     Returns
     -------
@@ -143,7 +148,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         raise BadInput(f"{path} is damaged: its checksum is wrong")
     _name_own(arrays, meta)
     try:
-        check_state(arrays, meta)
+        check_state(arrays, meta, components)
     except BadInput as error:
         raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
@@ -167,8 +172,15 @@ def _name_own(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
         arrays["grains/own"] = only[None][: len(meta["own"])]
 
 
-def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def newest_checkpoint(
+    folder: Path, components: Collection[Groups] = ()
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Read the newest intact checkpoint of a folder; damaged newer ones are renamed, with a warning.
+
+    Parameters
+    ----------
+    components : Collection[Mapping[str, type]], optional
+        As of `read_checkpoint`.
 
     Returns
     -------
@@ -187,7 +199,7 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
     problems: list[tuple[Path, str]] = []
     for path in reversed(checkpoint_files(folder)):
         try:
-            arrays, meta = read_checkpoint(path)
+            arrays, meta = read_checkpoint(path, components)
         except OtherFormat:
             raise
         except BadInput as error:

@@ -1,101 +1,44 @@
 """Checks of the arrays and numbers of a checkpoint, before they reach compiled code, which checks no index.
 
-One table has the name, data type, shape and allowed values of every array. A matching checksum does not suffice: it
-shows that a file is unchanged, not that SAND wrote it.
+The declarations of arrays (`basics.array_groups`) have the data type, shape and allowed values of every array. A
+matching checksum does not suffice: it shows that a file is unchanged, not that SAND wrote it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
-from ..basics.arrays import KEPT_ROWS, SAVED_BODIES, SAVED_LONG_RANGE, SAVED_WALLS, body_arrays
+from ..basics.array_groups import GRAINS, SIDES, USED, Array, saved_in
+from ..basics.arrays import BodyArrays, ContactArrays, LongRangeArrays, PairList
 from ..basics.errors import BadInput
-from ..basics.schema import FIELDS
-from ..basics.state import (
-    CLOCK,
-    CONTACTS,
-    COUNT,
-    CUTOFF,
-    GRAIN1,
-    GRAIN2,
-    LEAST_CLOCK,
-    LOST,
-    PAIRS,
-    STAGE,
-    STEPS,
-    TIME,
-    WALL_CONTACTS,
-)
+from ..basics.grains import GrainArrays
+from ..basics.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LEAST_CLOCK, LOST, PAIRS, STAGE, STEPS, TIME
 
-
-class ArraySpec(NamedTuple):
-    """Data type, shape and allowed values of one array of a checkpoint."""
-
-    dtype: str
-    # sizes: an integer, N grains, C contacts, P pairs, W walls, K contacts with walls; a tuple: one of these; None: any
-    shape: tuple[Any, ...]
-    rule: str = "finite"  # allowed values: a name in RULES
-    required: bool = True
-
-
-STORED = {
-    "clock": ArraySpec("f8", (tuple(range(LEAST_CLOCK, len(CLOCK) + 1)),), "no nan"),
-    "count": ArraySpec("i8", (len(COUNT),), "any"),
-    "lost": ArraySpec("f8", (len(LOST),)),
-    "cutoff": ArraySpec("f8", (len(CUTOFF),), "not below 0"),
-    "order": ArraySpec("u4", ("N",), "order", required=False),
-    "ledger": ArraySpec("f8", (None, None)),
-    **{f"grains/{field.name}": ArraySpec("f8", ("N",) if field.width == 1 else (field.width, "N")) for field in FIELDS},
-    **{f"grains/{name}": ArraySpec("f8", ("N",), "above 0") for name in ("radius", "mass", "inertia")},
-    "grains/own": ArraySpec("f8", (None, "N")),
-    "grains/material": ArraySpec("u4", ("N",), "any"),
-    "grains/id": ArraySpec("u4", ("N",), "ascending"),
-    "grains/image": ArraySpec("i4", (3, "N"), "any", required=False),  # earlier versions did not count crossings
-    "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
-    **{
-        f"contacts/{name}": ArraySpec("f8", (3, "C"))
-        for name in ("pointer1", "pointer2", "force", "torque1", "torque2")
-    },
-    **{f"contacts/{name}": ArraySpec("f8", ("C",)) for name in ("twist", "formed")},
-    "contacts/constants": ArraySpec("f8", (None, (1, "C"))),
-    "contacts/lost": ArraySpec("f8", ((4, 6), "C")),
-    "contacts/damping": ArraySpec("f8", (12, (0, "C"))),
-    "contacts/kept": ArraySpec("f8", (KEPT_ROWS, "C"), required=False),  # earlier versions kept no displacements
-    "contacts/flag": ArraySpec("u1", ("C",), "any"),
-    "contacts/every_step": ArraySpec("u1", ("C",), "boolean"),
-    "contacts/side": ArraySpec("u4", ("2C",), "order"),
-    "contacts/start": ArraySpec("u4", ("N+1",), "starts"),
-    "pair_list/pair": ArraySpec("u4", (2, "P"), "grains"),
-    "pair_list/in_contact": ArraySpec("u1", ("P",), "boolean"),
-    "pair_list/step": ArraySpec("f8", ((1, "P"),), "no nan"),
-    "pair_list/break_overlap": ArraySpec("f8", ((1, "P"),)),
-    "pair_list/anchor": ArraySpec("f8", (3, "N"), "no nan"),
-    **{f"long_range/{name}": ArraySpec("f8", (3, (0, "N"))) for name in SAVED_LONG_RANGE},
-    "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
-    **{f"walls/{name}": ArraySpec("f8", (3, "W"), required=False) for name in SAVED_WALLS},
-    "walls/work": ArraySpec("f8", ("W",), required=False),
-    "wall_contacts/pair": ArraySpec("u4", (2, "K"), "grain and wall", required=False),
-    **{
-        f"wall_contacts/{name}": ArraySpec("f8", (3, "K"), required=False)
-        for name in ("pointer1", "pointer2", "force", "torque1")
-    },
-    **{f"wall_contacts/{name}": ArraySpec("f8", ("K",), required=False) for name in ("twist", "formed")},
-    "wall_contacts/constants": ArraySpec("f8", (None, "K"), "no nan", required=False),  # a wall has an infinite radius
-    "wall_contacts/lost": ArraySpec("f8", ((4, 6), "K"), required=False),
-    "wall_contacts/damping": ArraySpec("f8", (12, (0, "K")), required=False),
-    "wall_contacts/flag": ArraySpec("u1", ("K",), "any", required=False),
-    **{
-        f"bodies/{name}": ArraySpec("f8", ("N",) if array.ndim == 1 else (len(array), "N"), "no nan", required=False)
-        for name, array in body_arrays(1)._asdict().items()
-        if name in SAVED_BODIES
-    },
-    "bodies/first": ArraySpec("u4", ("N",), "bodies", required=False),
-    "bodies/asleep": ArraySpec("u1", ("N",), "boolean", required=False),
+Groups = Mapping[str, type]
+"""Groups of arrays by name; if a file has an array of one of them, it has those of all."""
+SINGLE = {
+    "clock": Array(("clock",), rule="no nan"),
+    "count": Array((len(COUNT),), dtype="i8", rule="any"),
+    "lost": Array((len(LOST),), "J"),
+    "cutoff": Array((len(CUTOFF),), rule="not below 0"),
+    "order": Array((GRAINS,), dtype="u4", rule="order", required=False),
+    "ledger": Array(("rows", "columns")),
 }
-"""All arrays of a checkpoint."""
+"""Arrays of a checkpoint besides those of groups."""
+ALWAYS: Groups = {
+    "grains": GrainArrays,
+    "contacts": ContactArrays,
+    "pair_list": PairList,
+    "long_range": LongRangeArrays,
+}
+"""Groups that every checkpoint has."""
+OPTIONAL: Groups = {"bodies": BodyArrays}
+"""Groups of rigid clusters."""
+SIZES = {"clock": tuple(range(LEAST_CLOCK, len(CLOCK) + 1)), "channels": (4, 6)}
+"""Sizes of which there are several; others are those of the first array that has them."""
 NUMBERS = {"steps": int, "time": float, "output_time": float, "wall_seconds": float, "temperature": float}
 """Required numbers of `meta.json` with their types; an integer is accepted for either."""
 PLANNED_END = {"until": float, "last_step": int}
@@ -107,7 +50,7 @@ CHANGES = {"case_written": dict, "updaters": list, "own": dict, "wall_times": di
 parts of the wall time in older files."""
 
 
-def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
+def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any], components: Iterable[Groups] = ()) -> None:
     """Check that a state can be resumed: every array exists with the right type and shape, every index is in range.
 
     Parameters
@@ -116,6 +59,8 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
         Arrays of a checkpoint, by name.
     meta : Mapping[str, Any]
         Its metadata.
+    components : Iterable[Mapping[str, type]], optional
+        Groups of arrays of each component, as `engine.component.Component.groups`.
 
     Raises
     ------
@@ -124,21 +69,29 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
     """
     _check_meta(meta)
     sizes = _sizes(arrays)
-    for name, spec in STORED.items():
-        if name in arrays:
-            _check_array(name, arrays[name], spec, sizes)
-        elif (
-            spec.required
-            or ("walls/work" in arrays and name.startswith(("walls/", "wall_contacts/")))
-            or ("bodies/first" in arrays and name.startswith("bodies/"))
-        ):
-            raise BadInput(f"there is no array {name!r}")
+    _check_arrays(arrays, SINGLE, dict(sizes))
+    for groups in (ALWAYS, OPTIONAL, *components):
+        of_component = dict(sizes)
+        if groups is not ALWAYS and not any(name.split("/")[0] in groups for name in arrays):
+            continue
+        for group, kind in groups.items():
+            of_component = {name: size for name, size in of_component.items() if name not in (USED, SIDES)}
+            _check_arrays(arrays, {f"{group}/{name}": each for name, each in saved_in(kind).items()}, of_component)
     if len(meta.get("own", {})) != len(arrays["grains/own"]):
         raise BadInput(f"'grains/own' has {len(arrays['grains/own'])} rows, but meta.json names a different number")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
     if arrays["ledger"].shape[1] != len(meta.get("ledger", ())):
         raise BadInput(f"'ledger' has {arrays['ledger'].shape[1]} columns, but meta.json names a different number")
+
+
+def _check_arrays(arrays: Mapping[str, np.ndarray], declared: Mapping[str, Array], sizes: dict[str, Any]) -> None:
+    """Check arrays by their declarations; adds the sizes that it meets to those that are known."""
+    for name, each in declared.items():
+        if name in arrays:
+            _check_array(name, arrays[name], each, sizes)
+        elif each.required:
+            raise BadInput(f"there is no array {name!r}")
 
 
 def _check_meta(meta: Mapping[str, Any]) -> None:
@@ -166,80 +119,70 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
             raise BadInput(f"its meta.json has {name} = {meta.get(name)!r}, which is not a {table.__name__}")
 
 
-def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
-    """Values of N, C and P according to the arrays themselves."""
-
-    def columns(name: str) -> int:
-        if name not in arrays or arrays[name].ndim == 0:
-            raise BadInput(f"there is no array {name!r}")
-        return int(arrays[name].shape[-1])
-
-    n, c, p = columns("grains/radius"), columns("contacts/pair"), columns("pair_list/pair")
-    w, k = (columns(name) if name in arrays else 0 for name in ("walls/work", "wall_contacts/pair"))
+def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Sizes that several groups name."""
+    if "grains/radius" not in arrays or arrays["grains/radius"].ndim == 0:
+        raise BadInput("there is no array 'grains/radius'")
+    n = arrays["grains/radius"].shape[-1]
     if n == 0:
         raise BadInput("it holds no grain")
-    return {"N": n, "N+1": n + 1, "C": c, "2C": 2 * c, "P": p, "W": w, "K": k}
+    return {GRAINS: n, "grains + 1": n + 1, **SIZES}
 
 
-def _check_array(name: str, array: np.ndarray, spec: ArraySpec, sizes: Mapping[str, int]) -> None:
-    if array.dtype != np.dtype(spec.dtype):
-        raise BadInput(f"{name!r} holds numbers of type {array.dtype}, not {np.dtype(spec.dtype)}")
-
-    def allowed(size: Any) -> tuple[int, ...]:
-        return tuple(sizes.get(one, one) for one in (size if isinstance(size, tuple) else (size,)))
-
-    fits = len(array.shape) == len(spec.shape) and all(
-        size is None or actual in allowed(size) for actual, size in zip(array.shape, spec.shape, strict=True)
-    )
-    if not fits:
-        wanted = ", ".join("any" if s is None else " or ".join(map(str, dict.fromkeys(allowed(s)))) for s in spec.shape)
-        raise BadInput(f"{name!r} has shape {array.shape}, not ({wanted})")
-    if message := RULES[spec.rule](array, sizes):
+def _check_array(name: str, array: np.ndarray, each: Array, sizes: dict[str, Any]) -> None:
+    if array.dtype != np.dtype(each.dtype):
+        raise BadInput(f"{name!r} holds numbers of type {array.dtype}, not {np.dtype(each.dtype)}")
+    shape = each.shape
+    if len(array.shape) == len(shape):
+        for size, number in zip(shape, array.shape, strict=True):
+            if size not in sizes and isinstance(size, str):
+                sizes |= {USED: number, SIDES: 2 * number} if size == USED else {size: number}
+    wanted = [sizes.get(size, "any") if isinstance(size, str) else size for size in shape]
+    allowed = [size if isinstance(size, tuple) else (size,) for size in wanted]
+    if each.fewer is not None:
+        allowed[-1] = (each.fewer, *allowed[-1])
+    if len(array.shape) != len(shape) or any(n not in one for n, one in zip(array.shape, allowed, strict=True)):
+        text = ", ".join(" or ".join(map(str, dict.fromkeys(one))) for one in allowed)
+        raise BadInput(f"{name!r} has shape {array.shape}, not ({text})")
+    for row, of in zip(np.atleast_2d(array), each.names, strict=False):
+        if row.size and int(row.max()) >= sizes[of]:
+            raise BadInput(f"{name!r} names {of[:-1]} {int(row.max())}, but the {of} are 0 to {sizes[of] - 1}")
+    if message := RULES[each.rule](array, sizes):
         raise BadInput(f"{name!r} {message}")
 
 
 def _each(is_allowed: Callable[[np.ndarray], np.ndarray], allowed: str) -> Callable[[np.ndarray, Any], str]:
     """Rule that each number of an array has to fulfil."""
 
-    def rule(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+    def rule(array: np.ndarray, sizes: Mapping[str, Any]) -> str:
         good = is_allowed(array)
         return "" if good.all() else f"holds {array[~good][0]}: it must be {allowed}"
 
     return rule
 
 
-def _pairs(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    n = sizes["N"]
-    if array.size and int(array.max()) >= n:
-        return f"names grain {int(array.max())}, but the grains are 0 to {n - 1}"
+def _two_grains(array: np.ndarray, sizes: Mapping[str, Any]) -> str:
     return "names the same grain twice" if (array[0] == array[1]).any() else ""
 
 
-def _at_walls(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    for row, what, n in zip(array, ("grain", "wall"), (sizes["N"], sizes["W"]), strict=True):
-        if row.size and int(row.max()) >= n:
-            return f"names {what} {int(row.max())}, but the {what}s are 0 to {n - 1}"
-    return ""
-
-
-def _order(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+def _order(array: np.ndarray, sizes: Mapping[str, Any]) -> str:
     seen = np.zeros(array.size, bool)
     seen[array[array < array.size]] = True
     return "" if seen.all() else f"does not hold each number from 0 to {array.size - 1} once"
 
 
-def _ascending(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+def _ascending(array: np.ndarray, sizes: Mapping[str, Any]) -> str:
     return "" if (array[1:] > array[:-1]).all() else "does not hold ascending numbers, each once"
 
 
-def _bodies(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+def _bodies(array: np.ndarray, sizes: Mapping[str, Any]) -> str:
     good = (array <= np.arange(array.size)).all() and (array[np.minimum(array, array.size - 1)] == array).all()
     return "" if good else "does not name the first grain of each body"
 
 
-def _starts(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    good = array[0] == 0 and array[-1] == sizes["2C"] and (array[1:] >= array[:-1]).all()
-    return "" if good else f"does not grow from 0 to {sizes['2C']}"
+def _starts(array: np.ndarray, sizes: Mapping[str, Any]) -> str:
+    good = array[0] == 0 and array[-1] == sizes[SIDES] and (array[1:] >= array[:-1]).all()
+    return "" if good else f"does not grow from 0 to {sizes[SIDES]}"
 
 
 RULES: dict[str, Callable[[np.ndarray, Any], str]] = {
@@ -250,8 +193,7 @@ RULES: dict[str, Callable[[np.ndarray, Any], str]] = {
     "not below 0": _each(lambda array: array >= 0.0, "a number of at least 0"),
     "above 0": _each(lambda array: np.isfinite(array) & (array > 0.0), "finite and above 0"),
     "boolean": _each(lambda array: array <= 1, "0 or 1"),
-    "grains": _pairs,
-    "grain and wall": _at_walls,
+    "two grains": _two_grains,
     "order": _order,
     "ascending": _ascending,
     "starts": _starts,
@@ -269,7 +211,6 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
         STAGE: 0,
         CONTACTS: arrays["contacts/pair"].shape[1],
         PAIRS: arrays["pair_list/pair"].shape[1],
-        WALL_CONTACTS: arrays["wall_contacts/pair"].shape[1] if "wall_contacts/pair" in arrays else 0,
     }
     for index, value in wanted.items():
         if count[index] != value:
@@ -286,8 +227,8 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
         raise BadInput(f"'clock' says time = {float(clock[TIME])!r} s, but its meta.json {meta['time']!r} s")
 
 
-def _check_lists(pair: np.ndarray, side: np.ndarray, start: np.ndarray, sizes: Mapping[str, int]) -> None:
+def _check_lists(pair: np.ndarray, side: np.ndarray, start: np.ndarray, sizes: Mapping[str, Any]) -> None:
     """Check that the list of contacts of each grain names exactly the contacts in which the grain takes part."""
     owner = pair[side & 1, side >> 1]
-    if not (owner == np.repeat(np.arange(sizes["N"], dtype=np.uint32), np.diff(start))).all():
+    if not (owner == np.repeat(np.arange(sizes[GRAINS], dtype=np.uint32), np.diff(start))).all():
         raise BadInput("'contacts/side' and 'contacts/start' do not list the contacts of each grain")

@@ -10,19 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.arrays import NOT_SAVED, RATE_ARRAYS, SAVED_LONG_RANGE, UNIFORM_ARRAYS
+from ..basics.array_groups import USED, arrays_of
 from ..basics.grains import Grains
-from ..basics.state import CONTACTS, GRAIN1, GRAIN2, PAIRS, WALL_CONTACTS, State
+from ..basics.state import CONTACTS, PAIRS, State
 from ..contact.gather import resort_contacts_by_grain
 
 BITS = 21
 """Bits per coordinate; three coordinates fill 63 bits."""
 SORT_INTERVAL = 2000
 """Steps between two sorts.  Even fast grains pass few others in this time; a sort costs as much as 10 to 20 steps."""
-PER_GRAIN_ARRAYS = (*SAVED_LONG_RANGE, *RATE_ARRAYS[:2])
-"""Long-range arrays with a column per grain that persist between summations."""
-NOT_PER_PAIR = ("side", "start", "anchor", *NOT_SAVED)
-"""Arrays of contacts and candidate pairs without a column per contact or pair."""
 
 
 def morton_keys(position: np.ndarray) -> np.ndarray:
@@ -61,18 +57,8 @@ def inverse(order: np.ndarray) -> np.ndarray:
 
 def reorder_grains(state: State, rows: np.ndarray) -> None:
     """Permute the grains: grain k becomes the former grain rows[k].  Contacts and candidate pairs stay in order."""
-    new_index = inverse(rows)
-    pair_list, long_range, contacts, count = state.pair_list, state.long_range, state.contacts, state.count
-    for array in [*state.grains.arrays, pair_list.anchor, *(getattr(long_range, name) for name in PER_GRAIN_ARRAYS)]:
-        if array.shape[-1]:
-            array[...] = array[..., rows]
-    at_walls = state.wall_contacts.pair[0, : count[WALL_CONTACTS]]
-    for array in [contacts.pair[:, : count[CONTACTS]], pair_list.pair[:, : count[PAIRS]], long_range.order, at_walls]:
-        array[...] = new_index[array]
-    for index in (GRAIN1, GRAIN2):
-        if count[index] >= 0:
-            count[index] = new_index[count[index]]
-    resort_contacts_by_grain(state.grains.arrays, contacts, count)
+    state.reorder(rows, inverse(rows))
+    resort_contacts_by_grain(state.grains.arrays, state.contacts, state.count)
 
 
 def sort_contacts_and_pairs(state: State) -> None:
@@ -80,8 +66,9 @@ def sort_contacts_and_pairs(state: State) -> None:
     for arrays, used in (state.contacts, CONTACTS), (state.pair_list, PAIRS):
         pair = arrays.pair[:, : state.count[used]]
         order = np.lexsort((pair[1], pair[0]))
-        for name, columns in arrays._asdict().items():
-            if columns.size and name not in NOT_PER_PAIR and not (state.uniform_contacts and name in UNIFORM_ARRAYS):
+        for columns, each in zip(arrays, arrays_of(arrays).values(), strict=True):
+            uniform = each.fewer == 1 and state.uniform_contacts
+            if columns.size and each.shape[-1] == USED and not uniform:
                 columns[..., : order.size] = columns[..., order]
     resort_contacts_by_grain(state.grains.arrays, state.contacts, state.count)
 

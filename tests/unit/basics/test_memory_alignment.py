@@ -28,8 +28,8 @@ def test_all_arrays_of_a_state_are_aligned():
     body = sand.setup.bpca(37, radius="0.1 um", material=sand.SILICA, seed=1)
     system = sand.Simulation(body, [sand.Contact()]).state
     for one in (system, system.copy()):
-        one.grow_contacts()
-        one.grow_pairs()
+        one.grow("contacts")
+        one.grow("pair_list")
         groups = (one.grains.arrays, one.contacts, one.pair_list, one.long_range)
         assert all(is_aligned(array) or array.size == 0 for group in groups for array in group)
         assert one.contacts.flag.size % SIMD_WIDTH == one.pair_list.in_contact.size % SIMD_WIDTH == 0

@@ -8,33 +8,36 @@ import numpy as np
 import pytest
 
 import sand
-from sand.basics.arrays import SAVED_BODIES, SAVED_WALLS, body_arrays
-from sand.basics.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS, WALL_CONTACTS
+from sand import components
+from sand.basics.array_groups import Array, new_group, saved_in
+from sand.basics.arrays import body_arrays
+from sand.basics.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
+from sand.io.state_arrays import ALWAYS, NUMBERS, OPTIONAL, PLANNED_END, SINGLE, check_state
 
 REFERENCE = Path(__file__).parents[2] / "reference"
 ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))
 META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
-ONE_WALL = {
-    **{f"walls/{name}": np.zeros((3, 1)) for name in SAVED_WALLS},
-    "walls/work": np.zeros(1),
-    "wall_contacts/pair": np.zeros((2, 1), np.uint32),
-    **{f"wall_contacts/{name}": np.zeros((3, 1)) for name in ("pointer1", "pointer2", "force", "torque1")},
-    **{f"wall_contacts/{name}": np.zeros(1) for name in ("twist", "formed")},
-    "wall_contacts/constants": np.ones((5, 1)),
-    "wall_contacts/lost": np.zeros((4, 1)),
-    "wall_contacts/damping": np.zeros((12, 1)),
-    "wall_contacts/flag": np.zeros(1, np.uint8),
+GROUPS = {**ALWAYS, **OPTIONAL, **{name: group for each in components.groups() for name, group in each.items()}}
+STORED: dict[str, Array] = SINGLE | {
+    f"{name}/{key}": each for name, group in GROUPS.items() for key, each in saved_in(group).items()
 }
+"""All arrays of a checkpoint."""
+
+
+def saved(name, arrays):
+    """The arrays of a group that a checkpoint has."""
+    return {f"{name}/{key}": getattr(arrays, key) for key in saved_in(arrays)}
+
+
+SIZES = {"used": 1, "grains": 4, "walls": 1, "constants": 5, "channels": 4}
+ONE_WALL = {k: v for name in ("walls", "wall_contacts") for k, v in saved(name, new_group(GROUPS[name], SIZES)).items()}
 """A wall with one contact."""
-BODIES = {f"bodies/{name}": array for name, array in body_arrays(4)._asdict().items() if name in SAVED_BODIES}
+BODIES = saved("bodies", body_arrays(4))
 BODIES["bodies/first"][:] = np.arange(4)
 CROSSINGS = {"grains/image": np.zeros((3, 4), np.int32)}
 WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES, **CROSSINGS}
-WITH_ORDER["count"] = ARRAYS["count"].copy()
-WITH_ORDER["count"][WALL_CONTACTS] = 1
 FAR = 2**31 - 1
 """An index out of range."""
 
@@ -43,7 +46,7 @@ def error_of(folder, arrays, meta=META):
     """The error message for a checkpoint written with a valid checksum."""
     path = write_checkpoint(folder, arrays, dict(meta))
     with pytest.raises(sand.BadInput) as error:
-        newest_checkpoint(folder)
+        newest_checkpoint(folder, components.groups())
     message, last = error.value.problems
     assert message.startswith(f"{path} cannot be resumed: ") and "no checkpoint to continue from" in last
     assert path.exists()
@@ -87,7 +90,7 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
             "grains/radius",
             "contacts/pair",
             "pair_list/pair",
-            "walls/work",
+            "walls/position",
             "wall_contacts/pair",
         )  # then other arrays are inconsistent
         assert sizing or f"'{name}'" in message, (what, message)

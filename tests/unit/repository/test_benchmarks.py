@@ -68,7 +68,7 @@ def test_bytes_of_counts_every_array():
     """Arrays of grains, contacts, pairs and lists, at any nesting."""
     system = worlds.lattice(3).state
     parts = (system.grains.arrays, system.contacts, system.pair_list, system.long_range)
-    parts += (system.walls, system.wall_contacts, system.bodies)
+    parts += (system.bodies, *system.of_components.values())
     alone = (system.clock, system.count, system.lost, system.cutoff)
     assert pieces.bytes_of(system) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
 
