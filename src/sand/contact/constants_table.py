@@ -46,8 +46,8 @@ def with_derived(law: ContactLaw, saved: Mapping[str, np.ndarray]) -> dict[str, 
             radius, (first, second) = saved["grains/radius"], saved[f"{group}/pair"]
             radii = radius[first], radius[second] if group == "contacts" else np.full(first.size, np.inf)
             # one column serves equal contacts
-            radii = [np.resize(own if first.size else radius, table.shape[1]) for own in radii]
-            given = zip(*(table[names.index(name)] for name in needed), *radii, strict=True)
+            resized = [np.resize(own if first.size else radius, table.shape[1]) for own in radii]
+            given = zip(*(table[names.index(name)] for name in needed), *resized, strict=True)
             derived = np.array([derived_constants(*column) for column in given])
             found[f"{group}/constants"] = np.concatenate([table, derived.reshape(-1, len(Derived._fields)).T])
     return found
