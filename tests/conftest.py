@@ -12,6 +12,7 @@ Tiers (the last line of a run says which were left out and how to run them):
 from __future__ import annotations
 
 import compileall
+import gc
 import signal
 import warnings
 from collections import Counter
@@ -36,6 +37,9 @@ from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E4
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# numba and the collected tests are millions of objects that stay: looking through them often costs a tenth of a run
+gc.set_threshold(20_000, 10, 10)
 
 TESTS = Path(__file__).parent
 FOLDERS = ("browser", "peers")
@@ -197,11 +201,28 @@ def _no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SAND_NO_BROWSER", "1")
 
 
+def _draw_nothing(patch: pytest.MonkeyPatch) -> None:
+    for name in ("run_figure.run_figure", "collisions.collision_figure", "scattering.sigma_figure"):
+        patch.setattr(f"sand.plotting.{name}", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _empty_figures() -> Iterator[pytest.MonkeyPatch]:
+    """Runs and jobs, also those of fixtures, end with an empty figure, which costs a second less than a real one."""
+    with pytest.MonkeyPatch.context() as patch:
+        _draw_nothing(patch)
+        yield patch
+
+
 @pytest.fixture(autouse=True)
-def _empty_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs end with an empty figure, which costs a second less than a real one, except in tests marked `draws`."""
-    if "draws" not in request.keywords:
-        monkeypatch.setattr("sand.plotting.run_figure.run_figure", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
+def _real_figures(request: pytest.FixtureRequest, _empty_figures: pytest.MonkeyPatch) -> Iterator[None]:
+    """Tests marked `draws` end with a real figure."""
+    draws = "draws" in request.keywords
+    if draws:
+        _empty_figures.undo()
+    yield
+    if draws:
+        _draw_nothing(_empty_figures)
 
 
 @pytest.fixture(autouse=True)

@@ -17,14 +17,13 @@ from .basics.arguments import checked
 from .basics.errors import BadInput, ErrorCollector, import_optional, shown
 from .basics.paths import user_path
 from .basics.units import format_quantity, si
-from .config.build import simulate
+from .config.build import simulation_from
 from .config.case import read_case
 from .io import run_folder as files
 from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
-from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
 from .viewer.external_field import read_field
@@ -115,8 +114,7 @@ class Run:
             As `setup.from_frame`; or if a case file cannot describe one of the forces.
         """
         case = read_case(self.folder / files.CASE)
-        start = from_frame(self.frames[frame], case.materials_by_name())
-        return simulate(case, start.grains, start.box, contacts=start.contacts)
+        return simulation_from(self.frames[frame], case)
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:

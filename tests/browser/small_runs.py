@@ -15,9 +15,9 @@ import numpy as np
 
 from sand.basics.box import Box
 from sand.basics.material import IRON, SILICA
+from sand.basics.schema import MODES
 from sand.basics.state import LOST
 from sand.io.damage import sealed
-from sand.io.frame_chunks import MODES
 from sand.io.ledger_table import LedgerFile
 from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
 from sand.io.trajectory import TrajectoryWriter

@@ -6,7 +6,7 @@ import pytest
 from sand.analysis.clusters import cluster_labels
 from sand.analysis.quantities import GRAIN_NAMES, measured
 from sand.basics.errors import BadInput
-from sand.io.frame_chunks import REST
+from sand.basics.schema import REST
 
 from .looking import SOURCES, View
 

@@ -477,7 +477,8 @@ def test_commands_know_own_quantities(tmp_path, capsys):
     """`sand plot` draws histograms and colours of the run's own quantities, and proposes them for misspelt names."""
     write_body(tmp_path / "body.gsd", five())
     source = str(tmp_path / "body.gsd")
-    assert main(["plot", source, "--what", "still,heating", "--colour", "temperature"]) == 0
+    words = ["--what", "still,heating", "--colour", "temperature", "--size", "300x200"]
+    assert main(["plot", source, *words]) == 0
     assert {path.name for path in (tmp_path / "body-plots").iterdir()} == {"still.png", "heating.png"}
     assert main(["plot", source, "--what", "heatin", "--colour", "temperatur"]) != 0
     message = capsys.readouterr().err

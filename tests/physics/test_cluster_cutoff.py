@@ -11,7 +11,7 @@ import sand
 from sand.basics import threads
 from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.basics.state import COMPARED, CONTACTS, CUT_RADIUS, CUT_TIME
-from sand.engine import engine
+from sand.engine import compiled_state, engine
 from sand.integrate import task_queue
 from sand.integrate.parts import Stop
 
@@ -182,7 +182,7 @@ def test_energy_and_loads_at_a_change(search):
     other.run(until="0.35 ns")
     sim.run(until=0.99 * other.state.cutoff[CUT_TIME])
     before, old, new = to_next_change(sim)
-    before._engine.cutoff, before.state.count[COMPARED] = None, -1  # this copy keeps its cut-off
+    before._engine.components, before.state.count[COMPARED] = (), -1  # this copy keeps its cut-off
     before.run(steps=1)
     assert new == pytest.approx(old * 2.0 ** (1.0 / 3.0), rel=1e-9, abs=0.0)  # 2 and 1 grains, head to tail
     assert (before.grains.position == sim.grains.position).all() and before.time == sim.time
@@ -218,7 +218,7 @@ def test_the_energy_balance_closes_over_changes(stepping):
     """
     sim = pairs_of_grains(frame_every="0.1 ns", stepping=stepping)
     sim.run(until="0.6 ns")
-    assert sim.state.cutoff[CUT_RADIUS] > 1.5 * sim._engine.cutoff.at_start.radius
+    assert sim.state.cutoff[CUT_RADIUS] > 1.5 * sim._engine.components[0].first.radius
     booked = sim.ledger["lost_cutoff_changed"]
     assert len(set(booked)) == 3 and np.ptp(sim.ledger["total"]) < 0.2 * np.abs(booked).max()
 
@@ -293,7 +293,7 @@ def test_a_regular_step_that_is_not_kept_changes_nothing(monkeypatch, order, ste
 @pytest.mark.parametrize("search", ["all pairs", "cells"])
 def test_changes_are_the_same_for_any_number_of_threads(monkeypatch, search):
     """One and two threads, with loops shared among them."""
-    for module in (task_queue, engine):
+    for module in (task_queue, compiled_state):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: True)
     ends = []
     for number in (1, 2):

@@ -81,7 +81,9 @@ def test_a_resumed_run_has_the_same_bits(name, tmp_path):
         assert state(sim) == state(whole)
 
 
-@EACH
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.validate if name == "charges" else ()) for name in FORCES]
+)
 @pytest.mark.compiled("threads")
 @pytest.mark.parametrize("search", ["all pairs", pytest.param("cells", marks=pytest.mark.validate)])
 def test_the_number_of_threads_changes_no_bit(search, name):

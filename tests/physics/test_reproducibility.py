@@ -131,8 +131,7 @@ def test_array_sizes_change_no_bit():
         sim.state.contacts = empty_contact_arrays(n, room, len(constant_names(LAW)), uniform_contacts=uniform)
         sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=uniform), uniform
         settings = sim._engine.parameters.settings._replace(uniform_contacts=uniform)
-        sim._engine.parameters = sim._engine.parameters._replace(settings=settings)
-        sim._engine._table.set("settings", settings)
+        sim._engine.set_parameters(settings=settings)
         sim.run(until=1e-9)
         ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in shared})
     assert sim.state.count[CONTACTS] > 16

@@ -159,8 +159,7 @@ def test_two_bodies_follow_the_equations_of_motion(forces):
     for step in (2e-10, 1e-10, 5e-11, 5e-12):
         sim = begun.copy()
         limits = sim._engine.parameters.flight_limits._replace(step_fraction=0.2, longest_step=step)
-        sim._engine.parameters = sim._engine.parameters._replace(flight_limits=limits)
-        sim._engine._table.set("flight_limits", limits)
+        sim._engine.set_parameters(flight_limits=limits)
         sim.run(until=time + 2e-8)
         assert sim.regular_state.count[MADE] == 0 and sim.regular_state.bodies.asleep.all()
         errors.append(np.linalg.norm(sim.grains.position - exact, axis=1).max())

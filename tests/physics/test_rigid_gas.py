@@ -335,8 +335,7 @@ def test_drag_on_a_body_follows_the_equations_of_motion():
     for step in (4e-10, 2e-10, 1e-10, 2.5e-11):
         sim = begun.copy()
         limits = sim._engine.parameters.flight_limits._replace(longest_step=step)
-        sim._engine.parameters = sim._engine.parameters._replace(flight_limits=limits)
-        sim._engine._table.set("flight_limits", limits)
+        sim._engine.set_parameters(flight_limits=limits)
         sim.run(until=time + 1e-8)
         errors.append(np.linalg.norm(sim.grains.position - exact, axis=1).max())
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1, abs=0.0)

@@ -229,7 +229,7 @@ def test_inner_list_is_complete_after_sorting():
     sim.run(steps=SORT_EVERY)
     builds = sim.state.count[REBUILT]
     sim._engine.advance(np.inf, 1)
-    w, reach = sim._engine._state, sim._engine.parameters.criteria.pair_gap
+    w, reach = sim._engine.stored_state, sim._engine.parameters.criteria.pair_gap
     assert w.count[ORDERED] == SORT_EVERY and w.count[REBUILT] == builds
     i, j = w.pair_list.pair[:, : w.count[PAIRS]].astype(int)
     apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)

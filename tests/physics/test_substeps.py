@@ -43,7 +43,7 @@ def thin_gas(*forces, box=SIDE, dipoles=None, seed=1, substeps=True, fraction=0.
     sim = sand.Simulation(grains, forces, box=box, stepping=stepping, **{"frame_every": 1.0} | options)
     if not substeps:
         limits = sim._engine.parameters.flight_limits._replace(substeps=False)
-        sim._engine._table.set("flight_limits", limits)
+        sim._engine.table.set("flight_limits", limits)
     return sim
 
 

@@ -12,7 +12,7 @@ import sand
 from sand.basics import threads
 from sand.basics.errors import BadInput
 from sand.basics.state import CONTACTS, OUTSIDE, SLIPPED
-from sand.engine import engine
+from sand.engine import compiled_state
 from sand.integrate import task_queue
 from sand.integrate.task_queue import (
     ACTIVE,
@@ -48,7 +48,7 @@ def vibrating_lattice(cutoff, size=(11, 10, 10)):
 
 def share_blocks_if(monkeypatch, shared):
     """Make simulations divide their loops among threads, or not, whatever their size."""
-    for module in (task_queue, engine):
+    for module in (task_queue, compiled_state):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: shared)
     assert new_task_queue(1, 1).words[SHARED] == shared
 
@@ -76,7 +76,7 @@ def test_the_number_of_threads_changes_no_bit(cutoff, size):
     for number in (1, 2, 3):
         sand.set_threads(number)
         sim = vibrating_lattice(cutoff, size)
-        assert sim._engine._workers is not None
+        assert sim._engine.workers is not None
         assert bool(sim._engine.content.pair_forces) is (cutoff != "bare")
         sim.run(steps=25)
         sim.run(steps=35)
@@ -93,7 +93,7 @@ def test_parallel_and_serial_loops_agree(monkeypatch):
     for large in (True, False):
         share_blocks_if(monkeypatch, large)
         sim[large] = vibrating_lattice(None)
-        assert (sim[large]._engine._workers is not None) is large
+        assert (sim[large]._engine.workers is not None) is large
         sim[large].run(steps=20)
     assert state(sim[True]) == state(sim[False])
 
@@ -147,15 +147,15 @@ def test_workers_stop_when_a_driver_raises(monkeypatch):
     sand.set_threads(2)
     sim = vibrating_lattice(None)
     sim.run(steps=1)
-    monkeypatch.setattr(engine, "new_task_queue", recording_queue)
+    monkeypatch.setattr(compiled_state, "new_task_queue", recording_queue)
     with monkeypatch.context() as patched:
-        patched.setattr(sim._engine._program, "run", fails)
+        patched.setattr(sim._engine.program, "run", fails)
         with pytest.raises(RuntimeError, match="broken"):
             sim._engine.advance(1.0, 1)
     assert queues[-1].words[WORD] == QUIT << TASK
     assert queues[-1].words[ACTIVE] == 0
     sim.run(steps=1)
-    assert copy.deepcopy(sim._engine._workers) is not sim._engine._workers
+    assert copy.deepcopy(sim._engine.workers) is not sim._engine.workers
 
 
 RAISES = """
@@ -238,9 +238,9 @@ def test_workers_are_used_where_they_save_time(number, forces, workers):
     chain = sand.Grains(positions, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
     sim = sand.Simulation(chain, [sand.Contact(), *forces])
     sim.run(steps=1)
-    assert sim._engine._workers is not None
+    assert sim._engine.workers is not None
     assert sim.state.count[CONTACTS] == number - 1
-    assert len(sim._engine._workers._inboxes) == workers
+    assert len(sim._engine.workers._inboxes) == workers
 
 
 def test_small_simulations_have_no_task_queue():

@@ -1,27 +1,22 @@
 """Rules that keep the structure: order of imports, docstrings, and which packages use numba, files and the network."""
 
 import ast
-import functools
 import graphlib
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
 from .counts import COUNTS
 from .layers import LAYERS, PLAN, SOURCE, TOP, rank, written
+from .sources import SOURCES, nodes_of, text_of
 
-SOURCES = sorted(SOURCE.rglob("*.py"))
+pytestmark = pytest.mark.xdist_group("sources")
 PAGE = sorted((TOP / "grainview" / "src").rglob("*.*"))
-
-
-@functools.cache
-def tree_of(path: Path) -> ast.Module:
-    """The syntax tree of a source file, parsed once."""
-    return ast.parse(path.read_text("utf-8"))
 
 
 def package_of(path: Path) -> str:
@@ -33,7 +28,7 @@ def imports(path: Path) -> list[str]:
     """Full names of the modules that a file imports, wherever in the file; `sand.` ones as far as they are modules."""
     package = ["sand", *path.relative_to(SOURCE).parts[:-1]]
     found = []
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             module = ".".join([*base, *((node.module or "").split(".") if node.module else [])])
@@ -91,10 +86,10 @@ def test_public_names_have_docstrings():
     """Modules, and public classes, functions and methods with more than one statement."""
     silent = []
     for path in SOURCES:
-        tree = tree_of(path)
-        if not ast.get_docstring(tree):
+        nodes = nodes_of(path)
+        if not ast.get_docstring(nodes[0]):
             silent.append(str(path.relative_to(TOP)))
-        for parent in ast.walk(tree):
+        for parent in nodes:
             if not isinstance(parent, (ast.Module, ast.ClassDef)):
                 continue
             for node in parent.body:
@@ -133,7 +128,7 @@ def test_only_io_opens_files_and_only_cli_prints():
     """`open`, `read_text`, `write_text` are called in io/ and compiler/ alone; print in cli/ and compiler/progress."""
     for path in SOURCES:
         package = package_of(path)
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if not isinstance(node, ast.Call):
                 continue
             name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
@@ -146,15 +141,15 @@ def test_only_io_opens_files_and_only_cli_prints():
                 assert package in ("io", "compiler"), where
 
 
-def loads_of_numpy(tree: ast.AST) -> list[ast.Call]:
+def loads_of_numpy(nodes: Iterable[ast.AST]) -> list[ast.Call]:
     """Calls of `numpy.load`, under any name that the module imports."""
     modules, functions = set(), set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             modules |= {alias.asname or alias.name for alias in node.names if alias.name == "numpy"}
         elif isinstance(node, ast.ImportFrom) and node.module == "numpy":
             functions |= {alias.asname or alias.name for alias in node.names if alias.name == "load"}
-    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)] if modules or functions else []
+    calls = [node for node in nodes if isinstance(node, ast.Call)] if modules or functions else []
     return [
         call
         for call in calls
@@ -173,7 +168,7 @@ def test_calls_that_load_arrays_are_found():
     text = (
         "import numpy\nimport numpy as np\nfrom numpy import load as get\nnp.load(a)\nnumpy.load(b, allow_pickle=x)\n"
     )
-    found = loads_of_numpy(ast.parse(text + "get(c, allow_pickle=False)\nother.load(d)\nload(e)\n"))
+    found = loads_of_numpy([*ast.walk(ast.parse(text + "get(c, allow_pickle=False)\nother.load(d)\nload(e)\n"))])
     assert [ast.unparse(call.args[0]) for call in found] == ["a", "b", "c"]
     assert [refuses_pickles(call) for call in found] == [False, False, True]
 
@@ -188,7 +183,7 @@ def test_no_pickle_no_network():
         names = {name.split(".")[0] for name in imports(path)}
         assert not names & {"pickle", "dill", "cloudpickle"}, path
         assert not names & (network - {"http", "socketserver"} if path == server else network), path
-        loads += [(path, call) for call in loads_of_numpy(tree_of(path))]
+        loads += [(path, call) for call in loads_of_numpy(nodes_of(path))]
     assert loads
     assert not [f"{path.relative_to(TOP)}:{call.lineno}" for path, call in loads if not refuses_pickles(call)]
 
@@ -198,7 +193,8 @@ def test_bounds_of_tests_state_their_absolute_part():
     calls = [
         (path, node)
         for path in sorted((TOP / "tests").rglob("*.py"))
-        for node in ast.walk(tree_of(path))
+        if "approx" in text_of(path)
+        for node in nodes_of(path)
         if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "approx"
     ]
     silent = [f"{path.relative_to(TOP)}:{call.lineno}" for path, call in calls if "abs" not in named(call)]

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.errors import BadInput, did_you_mean, refuse_other
-from ..io.frame_chunks import MODES as SHARES
-from ..io.frame_chunks import REST
+from ..basics.schema import MODES as SHARES
+from ..basics.schema import REST
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 

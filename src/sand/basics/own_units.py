@@ -13,26 +13,8 @@ from .conversion import has_unit_within, in_unit
 from .unit_factors import LONGEST_TEXT, NUMBER, TEXT, factor, powers_of, registry, spelled, times
 
 _SI_UNITS = (
-    "m",
-    "kg",
-    "s",
-    "A",
-    "K",
-    "mol",
-    "cd",
-    "rad",
-    "N",
-    "J",
-    "W",
-    "Pa",
-    "C",
-    "V",
-    "ohm",
-    "T",
-    "Wb",
-    "F",
-    "H",
-    "Hz",
+    *("m", "kg", "s", "A", "K", "mol", "cd", "rad"),
+    *("N", "J", "W", "Pa", "C", "V", "ohm", "T", "Wb", "F", "H", "Hz"),
 )
 """Units of SI without a prefix that replace others of the same dimension."""
 

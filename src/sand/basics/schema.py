@@ -41,6 +41,10 @@ FIELDS = (
 BY_NAME = {field.name: field for field in FIELDS}
 CHANGEABLE = ("velocity", "spin", "moment", "charge")
 """Quantities that `Simulation.change` can change."""
+REST = "at_rest"
+"""Name of the array of a frame that says which grains belong to clusters at rest."""
+MODES = ("stretch", "slide", "roll", "twist")
+"""Modes of a contact: columns of `share` of a frame."""
 
 
 def public(array: np.ndarray) -> np.ndarray:

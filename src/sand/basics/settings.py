@@ -172,14 +172,14 @@ class Direction(Setting):
 
 
 class AlongZ(Setting):
-    """Three components, or one value along +z, −z if `direction` is −1."""
+    """Three components, or one value along +z."""
 
-    def __init__(self, unit: str, direction: float = 1.0):
-        self.unit, self.direction = unit, direction
+    def __init__(self, unit: str):
+        self.unit = unit
 
     def read(self, value: Any, name: str) -> tuple[float, float, float]:
         """The components in SI."""
-        return along_z(value, self.unit, name, self.direction)
+        return along_z(value, self.unit, name)
 
 
 class Reading(Setting):

@@ -28,10 +28,7 @@ def command(
     out: str | None,
     frames: slice,
     overwrite: bool,
-    radius: str | None,
-    length: str | None,
-    material: str | None,
-    **output: bool,
+    **how: Any,
 ) -> None:
     """Export the frames of the run in DIR to other programs.
 
@@ -46,7 +43,7 @@ def command(
     from ..io.run_folder import TRAJECTORY
     from ..results import Run
 
-    source, given = Path(folder), {"radius": radius, "length": length, "material": material}
+    source, given = Path(folder), {name: how.pop(name) for name in options.READING}
     if source.is_file():
         opened: Any = open_frames(source, **given)
         stem = Path(out) if out else source.with_name(f"{source.stem}-frames")
@@ -59,7 +56,7 @@ def command(
         raise BadInput(f"{existing[0]} exists; give another --out, or --overwrite")
     if any(source.is_file() and one.samefile(source) for one in existing):
         raise BadInput(f"--out {stem}: this is the file that is exported; give another name")
-    if not output["quiet"]:
+    if not how["quiet"]:
         report.reading(folder)
     written = export_frames(opened, stem, form, cluster_labels, frames)
     if left := stale_files(stem, form, written):
@@ -68,4 +65,4 @@ def command(
         )
     more = f" and {len(written) - 1} more" if len(written) > 1 else ""
     content = {"files": [str(path) for path in written]}
-    report.answer(content, f"export {folder}", [("files", f"{written[0]}{more}")], **output)
+    report.answer(content, f"export {folder}", [("files", f"{written[0]}{more}")], **how)

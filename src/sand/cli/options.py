@@ -80,6 +80,10 @@ threads = click.option(
 )
 
 
+READING = ("radius", "length", "material")
+"""Names of the options of `reading`."""
+
+
 def reading(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --radius, --length and --material of commands that read files of grains of other programs."""
     radius = click.option("--radius", metavar="R", help="Radius of the grains of a file without radii.")

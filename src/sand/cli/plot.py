@@ -15,8 +15,6 @@ from . import options, parsing, report
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
 FOLDER = "plots"  # as `io.run_folder.PLOTS`, whose import is slow
-READING = ("radius", "length", "material")
-"""Options of `options.reading`."""
 
 
 class PrintSize(NamedTuple):
@@ -76,7 +74,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     from ..plotting.plots import HISTORY
     from ..plotting.render.still import check_picture_options
 
-    given = {name: values[name] for name in READING}
+    given = {name: values[name] for name in options.READING}
     one = None if values["source"] is None else _first_frame(Path(values["source"]), given)
     allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
     yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
@@ -163,7 +161,7 @@ def command(
 
     folder, names = _place(Path(source), what, out, form, overwrite)
     how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
-    given = {name: how.pop(name) for name in READING}
+    given = {name: how.pop(name) for name in options.READING}
     pictures = _draw(_open_source(Path(source), given), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)

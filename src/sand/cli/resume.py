@@ -104,18 +104,15 @@ def _run(place: Path, until: float | None, wall_time: float | None, *, quiet: bo
     simulation = resume(place)
     (end, last_step, stop), now = simulation.planned, format_quantity(simulation.time, "s")
     met = stop is not None and simulation.met_condition == stop
-    if until is None and met:
+    if until is None and (met or simulation.time >= end or simulation.steps >= last_step):
+        how = f"{report.resume_line(place)} --until TIME"
+        text = f"{place} has reached its planned end at t = {now}; to continue it further: {how}"
+        if met:
+            text = (
+                f"{place} ended at t = {now}, as its condition is met: {stop}; to continue it, change stop in "
+                f"{place / CASE}, or: {how}, which ignores this condition"
+            )
         summary = read_json(place / SUMMARY) if as_json and (place / SUMMARY).exists() else {}
-        text = (
-            f"{place} ended at t = {now}, as its condition is met: {stop}; to continue it, change stop in "
-            f"{place / CASE}, or: {report.resume_line(place)} --until TIME, which ignores this condition"
-        )
-        report.answer({**summary, "folder": str(place)}, text, [], as_json=as_json, quiet=quiet)
-        return None
-    if until is None and (simulation.time >= end or simulation.steps >= last_step):
-        summary = read_json(place / SUMMARY) if as_json and (place / SUMMARY).exists() else {}
-        further = f"to continue it further: {report.resume_line(place)} --until TIME"
-        text = f"{place} has reached its planned end at t = {now}; {further}"
         report.answer({**summary, "folder": str(place)}, text, [], as_json=as_json, quiet=quiet)
         return None
     if until is not None and until <= simulation.time:

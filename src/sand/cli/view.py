@@ -45,10 +45,7 @@ def command(
     port: int,
     no_browser: bool,
     overwrite: bool,
-    radius: str | None,
-    length: str | None,
-    material: str | None,
-    **output: bool,
+    **how: Any,
 ) -> None:
     """Show the grains of the run in DIR in the browser.
 
@@ -63,8 +60,7 @@ def command(
     if target is not None:
         _refuse_target(target, overwrite)
     selection = frame_slice(frames, every)
-    silent = output["quiet"] or output["as_json"]
-    given = {"radius": radius, "length": length, "material": material}
+    silent, given = how["quiet"] or how["as_json"], {name: how.pop(name) for name in options.READING}
     dataset = _open_dataset(Path(folder), given, verbose=not silent)
     if selection != slice(None, None, 1):
         ends = ("" if k is None else str(k) for k in (frames.start, frames.stop, frames.step))
@@ -72,13 +68,13 @@ def command(
         parts = [f"frames {chosen} of the run"] * (chosen != ":") + [f"one frame of {every}"] * (every > 1)
         dataset.select(selection, ", ".join(parts))
     if target is None:
-        _serve(dataset, folder, port, not no_browser, as_json=output["as_json"], silent=silent)
+        _serve(dataset, folder, port, not no_browser, as_json=how["as_json"], silent=silent)
         return
     with report.progress_bar(len(dataset), silent, desc=report.clean(target.name), unit="frame") as bar:
         size = write_page(dataset, target, progress=bar.update)
     megabytes = f"{size / 1e6:.3g} MB"
     rows = [("file", str(target)), ("frames", str(len(dataset))), ("size", megabytes)]
-    report.answer({"file": str(target), "bytes": size}, f"view {folder}", rows, **output)
+    report.answer({"file": str(target), "bytes": size}, f"view {folder}", rows, **how)
     if size > report.LARGE:
         fewer = max(int(every * size / report.LARGE) + 1, 2)
         report.note(f"note: a page of {megabytes} opens slowly; --every {fewer} would reduce it to about 100 MB")

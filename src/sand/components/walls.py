@@ -155,14 +155,14 @@ class Walls(Component):
             problems.append(f"walls: sand.{type(stepping).__name__} does not know walls; use stepping=sand.Verlet()")
         for wall in self.items:
             problems += _material_problems(wall, setup.grains, contact)
-            lengths = setup.box.lengths
+            lengths, materials = setup.box.lengths, (wall.material, *setup.grains.materials)
             axes = [axis for axis, v, length in zip("xyz", wall.normal, lengths, strict=True) if v and length]
             if axes:
                 problems.append(
                     f"walls: the normal of '{wall.name}' has a component along {axes[0]}, along which the box is "
                     "periodic; open this axis, or give another normal"
                 )
-            elif setup.fresh and contact is not None and wall.material.surface_energy is not None:
+            elif setup.fresh and contact is not None and all(m.surface_energy is not None for m in materials):
                 problems += _grain_problems(wall, setup.grains, contact)
         return problems
 

@@ -21,7 +21,7 @@ from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..setup.from_file import from_trajectory, is_own_trajectory, start_from_file
-from ..setup.from_frame import Start
+from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas_with_contacts
 from ..simulation.condition import GIVEN
 from ..simulation.simulation import Simulation
@@ -49,6 +49,12 @@ def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Sim
         **extra,
         **options,
     )
+
+
+def simulation_from(frame: Any, case: Case) -> Simulation:
+    """Create a simulation in memory from a frame of a run of this case.  Raises BadInput, as `setup.from_frame`."""
+    start = from_frame(frame, case.materials_by_name())
+    return simulate(case, start.grains, start.box, contacts=start.contacts)
 
 
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:

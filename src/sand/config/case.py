@@ -312,9 +312,14 @@ def read_case(path: str | Path) -> Case:
     BadInput
         If the file has errors; all of them, one line each, with their place.
     """
+    return check_case(read_content(path, "run"), str(path))
+
+
+def read_content(path: str | Path, command: str) -> dict[str, Any]:
+    """Content of a case file of this command, with absolute paths of files.  Raises BadInput."""
     content = read_toml(path)
-    refuse_other_command(content, path, "run")
-    return check_case(with_absolute_files(content, path), str(path))
+    refuse_other_command(content, path, command)
+    return with_absolute_files(content, path)
 
 
 def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, Any]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..basics.box import Box
-from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.state import State
@@ -16,7 +17,10 @@ from ..contact.law import ContactLaw
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
-from .kinds import ForcesByType
+from .engine import Engine
+from .step_parameters import ForcesByType
+
+NO_PAIRS = np.zeros((0, 2), np.int64)
 
 
 class Setup(NamedTuple):
@@ -28,29 +32,35 @@ class Setup(NamedTuple):
     stepping: Integrator
     neighbours: Neighbours
     fresh: bool  # whether this is a new start; a resumed run may be in the middle of an impact
+    saved: Mapping[str, np.ndarray] = MappingProxyType({})  # arrays of the checkpoint from which a run continues
+    touching: np.ndarray = NO_PAIRS  # (C, 2) pairs in contact at a new start
 
 
 class Component:
     """A feature of a simulation that is no formula; what a class does not define is nothing.
 
     At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
-    `stages` and `heavy`, `add_arrays`.  The ledger has its `columns` and `losses`, with the values of `row` (energies
-    stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change asks
-    `problems_of_motion` and `problems_of_arrays`, and continues with what is `kept`; case.toml has `parameters` and
-    `materials`.
+    `at_start`, `stages` and `heavy`, `add_arrays`, `begin`.  While the engine runs it calls `update`, `next_time` and
+    `contacts_changed`, between regular steps.  The ledger has its `columns` and `losses`, with the values of `row`
+    (energies stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change
+    asks `problems_of_motion` and `problems_of_arrays`, continues with what is `kept`, and calls `saved_for_change` and
+    `changed`; case.toml has `parameters` and `materials`.
 
     Attributes
     ----------
     name : str
         Its keyword of `sand.Simulation`, and its table in case files.
     noun : str
-        What it adds, in sentences: "rigid clusters cannot have walls".
+        What it adds, in sentences: "rigid clusters cannot have walls"; empty if it can be used with rigid clusters.
     keeps_order : bool
         Whether grains keep the order in which they were given.
     every_step : bool
         Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
     own_columns : bool
         Whether each contact needs its own constants, also between equal grains.
+    watches_contacts : bool
+        Whether `contacts_changed` is called; the driver then returns after each step in which a contact formed or
+        broke.
     groups : Mapping[str, type]
         Groups of its arrays (`basics.array_groups`) by name: parts of a simulation that stages take by this name,
         `State.of_components`, and its arrays in a checkpoint.
@@ -59,10 +69,11 @@ class Component:
     """
 
     name: ClassVar[str]
-    noun: ClassVar[str]
+    noun: ClassVar[str] = ""
     keeps_order: ClassVar[bool] = False
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
+    watches_contacts: ClassVar[bool] = False
     groups: ClassVar[Mapping[str, type]] = {}
 
     def __init__(self, items: Sequence[Any]):
@@ -74,6 +85,10 @@ class Component:
 
     def prepare(self, grains: Grains) -> None:
         """Give the grains of a start what it prescribes."""
+
+    def at_start(self, forces: ForcesByType, setup: Setup) -> ForcesByType:
+        """The forces as they act at first."""
+        return forces
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
         """Stages that the driver calls, by number, with their parameters."""
@@ -87,9 +102,44 @@ class Component:
         """Give a new state the arrays of `groups`; a class whose shapes name sizes of its own has to do it itself."""
         state.add_groups(self.groups, {})
 
+    def next_time(self, engine: Engine) -> float:
+        """Time [s] up to which steps may be taken without an `update`."""
+        return math.inf
+
+    def update(self, engine: Engine) -> None:
+        """Bring the engine up to date with the time of its regular state."""
+
+    def contacts_changed(self, engine: Engine) -> None:
+        """Called after steps in which contacts formed or broke, if it `watches_contacts`."""
+
+    def begin(self, engine: Engine) -> None:
+        """Called when an engine is built, before contacts are added, and when a saved or changed state was loaded."""
+
+    def choices(self) -> dict[str, str]:
+        """Automatic choices at the start, with their reasons."""
+        return {}
+
+    def present_choices(self, state: State) -> dict[str, str]:
+        """Automatic choices of the run so far."""
+        return {}
+
+    def notes(self, state: State) -> list[str]:
+        """What the run so far says about its set-up, a text each."""
+        return []
+
     def kept(self, kept: np.ndarray) -> Component:
         """What is left of it after a change; `kept` (K,) are the earlier indices of grains 0 … K − 1."""
         return self
+
+    def saved_for_change(self, state: State, box: Box) -> dict[str, np.ndarray]:
+        """What a change, after which the box is this one, takes from the state before as `Setup.saved`."""
+        return {}
+
+    def changed(self, arrays: dict[str, np.ndarray], *, regroups: bool) -> None:
+        """Adapt the arrays, as of `State.to_arrays`, with which a change continues.
+
+        `regroups`: there are other grains, or contacts have other numbers.
+        """
 
     def problems_of_motion(self, grains: Grains) -> list[str]:
         """Why it does not allow a change of the motion of grains to that of these."""
@@ -127,10 +177,3 @@ class Component:
 def in_use(components: Mapping[str, Component]) -> list[Component]:
     """The components that a simulation has."""
     return [each for each in components.values() if each.items]
-
-
-def check(components: Sequence[Component], setup: Setup) -> None:
-    """Check that components fit to the other parts of a simulation.  Raises BadInput with all problems."""
-    problems = [line for each in components for line in each.problems(setup)]
-    if problems:
-        raise BadInput(problems)

@@ -10,6 +10,7 @@ from ..basics.box import Box
 from ..basics.errors import BadInput, first_problems
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts, most_overlap
+from ..contact.events import InitialContacts, forming_loops
 from ..contact.model import Contact
 from .engine import Engine
 
@@ -31,6 +32,14 @@ def overlapping_pairs(grains: Grains, box: Box) -> OverlappingPairs:
     """All pairs of grains that overlap."""
     pair, overlap = grains.touching(box)
     return OverlappingPairs(pair[overlap > 0.0], overlap[overlap > 0.0])
+
+
+def with_contacts(pair: np.ndarray, contacts: StrainedContacts | None, count: int) -> np.ndarray:
+    """Pairs of grains (P, 2) and those of contacts, unless these name others than `count` grains; sorted."""
+    given = NO_OVERLAPS.pair if contacts is None else np.asarray(contacts.pair)
+    if given.ndim != 2 or given.shape[1] != 2 or ((given < 0) | (given >= count)).any():
+        return pair  # refused when they are added
+    return np.unique(np.sort(np.concatenate([pair, given.astype(pair.dtype)]), axis=1), axis=0)
 
 
 def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedContacts | None) -> np.ndarray:
@@ -59,7 +68,14 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedCont
     given = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
     if len(given) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
         raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
-    wrong = engine.add_contacts(pair, contacts.slide, contacts.roll, contacts.twist)
+    state, law, settings = engine.state, engine.law, engine.parameters.settings
+    if state.contacts.pair.shape[1] < len(pair):
+        state.grow("contacts", len(pair))
+    vectors = (np.ascontiguousarray(np.transpose(array), dtype=np.float64) for array in contacts[1:])
+    initial = InitialContacts(np.ascontiguousarray(pair.T, dtype=np.uint32), *vectors)
+    arrays = state.grains.arrays, state.contacts, state.count
+    with engine.heavy_grains(state):
+        wrong = forming_loops(law).add_initial(*arrays, state.box.span, settings, initial)
     if wrong >= 0:
         i, j = pair[wrong]
         raise BadInput(
@@ -69,7 +85,7 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedCont
 
 
 def refuse_overlaps(
-    grains: Grains, contact: Contact, found: OverlappingPairs, given: np.ndarray, when: str = "at the start"
+    grains: Grains, contact: Contact | None, found: OverlappingPairs, given: np.ndarray, when: str = "at the start"
 ) -> None:
     """Refuse pairs that overlap by too much at the start.
 
@@ -87,6 +103,8 @@ def refuse_overlaps(
     BadInput
         If a pair overlaps by more than `basics.initial_pairs.most_overlap`; the first ten pairs are named.
     """
+    if contact is None:
+        return
     (i, j), radius = found.pair.T, grains.radius
     count = np.int64(len(grains))
     reduced = radius[i] * radius[j] / (radius[i] + radius[j])

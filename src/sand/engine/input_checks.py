@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..basics.box import Box
-from ..basics.errors import BadInput
+from ..basics.errors import ErrorCollector
 from ..basics.grains import Grains
 from ..basics.initial_pairs import at_same_place
 from ..basics.units import format_quantity
@@ -55,27 +55,23 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
     BadInput
         With all problems.
     """
-    problems = _of_a_start(grains, forces, box) if fresh else []
-    warnings: list[str] = []
+    errors, warnings = ErrorCollector(), list[str]()
+    errors.problems += _of_a_start(grains, forces, box) if fresh else []
     names = {force.name for force in forces}
     if {Charges.name, ScreenedCharges.name} <= names:
-        problems.append(
+        errors.problems.append(
             "forces: charges (sand.Charges) and screened_charges (sand.ScreenedCharges) both act between the charges "
             "of the grains, which would count twice; leave one of them out"
         )
     for force in forces:
-        try:
-            warnings += force.check(grains, box)
-        except BadInput as error:
-            problems += error.problems
+        warnings += errors.take(force.check, grains, box, instead=[])
     least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
     if box.shortest < least:
-        problems.append(
+        errors.problems.append(
             f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
             "so that a grain interacts with only one image of each neighbour"
         )
-    if problems:
-        raise BadInput(problems)
+    errors.done()
     return warnings + (_start_warnings(grains, forces, box) if fresh else [])
 
 

@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from ..basics.box import Box
 from ..basics.grains import Grains
-from ..contact.model import Contact
-from ..forces.base import ExternalForce, Force, LongRangeForce
-from ..forces.gas import Gas
-from ..integrate.parts import StepParameters
+from ..forces.base import Force
 from ..neighbours.search import Neighbours
 from .engine import Engine
+from .step_parameters import ForceDependent, ForcesByType
 
 Build = Callable[[Sequence[Force], Neighbours], Engine]
 """Builds an engine of the same grains with other forces, whose grains take contact steps."""
-
-
-class ForcesByType(NamedTuple):
-    """The forces of a simulation by type."""
-
-    contact: Contact | None
-    long_range: list[LongRangeForce]  # the forces that act on at least one grain
-    external: list[ExternalForce]
-    gas: list[Gas]  # at most one
 
 
 class Kind:
@@ -55,7 +44,7 @@ class Kind:
         """The forces that limit the step."""
         return forces
 
-    def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> Any:
+    def flight_limits(self, parameters: ForceDependent, forces: ForcesByType, grains: Grains) -> Any:
         """The run-time numbers of the integrator, also the ones that depend on forces and grains."""
         return parameters.flight_limits
 

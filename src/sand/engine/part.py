@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -90,8 +91,7 @@ class Part:
 
     def anew(self) -> Part:
         """A part like this for other grains; it shares the threads of this one, as the two never step at once."""
-        prototype = self.prototype.for_state(self.prototype.regular_state)
-        prototype.share_threads(self.prototype)
+        prototype = self.prototype.for_state(self.prototype.regular_state, with_threads=True)
         return Part(prototype, self.steps_are, self.has_bodies)
 
     @property
@@ -117,9 +117,7 @@ class Part:
             getattr(state.grains.arrays, name).take(index, axis=-1, out=array)
         self._copy_contacts(state, own)
         if self.has_bodies:
-            for name in BODY_COLUMNS:
-                if getattr(state.bodies, name).size:
-                    getattr(state.bodies, name).take(index, axis=-1, out=getattr(own.bodies, name))
+            _copy(BODY_COLUMNS, state.bodies, index, own.bodies, slice(None))
             own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
         own.count[COMPARED] = -1
         own.count[CHECKED] = own.count[STEP_INCREASES] = -INCREASE_INTERVAL
@@ -143,14 +141,11 @@ class Part:
             Whether contacts have formed or broken; then `columns` are others.
         """
         own = self.state
-        for name in MOVING:
-            getattr(state.grains.arrays, name)[..., self.index] = getattr(own.grains.arrays, name)
+        _copy(MOVING, own.grains.arrays, slice(None), state.grains.arrays, self.index)
         changed = bool(own.count[MADE] + own.count[BROKEN])
         self.columns = self._changed_contacts(state, own) if changed else self._same_contacts(state, own)
         if self.has_bodies:
-            for name in BODY_COLUMNS:
-                if getattr(state.bodies, name).size:
-                    getattr(state.bodies, name)[..., self.index] = getattr(own.bodies, name)
+            _copy(BODY_COLUMNS, own.bodies, slice(None), state.bodies, self.index)
             state.bodies.first[self.index] = self.index[own.bodies.first]
         self._count(state, own)
         return changed
@@ -171,9 +166,8 @@ class Part:
             made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
         else:
             made.clusters = cluster_arrays(count)
-        engine = given.for_state(made)
-        if uses_task_queue(count) and not self.has_bodies:  # few grains, and bodies, share no work between threads
-            engine.share_threads(given)
+        # few grains, and bodies, share no work between threads
+        engine = given.for_state(made, with_threads=uses_task_queue(count) and not self.has_bodies)
         if len(self._engines) == MOST_ENGINES:
             self._engines.clear()
         self._engines[count] = engine
@@ -185,9 +179,7 @@ class Part:
         if own.contacts.pair.shape[1] < used:
             own.grow("contacts", used)
         own.contacts.pair[:, :used] = np.searchsorted(self.index, contacts.pair[:, self.columns])
-        for name in CONTACT_COLUMNS:
-            if getattr(own.contacts, name).shape[-1]:
-                getattr(own.contacts, name)[..., :used] = getattr(contacts, name)[..., self.columns]
+        _copy(CONTACT_COLUMNS, contacts, self.columns, own.contacts, slice(used))
         if state.uniform_contacts:
             own.contacts.constants[...] = contacts.constants
         else:
@@ -198,10 +190,7 @@ class Part:
 
     def _same_contacts(self, state: State, own: State) -> np.ndarray:
         """Copy contacts back, none of which has formed or broken; returns their columns."""
-        used = int(own.count[CONTACTS])
-        for name in CONTACT_COLUMNS:
-            if getattr(state.contacts, name).shape[-1]:
-                getattr(state.contacts, name)[..., self.columns] = getattr(own.contacts, name)[..., :used]
+        _copy(CONTACT_COLUMNS, own.contacts, slice(int(own.count[CONTACTS])), state.contacts, self.columns)
         return self.columns
 
     def _changed_contacts(self, state: State, own: State) -> np.ndarray:
@@ -239,3 +228,10 @@ class Part:
         state.clock[CORRECTED] += own.clock[CORRECTED]
         state.clock[LARGEST_LOAD] = max(state.clock[LARGEST_LOAD], own.clock[LARGEST_LOAD])
         state.take_extremes(own)
+
+
+def _copy(names: Sequence[str], source: Any, taken: Any, target: Any, given: Any) -> None:
+    """Copy columns of the arrays with these names that are not empty, to columns of a target."""
+    for name in names:
+        if getattr(target, name).shape[-1]:
+            getattr(target, name)[..., given] = getattr(source, name)[..., taken]

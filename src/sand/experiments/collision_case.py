@@ -13,12 +13,10 @@ from ..basics.arguments import MOST_GRAINS
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
 from ..basics.settings import For, List, Number, Reading, Whole, Word
-from ..config.case import ForcesSection, MaterialSection, material_errors, with_absolute_files
-from ..config.commands import refuse_other_command
+from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
 from ..config.key_errors import validate
 from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator
 from ..integrate.verlet import Verlet
-from ..io.run_folder import read_toml
 from ..setup.aggregates import KINDS, build
 from ..setup.encounters import offset_of
 from ..setup.from_file import body_from_file
@@ -159,8 +157,7 @@ def read_collision(path: str | Path) -> CollisionCase:
     BadInput
         All errors of the file, one line each, with their keys.
     """
-    content = with_absolute_files(read_toml(path), path)
-    refuse_other_command(content, path, "collide")
+    content = read_content(path, "collide")
     problems = material_errors(content, ("target", "projectile"), "silica")
     return validate(with_integrator(CollisionCase, content), content, str(path), problems)
 

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from ..basics.errors import BadInput, ErrorCollector
-from ..config.case import check_case, with_absolute_files
-from ..config.commands import refuse_other_command
+from ..config.case import check_case, read_content
 from ..config.key_errors import validate
 from ..config.sections import Section, Seeds
-from ..io.run_folder import read_toml
 
 DEFAULT_SEEDS = list(range(1, 9))
 
@@ -37,12 +35,10 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     BadInput
         All errors of the file, one line each, with their keys.
     """
-    content = read_toml(path)
-    refuse_other_command(content, path, "grow")
+    content = read_content(path, "grow")
     given, errors, section = content.pop("grow", None), ErrorCollector(), None
     if given is not None:
         section = errors.take(validate, GrowSection, given, str(path), table="grow")
-    content = with_absolute_files(content, path)
     case = errors.take(check_case, content, str(path))
     errors.done()
     if case.run.stop is not None:

@@ -44,7 +44,7 @@ def cannot_touch(simulation: Simulation, target: int) -> str:
         Number of grains of the first body.
     """
     grains, forces = simulation.grains, [force for force in simulation.forces if not isinstance(force, Contact)]
-    if not simulation.box.is_open or any(each.items for each in simulation._system.extra.values()):
+    if not simulation.box.is_open or any(each.items for each in simulation._system.given.values()):
         return ""
     if any(force.name not in WORK for force in forces):
         return ""  # external forces, a gas and forces of the user may bring bodies back

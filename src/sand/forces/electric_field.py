@@ -10,7 +10,7 @@ from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.ramps import rampable
 from ..basics.settings import RAMP, AlongZ, Settings
-from .external_formulas import UniformElectric, uniform_electric
+from .external_formulas import UniformVector, uniform_electric
 
 
 @checked
@@ -41,9 +41,9 @@ class ElectricField(Settings):
         """Warnings: no grain has a charge."""
         return [] if grains.charge.any() else ["an electric field is switched on but no grain has a charge"]
 
-    def numbers(self) -> UniformElectric:
+    def numbers(self) -> UniformVector:
         """Parameters of the formula."""
-        return UniformElectric(*self.strength)
+        return UniformVector(*self.strength)
 
     def flux_density_size(self) -> float:
         """0: there is no magnetic field."""

@@ -22,8 +22,8 @@ class GrainState(NamedTuple):
     charge: float  # [C]
 
 
-class UniformField(NamedTuple):
-    """A uniform, constant magnetic flux density [T]."""
+class UniformVector(NamedTuple):
+    """A uniform, constant flux density B [T], acceleration g [m/s²] or electric field E [V/m]."""
 
     x: float
     y: float
@@ -74,27 +74,11 @@ def field_in_time(time, grain, parameters):
     return (0.0, 0.0, 0.0), cross(grain.moment, b), -dot(grain.moment, b)
 
 
-class UniformGravity(NamedTuple):
-    """A uniform, constant acceleration g [m/s²]."""
-
-    x: float
-    y: float
-    z: float
-
-
 @formula
 def uniform_gravity(time, grain, parameters):
     """Force m g [N], no torque, energy −m g·x [J], 0 at the origin."""
     force = scale(grain.mass, (parameters.x, parameters.y, parameters.z))
     return force, (0.0, 0.0, 0.0), -dot(force, grain.position)
-
-
-class UniformElectric(NamedTuple):
-    """A uniform, constant electric field E [V/m]."""
-
-    x: float
-    y: float
-    z: float
 
 
 @formula

@@ -12,7 +12,7 @@ from ..basics.grains import Grains
 from ..basics.ramps import rampable
 from ..basics.settings import RAMP, Reading, Settings
 from ..basics.vectors import along_z, components
-from .external_formulas import UniformGravity, uniform_gravity
+from .external_formulas import UniformVector, uniform_gravity
 
 
 def _downwards(value: Any, name: str) -> tuple[float, float, float]:
@@ -54,9 +54,9 @@ class Gravity(Settings):
         """No warnings: every grain has a mass."""
         return []
 
-    def numbers(self) -> UniformGravity:
+    def numbers(self) -> UniformVector:
         """Parameters of the formula."""
-        return UniformGravity(*self.acceleration)
+        return UniformVector(*self.acceleration)
 
     def flux_density_size(self) -> float:
         """0: there is no magnetic field."""

@@ -16,7 +16,7 @@ from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, AlongZ, Direction, For, Number, Reading, Settings, Word
 from ..basics.units import si
 from ..numerics.vec import across, add, cross, dot, norm, scale, sub
-from .external_formulas import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
+from .external_formulas import FieldInTime, UniformVector, field_in_time, flux_density_at, uniform_field
 
 _WAVE = "oscillating", "rotating"
 _ALONG_Z = "one value along z or three components, in T, such as '1 mT'"
@@ -136,11 +136,11 @@ class Field(Settings):
         """Warnings: no grain has a moment."""
         return [] if grains.moment.any() else ["a field is switched on but no grain has a magnetic moment"]
 
-    def numbers(self) -> UniformField | FieldInTime:
+    def numbers(self) -> UniformVector | FieldInTime:
         """Parameters of `formula`."""
         b = self.flux_density
         if self.shape == "constant":
-            return UniformField(*b)
+            return UniformVector(*b)
         if self.shape == "ramp":
             return FieldInTime(b, _ZERO, _ZERO, sub(self.final, b), 0.0, 0.0, self.start, 1.0 / (self.end - self.start))
         cosine, sine = self._quadratures()

@@ -24,10 +24,8 @@ from ..basics.units import finite_number
 from ..basics.vectors import components, three
 from ..compiler.jit import compile_error, formula
 from .external_formulas import GrainState
-from .pair.cutoff import CutoffForce, cutoff_for
-from .pair.generic_loops import PairGrain, PairParameters, pair_sums
-from .pair.long_range_loops import LongRangeSums
-from .pair.pair_force import contact_energy, energy_at
+from .pair.generic_loops import PairGrain
+from .pair.pair_force import PairForce, energy_at
 from .registry import FORCES, column_of
 
 IMPORT = "import"
@@ -292,7 +290,7 @@ class OwnExternal(_Own):
         return 0.0
 
 
-class OwnPair(_Own, CutoffForce):
+class OwnPair(_Own, PairForce):
     """A pair force of the user; see `pair_force`."""
 
     def __init__(self, kind: OwnForce, values: dict[str, Any], cutoff: Any = "auto", cut: str = "smooth"):
@@ -303,28 +301,16 @@ class OwnPair(_Own, CutoffForce):
 
     def parameters(self) -> dict[str, Any]:
         """Import path, values in SI units and cut-off, as in a case file."""
-        return _Own.parameters(self) | CutoffForce.parameters(self)
+        return _Own.parameters(self) | PairForce.parameters(self)
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings as for all cut-offs.  Raises BadInput if the formula cannot be compiled."""
         self.kind.check(self.constants())
-        return CutoffForce.check(self, grains, box)
-
-    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
-        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
-        return pair_sums(self.formula, None, self.torques, listed)
-
-    def numbers(self, grains: Grains, box: Box) -> PairParameters:
-        """Parameters of the loops."""
-        return PairParameters(self.constants(), cutoff_for(self.choose(grains, box).radius, self.cut))
+        return PairForce.check(self, grains, box)
 
     def acts_on(self, grains: Grains) -> bool:
         """True: the formula decides."""
         return True
-
-    def energy_scale(self, grains: Grains) -> float:
-        """Largest |U| [J] of equal grains in contact, among those with extreme quantities."""
-        return contact_energy(self.formula, self.constants(), grains)
 
     def largest_energy(self, grains: Grains, distance: float) -> float:
         """Largest |U| [J] of two grains at a distance [m], without the cut-off."""

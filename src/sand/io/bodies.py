@@ -15,9 +15,9 @@ from ..basics.errors import BadInput, FilesFailed, did_you_mean
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
 from ..basics.paths import user_path
+from ..basics.schema import MODES
 from ..basics.units import format_quantity, si
 from .extended_xyz import xyz_text
-from .frame_chunks import MODES
 from .grain_files import FileBox, GrainData, GrainFile, is_gsd, open_grains
 from .run_folder import replace_file
 from .trajectory import Frames, TrajectoryWriter
@@ -42,6 +42,8 @@ class ReadGrains(NamedTuple):
 
 MASSES = 1e3
 """Largest factor between a mass in a file and that of a sphere of the material; beyond, its unit must be another."""
+Choice = tuple[Material | None, Mapping[str, Material], Material | None]
+"""Parameters of `read_grains`: material, materials, otherwise."""
 
 
 def read_grains(
@@ -82,22 +84,15 @@ def read_grains(
         If the file is missing or in no such format, has lines that are not numbers (the first ten are named), grains
         with impossible numbers, quantities without a unit, no radii or two, no such frame, or unknown materials.
     """
-    file = user_path(path)
+    file, choice = user_path(path), (material, materials, otherwise)
     if is_gsd(file) and (found := _read_own_gsd(file, frame)) is not None:
         data, contacts = found
-        return _in_si(path, data, radius, length, (material, materials, otherwise))._replace(contacts=contacts)
-    return read_frame(path, open_grains(path), material, radius, length, materials, otherwise, frame)
+        return _in_si(path, data, radius, length, choice)._replace(contacts=contacts)
+    return read_frame(path, open_grains(path), radius, length, choice, frame)
 
 
 def read_frame(
-    path: str | Path,
-    opened: GrainFile,
-    material: Material | None = None,
-    radius: Any = None,
-    length: str | None = None,
-    materials: Mapping[str, Material] = PRESETS,
-    otherwise: Material | None = None,
-    frame: int = -1,
+    path: str | Path, opened: GrainFile, radius: Any, length: str | None, choice: Choice, frame: int
 ) -> ReadGrains:
     """Read a frame of an open file of another program; parameters and errors as for `read_grains`."""
     if not -opened.frame_count <= frame < opened.frame_count:
@@ -109,14 +104,10 @@ def read_frame(
         raise BadInput(
             f"{path} ({opened.form}) does not state its unit of length; give it: length = '1 um', for example"
         )
-    return _in_si(path, data, radius, length, (material, materials, otherwise))
+    return _in_si(path, data, radius, length, choice)
 
 
-# parameters of `read_grains`: material, materials, otherwise
-_Choice = tuple[Material | None, Mapping[str, Material], Material | None]
-
-
-def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: _Choice) -> ReadGrains:
+def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: Choice) -> ReadGrains:
     """Grains and box in SI.  Raises BadInput."""
     if data.refused:
         raise BadInput(data.refused)
@@ -135,7 +126,7 @@ def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, c
     return ReadGrains(grains, box, centre, None, tuple(data.notes), data.time, data.step)
 
 
-def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: _Choice) -> Grains:
+def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: Choice) -> Grains:
     """Grains in SI.  Raises BadInput."""
     if data.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains: radius = '0.1 um', for example")

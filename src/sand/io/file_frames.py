@@ -102,7 +102,7 @@ class FileFrames(FrameSequence):
 
     def _read(self, number: int) -> Any:
         material, radius, length = self._given
-        return read_frame(self.path, self._opened, material, radius, length, _Known(), SILICA, number)
+        return read_frame(self.path, self._opened, radius, length, (material, _Known(), SILICA), number)
 
     def _frame(self, number: int) -> Frame:
         if self._kept is None or self._kept[0] != number:

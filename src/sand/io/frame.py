@@ -13,8 +13,9 @@ import numpy as np
 from ..basics.box import Box
 from ..basics.errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..basics.own_quantities import OwnQuantities
+from ..basics.schema import REST
 from ..basics.units import format_quantity
-from .frame_chunks import IDENTITY, IN_FULL, OWN, REST, code_of, crc32_of, material_name
+from .frame_chunks import IDENTITY, IN_FULL, OWN, code_of, crc32_of, material_name
 
 
 class Frame:
@@ -86,17 +87,8 @@ class Frame:
 
 
 OF_GRAINS = (
-    "position",
-    "velocity",
-    "spin",
-    "moment",
-    "orientation",
-    "radius",
-    "mass",
-    "charge",
-    "material",
-    "image",
-    REST,
+    *("position", "velocity", "spin", "moment", "orientation", "radius", "mass", "charge"),
+    *("material", "image", REST),
 )
 OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
 

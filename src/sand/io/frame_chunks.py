@@ -45,6 +45,7 @@ import numpy as np
 
 from ..basics.box import Box
 from ..basics.grains import Grains
+from ..basics.schema import MODES, REST
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
@@ -52,10 +53,6 @@ IDENTITY, LATE = "id", "late/"
 """Name of the identities of grains, and beginning of the names of chunks that the first frame lacks."""
 OWN = "own"
 """Name of the array with names and units of own quantities."""
-REST = "at_rest"
-"""Name of the array that says which grains belong to clusters at rest."""
-MODES = ("stretch", "slide", "roll", "twist")
-"""Columns of log/bonds/share."""
 IN_FULL = ("position", "radius", "velocity", "mass", "charge")
 """Quantities that trajectories have in single precision, and files of bodies also in double precision."""
 SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))

@@ -17,9 +17,9 @@ from ..basics.units import MELTED, format_quantity
 from ..contact.law import contact_constants, ringing_energy
 from ..contact.model import DAMPED_SPEED_GAIN, Contact
 from ..forces.base import Force
-from ..forces.gas import Gas
 from ..forces.pair.dipoles import Dipoles
 from ..theory.magnetic_limits import QUOTED_SIZES, MagneticLimits, contact_field, magnetic_limits
+from .truncation import given_temperature
 
 CREEP = 10.0
 """Elastic energy at the limit of a mode, in k_B T, below which thermal motion makes contacts creep."""
@@ -35,10 +35,8 @@ def bath_temperature(grains: Grains, forces: Sequence[Force], box: Box) -> float
     Velocities are taken as thermal in a box that is periodic on all axes: in open space they are those of bodies that
     collide. Above `MELTED` they are no temperature of a solid either, but follow from forces.
     """
-    given = [float(force.temperature) for force in forces if isinstance(force, Gas) and force.brownian]
-    given += [float(force.bath_temperature or 0.0) for force in _contacts(forces)]
-    if any(given):
-        return max(given)
+    if given := given_temperature(forces):
+        return given
     thermal = kinetic_temperature(grains) if all(side is not None for side in box.lengths) else 0.0
     return thermal if thermal <= MELTED else 0.0
 

@@ -128,7 +128,7 @@ def _fields(grains: Grains, forces: Sequence[Force]) -> str:
     return ""
 
 
-def torn_clusters(grains: Grains, contact: Contact, pairs: np.ndarray, box: Box) -> list[str]:
+def torn_clusters(grains: Grains, contact: Contact | None, pairs: np.ndarray, box: Box) -> list[str]:
     """A warning if a cluster at the start spins too fast for its contacts to hold it.
 
     Of the planes that contain axis and centre of mass, the one across the largest extent is looked at: the mass on one
@@ -139,7 +139,7 @@ def torn_clusters(grains: Grains, contact: Contact, pairs: np.ndarray, box: Box)
     pairs : ndarray
         Contacts at the start (C, 2).
     """
-    if not len(pairs):
+    if contact is None or not len(pairs):
         return []
     motion, mass = rigid_motion(grains, pairs, box), grains.mass
     spin, offset = np.linalg.norm(motion.spin, axis=0), motion.offset.T

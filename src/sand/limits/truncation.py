@@ -46,9 +46,14 @@ def truncation_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> li
 
 def motion_temperature(grains: Grains, forces: Sequence[Force]) -> float:
     """T [K] of a Brownian gas or of the bath of contacts, the higher one, else of the translation of the grains."""
+    return given_temperature(forces) or kinetic_temperature(grains)
+
+
+def given_temperature(forces: Sequence[Force]) -> float:
+    """Temperature [K] of a Brownian gas or of the bath of contacts, the higher one; 0 without any."""
     given = [float(force.temperature) for force in forces if isinstance(force, Gas) and force.brownian]
     given += [float(force.bath_temperature or 0.0) for force in forces if isinstance(force, Contact)]
-    return max(given) if any(given) else kinetic_temperature(grains)
+    return max(given, default=0.0)
 
 
 def _end(force: CutoffForce, grains: Grains, box: Box) -> float | None:

@@ -43,24 +43,22 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
             _draw_moments(middle, growth, rows, colour, guides)
             _draw_dimension(right, growth, rows, colour)
             _draw_temperatures(last, name, rows["temperatures"], size, colour)
-        for axes in (left, middle, right, last):
+        logarithmic = (left, middle, right, last)
+        for axes in logarithmic:
             axes.set(xscale="log", yscale="log")
-            for axis in (axes.xaxis, axes.yaxis):
-                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-                axis.set_major_formatter(lambda value, _: f"{value:g}")
-                axis.set_minor_formatter(NullFormatter())
+        degrees.set_xscale("log")
+        for axis in (degrees.xaxis, *(axes.xaxis for axes in logarithmic), *(axes.yaxis for axes in logarithmic)):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+            axis.set_major_formatter(lambda value, _: f"{value:g}")
+            axis.set_minor_formatter(NullFormatter())
         left.set(xlabel=f"time [{unit}]", ylabel="mean size $S$ [grains]")
-        degrees.set(xscale="log", xlabel="mean size $S$ [grains]", ylabel=r"local degree $\lambda = d\ln\dot S/d\ln S$")
-        degrees.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-        degrees.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        degrees.xaxis.set_minor_formatter(NullFormatter())
+        degrees.set(xlabel="mean size $S$ [grains]", ylabel=r"local degree $\lambda = d\ln\dot S/d\ln S$")
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
         last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
-        empty = "no aggregates"
         texts = {degrees: "$S$ grows too little", last: "all bodies are at rest"}
         for axes in (left, degrees, last, middle, right):
-            text = texts.get(axes, empty)
+            text = texts.get(axes, "no aggregates")
             if axes.get_legend_handles_labels()[0]:
                 legend_above(axes)
             else:

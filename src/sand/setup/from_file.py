@@ -191,11 +191,8 @@ def from_trajectory(path: str | Path, frame: int, materials: Mapping[str, Materi
 
     place = user_path(path)
     place = place / TRAJECTORY if place.is_dir() else place
-    frames = Frames(place)
-    try:
+    with contextlib.closing(Frames(place)) as frames:
         start = from_frame(frames[frame], materials)
-    finally:
-        frames.close()
     return start._replace(note=f"{place}, {start.note}")
 
 

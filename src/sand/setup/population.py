@@ -62,10 +62,6 @@ class Lognormal:
         most = median * math.exp(3.0 * sigma) if self.most is None else self.most
         _set(self, median=median, sigma=sigma, **_bounds(least, most))
 
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest radius [m]."""
-        return self.least, self.most
-
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Draw radii (count,) [m] by inversion. Raises BadInput."""
         from scipy.special import ndtr, ndtri
@@ -105,10 +101,6 @@ class PowerLaw:
         if abs(exponent + 1.0) > 100.0:
             raise BadInput(f"exponent of the radii = {self.exponent!r} must lie within ±100")
         _set(self, exponent=exponent, **_bounds(self.least, self.most))
-
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest radius [m]."""
-        return self.least, self.most
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Draw radii (count,) [m] by inversion."""

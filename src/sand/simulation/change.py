@@ -23,9 +23,6 @@ from ..basics.state import (
     CHECKED,
     COMPARED,
     CONTACTS,
-    CUT_CAPTURE,
-    CUT_RADIUS,
-    CUT_TEMPERATURE,
     FLIGHT,
     FORMING,
     KICKED,
@@ -38,6 +35,7 @@ from ..basics.state import (
     grains_from_arrays,
 )
 from ..basics.units import has_unit_within, si
+from ..components import components_of
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
@@ -45,6 +43,7 @@ from ..engine.component import Component, in_use
 from ..engine.engine import Engine
 from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
+from ..engine.measures import force_columns
 from ..forces.base import Force, LongRangeForce
 from ..forces.gas import Gas
 from ..integrate.step_control import INCREASE_INTERVAL
@@ -379,7 +378,7 @@ def changed_engine(
     engine: Engine,
     columns: Sequence[str],
     seed: int,
-    extra: Mapping[str, Component],
+    given: Mapping[str, Component],
 ) -> tuple[Engine, tuple[Force, ...], dict[str, Component]]:
     """The engine after a change, its forces and components; the engine before stays as it is.
 
@@ -391,8 +390,8 @@ def changed_engine(
         The engine before.
     columns : Sequence[str]
         Columns of the ledger, which are those of the start.
-    extra : Mapping[str, Component]
-        The components before.
+    given : Mapping[str, Component]
+        The components before that the user gave.
 
     Raises
     ------
@@ -400,23 +399,24 @@ def changed_engine(
         If something does not fit; all problems at once, as far as each can be found without the others.
     """
     errors, state = ErrorCollector(), engine.state
-    extra = {name: each.kept(change._kept) for name, each in extra.items()}
+    given = {name: each.kept(change._kept) for name, each in given.items()}
     forces = errors.take(change.checked_forces, present)
     grains = errors.take(change.checked_grains)
     if forces is not None and grains is not None:
         errors.take(change.refuse_overlaps, grains, forces)
     if grains is not None:
-        for each in in_use(extra):
+        for each in in_use(given):
             errors.problems += each.problems_of_motion(grains)
     errors.done()
     regroups = change.regroups
-    cutoff = None if change.box != state.box or state.cutoff[CUT_RADIUS] == 0.0 else state.cutoff.copy()
     arrays = {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
     same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
     forces = fitting_forces(forces, engine.stepping)
-    parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed)
-    new = build_engine(*parts, fresh=False, cutoff=cutoff, extra=in_use(extra))
-    without = [name for name in new.columns() if name not in columns]
+    extra = [*in_use(given), *components_of(forces, same, change.box)]
+    saved = {name: array for each in extra for name, array in each.saved_for_change(state, change.box).items()}
+    parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed, extra)
+    new = build_engine(*parts, fresh=False, saved=saved)
+    without = [name for name in force_columns(new) if name not in columns]
     if without:
         raise BadInput(
             f"forces: the ledger of this run has no column for {', '.join(without)}; give the force at the start, such "
@@ -425,7 +425,7 @@ def changed_engine(
     grains.arrays.material[...] = same.arrays.material  # materials are numbered anew
     rebuilt = regroups or any(len(set(shapes)) > 1 for shapes in _long_range_shapes(state, new.state))
     if rebuilt or change.box != state.box:
-        for each in in_use(extra):
+        for each in extra:
             errors.problems += each.problems_of_arrays()
         errors.done()
     if rebuilt:
@@ -434,14 +434,8 @@ def changed_engine(
         arrays = {name: array.copy() for name, array in state.to_arrays().items()}
         arrays |= {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
     count, clock = arrays["count"], arrays["clock"]
-    if cutoff is None and new.cutoff is not None:
-        arrays["cutoff"] = new.cutoff.values.copy()
-        if state.cutoff[CUT_TEMPERATURE] > 0.0:
-            arrays["cutoff"][CUT_TEMPERATURE] = state.cutoff[CUT_TEMPERATURE]
-    count[COMPARED] = engine.regular_state.count[COMPARED]
-    if new.cutoff is not None and (regroups or cutoff is None):
-        # chosen anew before the next step
-        arrays["cutoff"][CUT_CAPTURE], count[COMPARED] = 0.0, count[MADE] + count[BROKEN] + 1
+    for each in extra:
+        each.changed(arrays, regroups=regroups)
     # the next step is chosen anew, as after a start
     count[CHECKED] = count[STEP_INCREASES] = count[NEEDED] = count[STEPS] - INCREASE_INTERVAL
     clock[FLIGHT] = 0.0
@@ -451,7 +445,7 @@ def changed_engine(
     new.refresh_loads()
     if regroups:
         _as_initial(new.regular_state, int(arrays["count"][MADE]), float(arrays["lost"][FORMING]))
-    return new, forces, extra
+    return new, forces, given
 
 
 def _long_range_shapes(*states: State) -> list[tuple[tuple[int, ...], ...]]:

@@ -19,6 +19,7 @@ from ..basics.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 from ..contact.measure import ENERGIES
 from ..engine.component import Component
 from ..engine.engine import Engine
+from ..engine.measures import body_motion, contact_energies, force_energies, losses
 from ..io.ledger_table import TEMPERATURES
 
 KINETIC = "translation", "rotation"
@@ -112,9 +113,9 @@ class Ledger(LedgerColumns):
 
     def row_of(self, engine: Engine) -> dict[str, float]:
         """The row of the present state of an engine: energies, losses [J], momenta (SI), temperatures [K], counts."""
-        lost, bodies, state = engine.losses().tolist(), engine.body_motion(), engine.state
-        energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *engine.contact_energies()]
-        forces, own = engine.force_energies(), {name: v for each in self._extra for name, v in each.row(state).items()}
+        lost, bodies, state = losses(engine).tolist(), body_motion(engine), engine.state
+        energies = [*(math.fsum(each.tolist()) for each in kinetic_energies(state.grains)), *contact_energies(engine)]
+        forces, own = force_energies(engine), {name: v for each in self._extra for name, v in each.row(state).items()}
         further = [own[name] for name in self._further]
         row = dict.fromkeys(self.columns, 0.0)  # 0 for forces that a change left out
         row |= self.counts_of(engine) | dict(zip((*KINETIC, *ENERGIES, *LOSSES), (*energies, *lost), strict=True))

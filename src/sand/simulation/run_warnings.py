@@ -43,5 +43,5 @@ class RunWarnings:
         """Warn of what an engine has found."""
         while engine.warnings:
             self.show(engine.warnings.pop(0))
-        for about, text in extreme_warnings(engine.clock).items():
+        for about, text in extreme_warnings(engine.stored_state.clock).items():
             self.show(text, about)

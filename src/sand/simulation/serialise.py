@@ -30,7 +30,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
         Condition that ends the run.
     """
     of_grains = simulation.grains.materials  # first, in the order of their indices
-    extra = in_use(simulation._system.extra)
+    extra = in_use(simulation._system.given)
     materials = list({m.name: m for m in (*of_grains, *(m for each in extra for m in each.materials()))}.values())
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     if recipe["kind"] != "gas":  # a gas names the materials from which it is drawn

@@ -19,12 +19,13 @@ from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import CONTACTS, OUTSIDE, State
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
-from ..components import read_components
+from ..components import components_of, read_components
 from ..components.driven import Driven
 from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.component import Component, in_use
+from ..engine.measures import energies_at_grains, force_columns
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
@@ -74,7 +75,7 @@ class System:
     stepping: Integrator
     neighbours: Neighbours
     seed: int | None
-    extra: dict[str, Component]
+    given: dict[str, Component]
     next_id: int
 
 
@@ -167,20 +168,21 @@ class Simulation(ReadOnlySettings):
         driven: Any = (),
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        forces, extra, box = read_forces(forces), read_components(walls=walls, driven=driven), as_box(box)
+        forces, given, box = read_forces(forces), read_components(walls=walls, driven=driven), as_box(box)
         seed = None if seed is None else seed_given(seed, bits=63)
         self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         forces = fitting_forces(forces, integrator)
-        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), in_use(extra))
+        extra = [*in_use(given), *components_of(forces, grains, box)]
+        parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), extra)
         arrays, meta = ({}, {}) if restart is None else restart
         is_new = restart is None
-        self._engine = engine = build_engine(*parts, fresh=is_new, contacts=contacts, cutoff=arrays.get("cutoff"))
+        self._engine = engine = build_engine(*parts, fresh=is_new, contacts=contacts, saved=arrays)
         fitted = engine.stepping, engine.neighbours
-        self._system = System(grains.copy(), forces, box, *fitted, seed, extra, meta.get("next_id", len(grains)))
+        self._system = System(grains.copy(), forces, box, *fitted, seed, given, meta.get("next_id", len(grains)))
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
-        self.ledger = Ledger(engine.columns(), in_use(extra), awake=engine.state.at_rest is not None)
+        self.ledger = Ledger(force_columns(engine), in_use(given), awake=engine.state.at_rest is not None)
         self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
         self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None
@@ -270,20 +272,19 @@ class Simulation(ReadOnlySettings):
     def walls(self) -> tuple[WallState, ...]:
         """The walls at `time`: position, velocity, force, impulse, work, number of contacts."""
         self._begin()
-        return wall_states(self._system.extra["walls"].items, self.state)
+        return wall_states(self._system.given["walls"].items, self.state)
 
     @property
     def driven(self) -> tuple[Driven, ...]:
         """The grains with prescribed motion."""
-        return self._system.extra["driven"].items
+        return self._system.given["driven"].items
 
     @property
     @exclusive
     def choices(self) -> dict[str, str]:
         """Automatic choices with their reasons: boundary, cut-offs and neighbour search."""
-        follower = self._engine.cutoff
-        now = "" if follower is None else follower.present(self._engine.state)
-        present = {"dipoles cut-off now": now} if now else {}
+        engine = self._engine
+        present = {k: text for each in engine.components for k, text in each.present_choices(engine.state).items()}
         if self._origin.choices:
             return self._origin.choices | present
         choices = {"start": self.origin} if self.origin else {}
@@ -291,13 +292,11 @@ class Simulation(ReadOnlySettings):
         for force in self.forces:
             choose = getattr(force, "choose", None)
             if choose is not None:
-                if follower is not None and force is follower.force:
-                    radius, reason = follower.at_start
-                else:
-                    radius, reason = choose(self.start, self.box)
+                radius, reason = choose(self.start, self.box)
                 length = "none" if radius is None else format_quantity(radius, "m")
                 choices[f"{force.name} cut-off"] = f"{length} ({reason})"
-        return choices | {"neighbours": self._engine.search} | present
+        choices |= {name: text for each in engine.components for name, text in each.choices().items()}
+        return choices | {"neighbours": engine.search} | present
 
     @exclusive
     def loads(self) -> dict[str, Any]:
@@ -310,7 +309,7 @@ class Simulation(ReadOnlySettings):
         """
         self._begin()
         row = self._log_row()
-        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.columns()))
+        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *force_columns(self._engine)))
         return {
             "force": self.grains.force.copy(),
             "torque": self.grains.torque.copy(),
@@ -340,7 +339,8 @@ class Simulation(ReadOnlySettings):
         for side in range(2):
             np.add.at(elastic, contacts["pair"][:, side], half)
         energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
-        return {"flux_density": flux} | energies | self._engine.energies_at_grains()
+        shares = {name: share.copy() for name, share in energies_at_grains(self._engine).items()}
+        return {"flux_density": flux} | energies | shares
 
     @exclusive
     @checked
@@ -471,12 +471,12 @@ class Simulation(ReadOnlySettings):
             if self.writer:
                 self.writer.changed(self)
             return
-        fixed = int(self.seed or 0), system.extra
-        engine, forces, extra = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
+        fixed = int(self.seed or 0), system.given
+        engine, forces, given = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
         before = self._log_row()["total"]
         self._engine = engine
         start, box, next_id = self.grains.copy(), change.box, change._next_id
-        self._system = replace(system, start=start, forces=forces, box=box, extra=extra, next_id=next_id)
+        self._system = replace(system, start=start, forces=forces, box=box, given=given, next_id=next_id)
         for text in truncation_warnings(self.grains, forces, box):
             self._warnings.show(text, text.partition(",")[0])
         self._origin.choices = {}  # chosen anew
@@ -553,9 +553,8 @@ class Simulation(ReadOnlySettings):
 
         Contacts that vibrate, contacts that broke, and a cut-off of dipoles that half the box came to limit.
         """
-        follower = self._engine.cutoff
-        limited = "" if follower is None else follower.note(self.state)
-        return [*self._notes(self.ledger.rows).values(), *([limited] if limited else [])]
+        found = [text for each in self._engine.components for text in each.notes(self.state)]
+        return [*self._notes(self.ledger.rows).values(), *found]
 
     @property
     def warnings(self) -> list[str]:

@@ -105,7 +105,7 @@ class UpdateSchedule:
         """Find the next moment of updaters after the present regular state: a function of this state alone."""
         engine = self._simulation._engine
         for k in which:
-            self._schedules[k] = Schedule(self._updaters[k][1], engine.regular_time, engine.steps)
+            self._schedules[k] = Schedule(self._updaters[k][1], engine.stored_state.time, engine.steps)
         self.is_near = False
 
     @property
@@ -132,7 +132,7 @@ class UpdateSchedule:
             If an updater returns something other than True, False or None.
         """
         engine = self._simulation._engine
-        due = [k for k, each in enumerate(self._schedules) if each.is_due(engine.regular_time, engine.steps)]
+        due = [k for k, each in enumerate(self._schedules) if each.is_due(engine.stored_state.time, engine.steps)]
         return self._call(due)
 
     def act_again(self) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..basics.errors import BadInput
-from ..io.frame_chunks import REST
+from ..basics.schema import REST
 from ..io.run_folder import plain
 
 MAGIC = b"SANDPKT1"

@@ -57,7 +57,7 @@ def test_error_of_the_local_degree():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("grains", [50, 1000, np.inf])
+@pytest.mark.parametrize("grains", [pytest.param(50, marks=pytest.mark.validate), 1000, np.inf])
 def test_constant_kernel(grains):
     """dS/dt = (1 − S/N)/τ, S = N − (N − 1)e^(−t/Nτ) is exact in the mean of any number of boxes: λ = 0, z = 1.
 
@@ -75,7 +75,7 @@ def test_constant_kernel(grains):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("z", [0.8, 2.0, 3.33])
+@pytest.mark.parametrize("z", [0.8, pytest.param(2.0, marks=pytest.mark.validate), 3.33])
 def test_each_kernel_recovers_its_own_degree(z):
     """S of a separate solution with a finer grid, S from 2 to 12 and from 2 to 60: the degree within 0.01.
 

@@ -15,7 +15,8 @@ def test_default_figures(run_in_field, tmp_path, capsys):
     assert main(["plot", str(run_in_field), "--json"]) == 0
     message = json.loads(capsys.readouterr().out)["files"]
     assert message == [str(run_in_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]
-    assert Image.open(run_in_field / "plots" / "still.png").size == (1600, 1000)
+    still = Image.open(run_in_field / "plots" / "still.png")
+    assert still.size == (1600, 1000) and still.info["dpi"] == pytest.approx((160, 160), rel=0.0, abs=0.0128)
     assert main(["plot", str(run_in_field)]) == 2
     assert capsys.readouterr().err.count("exists; give another --out, or --overwrite") == 1
     assert main(["plot", str(run_in_field), "--overwrite", "--what", "size"]) == 0
@@ -39,7 +40,6 @@ def test_chosen_figures_and_formats(run_in_field, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "pixels"),
     [
-        ("", (1600, 1000)),
         ("--dpi 600 --size 1x0.5in", (600, 300)),
         ("--dpi 300 --size 5.08x2.54cm", (600, 300)),
         ("--dpi 300 --size 50.8x25.4mm", (600, 300)),
@@ -53,7 +53,7 @@ def test_pixels_of_a_still(run_in_field, tmp_path, words, pixels):
     """
     assert main(["plot", str(run_in_field), "--what", "still", "--out", str(tmp_path / "there"), *words.split()]) == 0
     picture = Image.open(tmp_path / "there" / "still.png")
-    dpi = int(words.split()[1]) if words else 160
+    dpi = int(words.split()[1])
     assert picture.size == pixels
     assert picture.info["dpi"] == pytest.approx((dpi, dpi), rel=0.0, abs=0.0128)
 

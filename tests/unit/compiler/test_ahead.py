@@ -1,7 +1,6 @@
 """Stages that a program lacks are compiled side by side: recipes, helper processes, their end, and the progress."""
 
 import json
-import math
 import os
 import signal
 import subprocess
@@ -55,7 +54,7 @@ PROGRAMS = {
 def stages_of(forces, settings):
     simulation = sand.Simulation(GRAINS, forces, seed=1, **settings)
     engine = simulation._engine
-    found = engine.stages(engine._call_table(math.inf, 1, False)[0])
+    found = engine.stages(engine.table_for_call())
     return [each for each in found if isinstance(each[1], Stage)]
 
 
@@ -172,7 +171,7 @@ simulation = sand.Simulation(
     sand.Grains(np.array([[0.0, 0.0, 0.0], [1e-6, 0.0, 0.0]]), 1e-8, sand.IRON), [sand.Contact()]
 )
 engine = simulation._engine
-table = engine._call_table(1.0, 1, False)[0]
+table = engine.table_for_call()
 stages = [(table, each, ()) for each in (remove_broken, gather_stage(False), set_contact_step)]
 ahead.WORTH_HELPERS, ahead.LONGEST_WAIT = 0.0, 60.0
 if "alone" in sys.argv:

@@ -512,7 +512,7 @@ for threads in (1, 2):
     sim.run(steps=20)
     names = "position", "velocity", "spin", "force", "torque"
     found |= {f"{name} {threads}": getattr(sim.state.grains.arrays, name) for name in names}
-    found[f"workers {threads}"] = len(sim._engine._workers._inboxes)
+    found[f"workers {threads}"] = len(sim._engine.workers._inboxes)
     found[f"contacts {threads}"] = len(sim.contacts["pair"])
 np.savez(sys.argv[1], **found)
 """

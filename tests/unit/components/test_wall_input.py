@@ -5,8 +5,8 @@ import pytest
 import sand
 from sand.components.walls import Walls
 from sand.config.case import check_case
-from sand.engine.component import Setup, check
-from sand.engine.kinds import ForcesByType
+from sand.engine.component import Setup
+from sand.engine.step_parameters import ForcesByType
 
 from ...plugins import ForestRuth
 
@@ -28,9 +28,10 @@ FLOOR = sand.Wall([0, 0, 0], [0, 0, 1], "silica", name="floor")
 def test_walls_must_fit_the_simulation(wall, options, message):
     """One line that says what to do."""
     given = {"contact": sand.Contact(), "box": sand.Box(), "stepping": sand.Verlet()} | options
-    with pytest.raises(sand.BadInput, match=message):
-        forces = ForcesByType(given["contact"], [], [], [])
-        check([Walls([wall])], Setup(ONE, forces, given["box"], given["stepping"], sand.Neighbours(), True))
+    forces = ForcesByType(given["contact"], [], [], [])
+    setup = Setup(ONE, forces, given["box"], given["stepping"], sand.Neighbours(), True)
+    (problem,) = Walls([wall]).problems(setup)
+    assert message in problem
 
 
 def test_names_and_types_of_walls():

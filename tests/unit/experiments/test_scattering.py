@@ -167,7 +167,7 @@ def test_the_command(tmp_path, capsys):
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     assert main(["scatter", str(case), "--out", str(out)]) == 2
     assert "sand resume" in capsys.readouterr().err
-    assert main(["scatter", str(case), "--out", str(out), "--resume", "--workers", "2"]) == 0
+    assert main(["scatter", str(case), "--out", str(out), "--resume"]) == 0
     assert "sigma = " in capsys.readouterr().out
     for name in ("flights.csv", "results.csv", "figure.png"):
         assert (out / name).read_bytes() == before[name]

@@ -53,6 +53,14 @@ def error_of(folder, arrays, meta=META):
     return message
 
 
+def refusal_of(arrays):
+    """The error message for these arrays, without a file."""
+    with pytest.raises(sand.BadInput) as error:
+        check_state(arrays, META | {"version": VERSION})
+    (message,) = error.value.problems
+    return message
+
+
 def test_the_reference_state_is_valid():
     """The reference checkpoint has no errors."""
     check_state(*read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz"))))
@@ -85,7 +93,7 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
     if name in ("contacts/every_step", "pair_list/in_contact", "bodies/asleep"):
         changed["neither"] = np.full_like(good, 2)
     for what, array in changed.items():
-        message = error_of(tmp_path, {**WITH_ORDER, name: array})
+        message = refusal_of({**WITH_ORDER, name: array})
         sizing = what == "shape" and name in (
             "grains/radius",
             "contacts/pair",
@@ -96,7 +104,9 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
         assert sizing or f"'{name}'" in message, (what, message)
     if STORED[name].required:
         without = {other: array for other, array in WITH_ORDER.items() if other != name}
-        assert re.search(f"there is no array '{name}'", error_of(tmp_path, without))
+        assert re.search(f"there is no array '{name}'", refusal_of(without))
+    message = error_of(tmp_path, {**WITH_ORDER, name: changed["axis"]})
+    assert f"'{name}'" in message
 
 
 def changed_entry(name, index, value):

@@ -40,13 +40,10 @@ def test_figures_need_no_backend(backend, tmp_path, monkeypatch):
 def test_help_and_case_files_without_docstrings(tmp_path, monkeypatch):
     """`python -OO` strips docstrings; helps, and meanings and units of the keys of a case file, stay the same."""
     monkeypatch.chdir(tmp_path)
-    for words in (["--help"], ["run", "--help"], ["new", "case", "--overwrite", "--json"]):
-        plain, stripped = (python(*how, "-m", "sand.cli.main", *words) for how in ((), ("-OO",)))
-        assert stripped == plain and plain
-        if "new" in words:
-            without = (tmp_path / "case.toml").read_text("utf-8")
-            python("-m", "sand.cli.main", *words)
-            assert (tmp_path / "case.toml").read_text("utf-8") == without
+    words = ["--help"], ["run", "--help"], ["new", "case", "--overwrite", "--json"]
+    script = f"from sand.cli.main import main\nfor words in {words}:\n    if main(words):\n        raise SystemExit(1)"
+    found = [(python(*how, "-c", script), (tmp_path / "case.toml").read_text("utf-8")) for how in ((), ("-OO",))]
+    assert found[0] == found[1] and "Usage: " in found[0][0] and "case.toml" in found[0][0]
 
 
 KEPT = """

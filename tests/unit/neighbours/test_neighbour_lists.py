@@ -35,7 +35,7 @@ def rows(position, box, reach):
 
 
 @pytest.mark.compiled("small")
-@settings(max_examples=60, deadline=None)
+@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(1, 250),

@@ -14,7 +14,7 @@ from sand.basics.state import (
     SQUARED_SPEED,
     SQUARED_SPIN,
 )
-from sand.engine import engine
+from sand.engine import compiled_state
 from sand.integrate import task_queue
 from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.skin import largest_displacement, largest_squared_speeds
@@ -64,7 +64,7 @@ def test_displacements_stay_within_the_skin(monkeypatch, blocks):
 
     Also with loops in blocks for threads.
     """
-    for module in (task_queue, engine):
+    for module in (task_queue, compiled_state):
         monkeypatch.setattr(module, "uses_task_queue", lambda grains: blocks)
     sim = dense_gas(margin="5 nm")
     limits = {

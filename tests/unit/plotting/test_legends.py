@@ -2,6 +2,7 @@
 
 import importlib.util
 import io
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
@@ -66,7 +67,8 @@ def history(name):
     return history_figure(ledger_of(rows_with_all_losses(), ("field", "gravity")), name, 8, 100.0)
 
 
-def growth(guides=True):
+@cache
+def ensembles_of_growth():
     ensembles = []
     for name, z in (("magnetic, with a long name", 3.2), ("plain", 2.0)):
         boxes = [synthetic_box(z, 0.63, 1.4, seed) for seed in range(4)]
@@ -74,7 +76,11 @@ def growth(guides=True):
         temperatures = np.column_stack([np.linspace(1e-6, 1e-5, 5), np.full((5, 3), 100.0)])
         rows = all_aggregates(boxes) | units | {"temperatures": temperatures}
         ensembles.append((name, growth_of(boxes, (2.0, 100.0)), rows))
-    return growth_figure(ensembles, guides)
+    return ensembles
+
+
+def growth(guides=True):
+    return growth_figure(ensembles_of_growth(), guides)
 
 
 def sections():

@@ -321,7 +321,8 @@ def timed(sim, pieces, outputs=(), writer=True):
     state, engine, now = type("State", (), {"count": np.zeros(40, np.int64)})(), sim._engine, [0.0]
 
     class Engine:
-        steps, awake_work, _state, parameters, long_range = 0, (0, 0, 0.0), state, engine.parameters, engine.long_range
+        steps, awake_work, stored_state = 0, (0, 0, 0.0), state
+        parameters, long_range = engine.parameters, engine.long_range
 
     class Counted:
         _engine, _clock, start = Engine(), sim._clock, sim.start

@@ -5,8 +5,8 @@ import pytest
 
 import sand
 from sand.basics.box import Box
+from sand.basics.schema import MODES
 from sand.engine.changed_state import joined, subset
-from sand.io.frame_chunks import MODES
 from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import TrajectoryWriter, read_frames
 from sand.viewer.by_identity import ByIdentity

@@ -19,14 +19,15 @@ from ...contact.law import ContactLaw, Pairing, contact_constants
 from ...contact.model import Contact
 from ...forces.base import Force
 from ...forces.pair.ewald_force import EwaldForce
-from ...integrate.parts import ContactParameters, StepParameters
+from ...integrate.parts import ContactParameters
 from ...integrate.rigid.body_friction import LARGEST_DEVIATE
 from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
 from ...neighbours.search import Neighbours
 from ..engine import Engine
-from ..kinds import Build, ForcesByType, Kind
+from ..kinds import Build, Kind
 from ..part import Part
+from ..step_parameters import ForceDependent, ForcesByType
 from .body_steps import PERIODS, BodySteps
 from .quick_bodies import QuickBodies
 
@@ -87,7 +88,7 @@ class BodiesKind(Kind):
         """The forces but a gas: friction and noise of bodies are exact; see `flight_limits`."""
         return forces._replace(gas=[])
 
-    def flight_limits(self, parameters: StepParameters, forces: ForcesByType, grains: Grains) -> RigidLimits:
+    def flight_limits(self, parameters: ForceDependent, forces: ForcesByType, grains: Grains) -> RigidLimits:
         """Limits of the steps of bodies that depend on grains, contacts and gas.
 
         In a gas a step is at most η τ, with the shortest stopping time τ of a grain, which no mode of a body falls
@@ -129,9 +130,8 @@ class BodiesKind(Kind):
         inner = build(near, Neighbours("all pairs", order="as given"))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
-        of_quick = inner.changed(
-            parameters=own, warnings=engine.warnings, stepper=BodySteps(Part(inner, CONTACT_STEPS))
-        )
+        steps = BodySteps(Part(inner, CONTACT_STEPS))
+        of_quick = dataclasses.replace(inner, parameters=own, warnings=engine.warnings, stepper=steps)
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
         engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), quick)
 

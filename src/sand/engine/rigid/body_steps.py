@@ -49,6 +49,7 @@ from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
 from ...integrate.stages import finish_gas
 from ..engine import Engine, GrainSteps
+from ..measures import external_energy
 from ..part import MOVING, Part
 from .cluster_bodies import (
     body_number,
@@ -111,22 +112,19 @@ class BodySteps(GrainSteps):
         """As `GrainSteps.for_part`, without substeps."""
         return BodySteps(self.part.anew())
 
-    def drivers(self) -> list[tuple[Stage, Any]]:
-        """Stages of bodies; those of awake grains are the ones of all grains with other loops over pairs."""
-        quick = [] if self.quick is None else self.quick.drivers()
-        return [*super().drivers(), (advance_bodies, ()), (mark_near_bodies, ()), *quick]
-
-    def stages_within(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
-        """Stages of awake clusters."""
-        inner = self.part.engine
+    def stages(self, engine: Engine, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
+        """Stages of bodies and of awake clusters; those are the ones of all grains with other loops over pairs."""
+        inner, quick = self.part.engine, [] if self.quick is None else self.quick.stages()
+        of_bodies = (advance_bodies, ()), (mark_near_bodies, ()), (store_rest, ()), *quick
         own: list[tuple[Stage, Any]] = [
             (measure_clusters_stage(inner.law), cluster_measures(1)),
             (kick_clusters, (self._remainder,)),
             (resort_contacts_by_grain, ()),
         ]
         own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
-        of_inner = inner.first_table()
-        return [(table, store_rest, ()), *inner.stages(of_inner), *((of_inner, *each) for each in own)]
+        of_inner = inner.table_for_call()
+        found = [*super().stages(engine, table), *((table, *each) for each in of_bodies)]
+        return [*found, *inner.stages(of_inner), *((of_inner, *each) for each in own)]
 
     def begin(self, engine: Engine) -> None:
         """Make a body of each grain without contacts; clusters are awake."""
@@ -265,7 +263,7 @@ class BodySteps(GrainSteps):
         if engine.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in engine.external:
-                state.lost[OUTSIDE] += inner.external_energy(outer, end) - inner.external_energy(outer, before)
+                state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
         present.count[STAGE] = 1
         present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
         inner.drive(-math.inf, 1)

@@ -13,6 +13,7 @@ from ...compiler.stage import Stage
 from ...integrate.parts import Stop
 from ...integrate.rigid.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
 from ..engine import Engine
+from ..measures import external_energy
 from ..part import Part
 from .cluster_bodies import contacts_of, sort_members
 
@@ -36,7 +37,7 @@ class QuickBodies:
 
     part: Part
 
-    def drivers(self) -> list[tuple[Stage, Any]]:
+    def stages(self) -> list[tuple[Stage, Any]]:
         """Stages of substeps, with their parameters."""
         vectors = np.zeros((3, 1))
         plain = [(each, ()) for each in (kick_by_slow_loads, place_all_velocities)]
@@ -115,7 +116,7 @@ class QuickBodies:
             # the drift of all other bodies will book the change of these energies once more
             part, end = self.part.engine, state.time + float(state.clock[STEP])
             for outer in engine.external:
-                state.lost[OUTSIDE] += part.external_energy(outer, end) - part.external_energy(outer, state.time)
+                state.lost[OUTSIDE] += external_energy(part, outer, end) - external_energy(part, outer, state.time)
         self.part.give_back(state)
         bodies.quick[index] = 1
         bodies.excluded_force[:, index] = own.grains.arrays.force - own.bodies.excluded_force

@@ -10,11 +10,9 @@ from pydantic import Field
 from ...basics.errors import BadInput, ErrorCollector
 from ...basics.material import PRESETS
 from ...basics.settings import For, Number, Whole
-from ...config.case import MaterialSection, material_errors, with_absolute_files
-from ...config.commands import refuse_other_command
+from ...config.case import MaterialSection, material_errors, read_content
 from ...config.key_errors import validate
 from ...config.sections import PathName, Section, Seed, with_keys
-from ...io.run_folder import read_toml
 from ..collision_case import BodyKind, BodySection
 from .encounters import Flight
 from .problem import flight, impact_parameter
@@ -125,8 +123,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     BadInput
         All errors of the file, one line each, with their keys.
     """
-    content = with_absolute_files(read_toml(path), path)
-    refuse_other_command(content, path, "scatter")
+    content = read_content(path, "scatter")
     problems = material_errors(content, ("target", "projectile"), "silica")
     case = validate(ScatterCase, content, str(path), problems)
     try:

@@ -41,7 +41,7 @@ class PairForce(CutoffForce):
 
     def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
-        return pair_sums(type(self).formula, type(self).rate, self.torques, listed)
+        return pair_sums(self.formula, self.rate, self.torques, listed)
 
     def numbers(self, grains: Grains, box: Box) -> Any:
         """Parameters of the loops."""
@@ -53,11 +53,11 @@ class PairForce(CutoffForce):
 
     def largest_energy(self, grains: Grains, distance: float) -> float:
         """Largest |U| [J] of two grains at a distance [m], without the cut-off."""
-        return max(energy_at(type(f).formula, f.constants(), grains, distance) for f in forces_at_points(self))
+        return max(energy_at(f.formula, f.constants(), grains, distance) for f in forces_at_points(self))
 
     def energy_scale(self, grains: Grains) -> float:
         """Largest |U| [J] of a grain in contact with an equal one, among those with extreme quantities."""
-        return contact_energy(type(self).formula, self.constants(), grains)
+        return contact_energy(self.formula, self.constants(), grains)
 
 
 def contact_energy(pair_formula: Callable, constants: Any, grains: Grains) -> float:

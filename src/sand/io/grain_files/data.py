@@ -53,19 +53,8 @@ UNITS = {
 DERIVED = frozenset(
     (
         *("id", "type", "types", "species", "symbol", "symbols", "element", "elements", "numbers", "index", "particle"),
-        *(
-            "mol",
-            "cluster",
-            "c_cluster",
-            "cluster_id",
-            "tags",
-            "orientation",
-            "orientations",
-            "quaternion",
-            "images",
-            "image",
-            "v_time",
-        ),
+        *("mol", "cluster", "c_cluster", "cluster_id", "tags", "orientation", "orientations", "quaternion"),
+        *("images", "image", "v_time"),
         *("force", "forces", "torque", "torques", "field", "fields", "energy", "stress"),
         *("fx", "fy", "fz", "tqx", "tqy", "tqz", "ix", "iy", "iz"),
     )

@@ -268,7 +268,7 @@ class StepTimer:
         """Steps, time [s], contact steps, substeps and the time [s] of both; number of contacts."""
         engine = self._simulation._engine
         counted = (engine.steps, self._clock(), *engine.awake_work)
-        return counted, int(engine._state.count[CONTACTS])
+        return counted, int(engine.stored_state.count[CONTACTS])
 
     def _add(self, before: tuple[float, ...], contacts: int, after: tuple[float, ...], contacts_after: int) -> None:
         steps, seconds, awake_steps, substeps, awake = map(sub, after, before)

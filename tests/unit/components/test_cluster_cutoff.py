@@ -10,17 +10,34 @@ import sand
 from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.basics.state import CONTACTS, CUT_RADIUS
 from sand.basics.temperature import kinetic_temperature
-from sand.engine.cluster_cutoff import follow_clusters
+from sand.components.cluster_cutoff import ClusterCutoff
+from sand.engine.component import Setup
+from sand.engine.step_parameters import forces_by_type
 from sand.forces.pair.dipoles import capturing_pair
 
 BOX = sand.Box.periodic("20 um")
-NO_PAIRS = np.zeros((0, 2), np.int64)
 
 
 def gas(number=6, kelvin="100 K"):
     return sand.setup.gas(
         number, BOX, radius="10 nm", material="iron", moment="200 A m^2/kg", temperature=kelvin, seed=2
     )
+
+
+def follow(grains, box=BOX, saved=None):
+    """The cut-off that follows the clusters of grains without contacts, from a start or a checkpoint."""
+    forces = [sand.Dipoles()]
+    follower, by_type = ClusterCutoff.of(forces, grains, box), forces_by_type(forces, grains)
+    arrays = {} if saved is None else {"cutoff": saved}
+    setup = Setup(grains, by_type, box, sand.Verlet(), sand.Neighbours(), saved is None, arrays)
+    (force,) = follower.at_start(by_type, setup).long_range
+    assert force.cutoff == follower.values[CUT_RADIUS]
+    return follower
+
+
+def now(follower, state):
+    """The text of the present cut-off."""
+    return "".join(follower.present_choices(state).values())
 
 
 def state_of(grains, pairs, cutoff, time=0.0):
@@ -68,19 +85,19 @@ def test_a_new_choice_needs_growth_by_a_tenth_and_never_shortens():
     """Of two pairs: (2·1)^(1/3), then (2·2)^(1/3); the same contacts again and fewer contacts change nothing."""
     grains = gas()
     grains.arrays.moment[...] = grains.arrays.moment[:, :1]  # parallel
-    follower = follow_clusters([sand.Dipoles()], grains, BOX, NO_PAIRS, None, None)
+    follower = follow(grains)
     state, start = state_of(grains, [], follower.values.copy()), follower.values[CUT_RADIUS]
-    assert follower.update(state) is None and follower.present(state) == ""
+    assert follower.choose_anew(state) is None and now(follower, state) == ""
     state = state_of(grains, [(0, 1)], state.cutoff, 1e-9)
-    assert follower.update(state) == pytest.approx(start * 2.0 ** (1.0 / 3.0), rel=1e-12, abs=0.0)
+    assert follower.choose_anew(state) == pytest.approx(start * 2.0 ** (1.0 / 3.0), rel=1e-12, abs=0.0)
     state = state_of(grains, [(0, 1), (2, 4)], state.cutoff, 2e-9)
-    assert follower.update(state) == pytest.approx(start * 4.0 ** (1.0 / 3.0), rel=1e-12, abs=0.0)
-    assert follower.update(state) is None
-    assert "since 2 ns" in follower.present(state) and "clusters of 2 and 2 grains" in follower.present(state)
+    assert follower.choose_anew(state) == pytest.approx(start * 4.0 ** (1.0 / 3.0), rel=1e-12, abs=0.0)
+    assert follower.choose_anew(state) is None
+    assert "since 2 ns" in now(follower, state) and "clusters of 2 and 2 grains" in now(follower, state)
     kept = state.cutoff.copy()
     grains.arrays.moment[:, 0] *= 1.3  # 2.3·2 in place of 2·2: b_max grows by 5 %
-    assert follower.update(state) is None
-    assert follower.update(state_of(grains, [], state.cutoff, 3e-9)) is None
+    assert follower.choose_anew(state) is None
+    assert follower.choose_anew(state_of(grains, [], state.cutoff, 3e-9)) is None
     assert (state.cutoff == kept).all()
 
 
@@ -90,30 +107,32 @@ def test_half_the_box_limits_the_choice_and_the_note_is_kept():
     grains.arrays.moment[...] = grains.arrays.moment[:, :1]
     start = sand.Dipoles().choose(grains, BOX).radius
     box = sand.Box.periodic(2.7 * 1.1 * start)
-    follower = follow_clusters([sand.Dipoles()], grains, box, NO_PAIRS, None, None)
+    follower = follow(grains, box)
     state = state_of(grains, [(0, 1)], follower.values.copy(), 1e-9)
-    assert follower.note(state) == ""
-    assert follower.update(state) == pytest.approx(1.1 * start, rel=1e-12, abs=0.0)
-    assert "from 1 ns on half the box / 1.35" in follower.note(state) == follower.message(state, start)
+    assert follower.notes(state) == []
+    assert follower.choose_anew(state) == pytest.approx(1.1 * start, rel=1e-12, abs=0.0)
+    assert "from 1 ns on half the box / 1.35" in follower.message(state, start)
+    assert follower.notes(state) == [follower.message(state, start)]
     state = state_of(grains, [(0, 1), (1, 2), (2, 3)], state.cutoff, 2e-9)
-    assert follower.update(state) is None
-    assert "from 1 ns on" in follower.note(state) and "cluster of 4 grains and a single grain" in follower.note(state)
+    assert follower.choose_anew(state) is None
+    (note,) = follower.notes(state)
+    assert "from 1 ns on" in note and "cluster of 4 grains and a single grain" in note
 
 
 def test_which_cutoffs_follow():
     """Only the automatic one with nearest images in a periodic box."""
     grains = gas()
     for force in (sand.Dipoles("1 um"), sand.Dipoles(None), sand.Dipoles(periodic="ewald")):
-        assert follow_clusters([force], grains, BOX, NO_PAIRS, None, None) is None
-    assert follow_clusters([sand.Dipoles()], grains, sand.Box.open(), NO_PAIRS, None, None) is None
+        assert not ClusterCutoff.of([force], grains, BOX).items
+    assert not ClusterCutoff.of([sand.Dipoles()], grains, sand.Box.open()).items
 
 
 def test_a_checkpoint_whose_cutoff_does_not_fit_the_box_is_refused():
     """A radius of 0 or above (L/2)/1.35."""
     grains = gas()
-    values = follow_clusters([sand.Dipoles()], grains, BOX, NO_PAIRS, None, None).values
+    values = follow(grains).values
     for radius in (0.0, 8e-6):
         wrong = values.copy()
         wrong[CUT_RADIUS] = radius
         with pytest.raises(sand.BadInput, match=r"cut-off of the dipoles in the checkpoint is .* at most 7.407 um"):
-            follow_clusters([sand.Dipoles()], grains, BOX, NO_PAIRS, None, wrong)
+            follow(grains, saved=wrong)
