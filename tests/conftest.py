@@ -38,8 +38,7 @@ from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E4
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# numba and the collected tests are millions of objects that stay: looking through them often costs a tenth of a run
-gc.set_threshold(20_000, 10, 10)
+gc.set_threshold(20_000, 10, 10)  # looking for garbage often costs a tenth of a run
 
 TESTS = Path(__file__).parent
 FOLDERS = ("browser", "peers")
@@ -143,7 +142,7 @@ class CompilationGuard(Listener):
     """Fails a test without the mark `compiled` that compiles a kernel, or makes the stages of a simulation."""
 
     def __init__(self) -> None:
-        self.allowed = True
+        self.allowed, self.has_compiled = True, False
 
     def on_start(self, event: Event) -> None:
         """Called by numba before it compiles a function."""
@@ -153,6 +152,7 @@ class CompilationGuard(Listener):
 
     def on_end(self, event: Event) -> None:
         """Called by numba after it compiled a function."""
+        self.has_compiled = True
 
 
 ADVICE = "mark it with pytest.mark.compiled(group), or as a long check (see tests/specs.py)"
@@ -165,7 +165,16 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     guard.allowed = _tier(item) is not None or bool(DISABLE_JIT) or item.get_closest_marker("compiled") is not None
     result = yield
     guard.allowed = True
+    if guard.has_compiled:  # what the compiler leaves stays to the end
+        gc.freeze()
+        guard.has_compiled = False
     return result
+
+
+def pytest_collection_finish() -> None:
+    """The collected tests and all modules, millions of objects, stay: the search for garbage passes over them."""
+    gc.collect()
+    gc.freeze()
 
 
 # ---- the last line -----------------------------------------------------------------------------------

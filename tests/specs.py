@@ -13,7 +13,7 @@ SPECS = ("contacts", "dipoles", "listed", "fields", "flights", "threads", "scatt
 blocks shared by threads; two-body scattering; anything that compiles in a second or two."""
 WORKERS = {"flights": "trajectories", "scattering": "trajectories"}
 """Groups that share a worker, because tests compare one with the other."""
-STARTS = ("dipoles", "contacts", "trajectories", "fields", "listed", "threads", "small", "sources")
+STARTS = ("dipoles", "contacts", "small", "trajectories", "listed", "fields", "threads", "sources")
 """The groups in the order in which workers start them, the longest first; the last one parses all files once."""
 FIXTURES = {"finished_run": "fields", "run_in_field": "fields"}
 """Fixtures that run a simulation, and the group of its stages."""

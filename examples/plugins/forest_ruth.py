@@ -32,12 +32,13 @@ from sand.basics.arguments import checked
 from sand.basics.settings import Number, Table
 from sand.basics.state import FLIGHT, LONG_RANGE_SUMS, NEEDED, REJECTED, STEPS, TIME
 from sand.compiler.jit import caller, formula, loop, rare
-from sand.compiler.program import call_stage, has_stage
+from sand.compiler.program import call_stage
 from sand.compiler.stage import stage
 from sand.forces.external_formulas import stiffness_of_field
 from sand.integrate.flight import finish_flight_step, refresh_verlet_list, sum_free_loads
 from sand.integrate.force_calls import sum_external
 from sand.integrate.force_stages import ENERGY, POWER
+from sand.integrate.hooks import Hook, call_hook
 from sand.integrate.integrator import IntegratorSettings, register
 from sand.integrate.motion import kick
 from sand.integrate.parts import DRIVER_PARTS, Stop
@@ -413,8 +414,7 @@ def symplectic_flight(s):
         sums = s.count[LONG_RANGE_SUMS]
         sum_free_loads(s, s.clock[TIME])
         s.count[LONG_RANGE_SUMS] = sums
-    if has_stage(s, StageNumber.GAS_KICK):
-        call_stage(s, StageNumber.GAS_KICK)
+    call_hook(s, Hook.BETWEEN_CYCLES)
     return Stop.NONE.value
 
 

@@ -117,7 +117,7 @@ FAULTS = (
           "ENERGY) - before + work", "ENERGY) - before - work",
           "examples/test_forest_ruth.py::test_work_of_an_oscillating_and_of_a_ramped_field"),
     Fault("the second half of a kick is a whole one", "factor 2", "loop", "integrate/driver.py",
-          "return kick(s.grains, 0.5 * s.clock[STEP])", "return kick(s.grains, s.clock[STEP])",
+          "= kick(s.grains, 0.5 * s.clock[STEP])", "= kick(s.grains, s.clock[STEP])",
           "physics/test_magnetic_dynamics.py::test_oscillation_of_two_distant_dipoles"),
     Fault("after a break the others keep the wrong twist", "lost row", "loop", "contact/events.py",
           "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
@@ -198,7 +198,7 @@ FAULTS = (
           'seconds = si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
           "unit/cli/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
     # analysis
-    Fault("a cluster is made whole without images", "forgotten image", "analysis", "analysis/clusters.py",
+    Fault("a cluster is made whole without images", "forgotten image", "analysis", "basics/clusters.py",
           "whole[i] + box.nearest(whole[j] - whole[i])", "whole[i] + (whole[j] - whole[i])",
           "unit/analysis/test_clusters.py::test_clusters_are_made_whole"),
     # set-up

@@ -15,8 +15,8 @@ from sand.basics.array_groups import GRAINS, USED, Array
 from sand.basics.state import STEP, TIME
 from sand.compiler.stage import stage
 from sand.engine.component import Component
+from sand.integrate.hooks import Hook
 from sand.integrate.parts import Stop
-from sand.integrate.stages import StageNumber
 from sand.io.checkpoint import newest_checkpoint, write_checkpoint
 from sand.simulation import simulation
 
@@ -71,7 +71,7 @@ class Flux(Component):
 
     def stages(self, setup, law, settings):
         """One, in each step."""
-        return {StageNumber.COMPONENT_CONTACTS: (measure, ())}
+        return {Hook.CONTACTS: [(measure, ())]}
 
     def parameters(self):
         """No table of a case file."""
@@ -83,7 +83,7 @@ def with_flux(monkeypatch):
     """Simulations have the component."""
     read = components.read_components
     monkeypatch.setattr(simulation, "read_components", lambda **given: read(**given, flux=[1]))
-    monkeypatch.setitem(components.READERS, "flux", (tuple, Flux))
+    monkeypatch.setitem(components.GIVEN, "flux", (tuple, Flux))
 
 
 def flying(count=40, order="as given", **options):

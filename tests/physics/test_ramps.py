@@ -143,10 +143,12 @@ def warm_gas(**options):
         20, "0.25 um", radius="10 nm", material="iron", moment="200 A m^2/kg", temperature="100 K", seed=11
     )
     contact = sand.Contact(
-        damping="critical", damping_ratio=0.2, bath_temperature=sand.Ramp(["100 K", "50 K"], ["8 ns", "12 ns"]),
+        damping="critical", damping_ratio=0.2,
+        bath_temperature=sand.Ramp(["100 K", "50 K"], ["8 ns", "12 ns"], steps=40),
         surface_energy_factor=sand.Ramp([1.0, 0.2], ["7 ns", "12 ns"], steps=77)
     )  # fmt: skip
-    forces = [contact, sand.Dipoles(cutoff="90 nm"), sand.Field(sand.Ramp(["10 mT", "0 T"], ["5 ns", "10 ns"]))]
+    field = sand.Field(sand.Ramp(["10 mT", "0 T"], ["5 ns", "10 ns"], steps=53))
+    forces = [contact, sand.Dipoles(cutoff="90 nm"), field]
     return sand.Simulation(grains, forces, box="0.25 um", seed=4, **options)
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.clusters import in_one_piece
 from ..basics.constants import BOLTZMANN
 from ..basics.errors import refuse_other
-from .clusters import cluster_labels, in_one_piece
+from .clusters import cluster_labels
 
 __all__ = ["MEDIAN_ENERGY", "BodyMotion", "BodyTemperatures", "body_motion", "body_temperatures"]
 

@@ -8,11 +8,9 @@ import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.box import Box
+from ..basics.clusters import closes_through_boundary, in_one_piece, labels_of
 from ..basics.errors import BadInput, shown
 from ..basics.units import whole_number
-
-FEW = 200
-"""Grains plus contacts up to which a disjoint-set forest in Python is faster than SciPy's graph (130 µs)."""
 
 
 def checked_pairs(count: int, pairs: Any) -> np.ndarray:
@@ -60,36 +58,6 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     """
     whole_number(count, "count", 0, MOST_GRAINS)
     return labels_of(count, checked_pairs(count, pairs))
-
-
-def labels_of(count: int, ends: np.ndarray) -> np.ndarray:
-    """As `cluster_labels`, for pairs that need no check, int64."""
-    if not len(ends):
-        return np.arange(count)  # avoids the slow import of SciPy's graphs
-    if count + len(ends) <= FEW:
-        return _disjoint_sets(count, ends)
-
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
-def _disjoint_sets(count: int, ends: np.ndarray) -> np.ndarray:
-    """The same with a disjoint-set forest whose roots are the lowest grains."""
-    parent = list(range(count))
-
-    def root(grain: int) -> int:
-        while parent[grain] != grain:
-            grain = parent[grain]
-        return grain
-
-    for one, other in ends.tolist():
-        a, b = root(one), root(other)
-        parent[max(a, b)] = min(a, b)
-    labels: dict[int, int] = {}
-    return np.array([labels.setdefault(root(grain), len(labels)) for grain in range(count)], dtype=np.int64)
 
 
 @checked
@@ -183,40 +151,6 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
     found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
     found[labels[ends[closes_through_boundary(whole, ends, box), 0]]] = True
     return found
-
-
-def closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
-    """Contacts (C,) whose grains, in clusters that are in one piece, touch across a periodic boundary all the same."""
-    return np.asarray(box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1))
-
-
-def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndarray | None = None) -> np.ndarray:
-    """As `unwrapped`, in place, for pairs that need no check, int64; with the labels of the clusters if known."""
-    count = len(whole)
-    apart = whole[pairs[:, 1]] - whole[pairs[:, 0]]
-    crosses = (box.nearest(apart) != apart).any(axis=1)
-    if not crosses.any():
-        return whole
-    labels = labels_of(count, pairs) if labels is None else labels
-    divided = np.isin(labels, labels[pairs[crosses, 0]])  # grains of clusters that cross a boundary
-    neighbours: list[list[int]] = [[] for _ in range(count)]
-    for a, b in pairs[divided[pairs[:, 0]]].tolist():
-        neighbours[a].append(b)
-        neighbours[b].append(a)
-    seen = np.zeros(count, dtype=bool)
-    for start in np.flatnonzero(divided).tolist():
-        if seen[start]:
-            continue
-        seen[start] = True
-        queue = [start]
-        while queue:
-            i = queue.pop()
-            for j in neighbours[i]:
-                if not seen[j]:
-                    seen[j] = True
-                    whole[j] = whole[i] + box.nearest(whole[j] - whole[i])
-                    queue.append(j)
-    return whole
 
 
 @checked

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
+from ..basics.clusters import in_one_piece
 from .body_motion import body_motion
-from .clusters import cluster_labels, in_one_piece
+from .clusters import cluster_labels
 
 __all__ = ["internal_kinetic_energy"]
 

@@ -126,6 +126,39 @@ def grown(group: Any, minimum: int = 0, unchanged: Collection[str] = ()) -> Any:
     return all_aligned(type(group)(**longer))
 
 
+def resized(group: Any, grains: int) -> Any:
+    """A group with memory as this one, for another number of grains."""
+    made = []
+    for array, each in zip(group, arrays_of(group).values(), strict=True):
+        *rows, last = array.shape
+        made.append(np.zeros((*rows, grains if each.shape[-1] == GRAINS else last), array.dtype))
+    return all_aligned(type(group)(*made))
+
+
+def copy_group(group: Any, other: Any, own: np.ndarray, theirs: np.ndarray) -> Any:
+    """Copy what is saved of a group to that of other grains, in which grains `own` are `theirs`; returns the latter.
+
+    A table names none but these grains. That of the other group grows as needed.
+    """
+    number, used = np.zeros(own.max(initial=-1) + 1, np.int64), None
+    number[own] = theirs
+    if table := table_in(group):
+        used = int(group.used[0])
+        other = grown(other, used) if getattr(other, table).shape[-1] < used else other
+        other.used[0] = used
+    for name, each in saved_in(group).items():
+        array, copied = getattr(group, name), getattr(other, name)
+        if each.shape[-1] == GRAINS:
+            copied[..., theirs] = array[..., own]
+        elif array.size:
+            columns = slice(used if each.shape[-1] == USED else None)
+            copied[..., columns] = array[..., columns]
+            for row, of in zip(np.atleast_2d(copied), each.names, strict=False):
+                if of == GRAINS:
+                    row[columns] = number[row[columns]]
+    return other
+
+
 def reorder_group(group: Any, rows: np.ndarray, new_index: np.ndarray) -> None:
     """Follow a new order of the grains: grain k was `rows[k]`, and the former grain i is now `new_index[i]`."""
     for array, each in zip(group, arrays_of(group).values(), strict=True):

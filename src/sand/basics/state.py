@@ -11,7 +11,21 @@ from typing import Any
 import numpy as np
 
 from .alignment import aligned_copies, all_aligned
-from .array_groups import GROWTH, SIDES, USED, Array, arrays_of, grown, new_group, reorder_group, saved_in, table_in
+from .array_groups import (
+    GRAINS,
+    GROWTH,
+    SIDES,
+    USED,
+    Array,
+    arrays_of,
+    copy_group,
+    grown,
+    new_group,
+    reorder_group,
+    resized,
+    saved_in,
+    table_in,
+)
 from .arrays import (
     BodyArrays,
     ClusterArrays,
@@ -178,6 +192,23 @@ class State:
     def at_rest(self) -> np.ndarray | None:
         """Which grains (N,) belong to clusters at rest, single grains included; None without rigid clusters."""
         return self.bodies.asleep == 1 if self.bodies.asleep.size else None
+
+    def held_grains(self) -> np.ndarray:
+        """Grains in tables of components, such as those in contact with walls."""
+        found = [
+            row[: self._used(group)]
+            for group, key, array, each in self._saved()
+            if group in self.of_components
+            for row, of in zip(np.atleast_2d(array), each.names, strict=False)
+            if of == GRAINS
+        ]
+        return np.concatenate([*found, np.zeros(0, np.uint32)])
+
+    def give_component_arrays(self, other: State, own: np.ndarray, theirs: np.ndarray) -> None:
+        """Copy the groups of components to a state whose grains `theirs` are the grains `own` of this one."""
+        for name, group in self.of_components.items():
+            present = other.of_components.get(name) or resized(group, len(other.grains))
+            other.of_components[name] = copy_group(group, present, own, theirs)
 
     def take_extremes(self, part: State) -> None:
         """Take over the largest overlap and the largest impact of a part of the grains that took steps of its own."""

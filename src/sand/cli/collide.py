@@ -26,12 +26,7 @@ SHOWN = 12
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.output
 def command(
-    case: str,
-    out: str | None,
-    seeds: list[int] | None,
-    overwrite: bool,
-    threads: int | None,
-    **how: Any,
+    case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
 ) -> None:
     """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 

@@ -22,14 +22,7 @@ SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vt
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.reading
 @options.output
-def command(
-    folder: str,
-    form: str,
-    out: str | None,
-    frames: slice,
-    overwrite: bool,
-    **how: Any,
-) -> None:
+def command(folder: str, form: str, out: str | None, frames: slice, overwrite: bool, **how: Any) -> None:
     """Export the frames of the run in DIR to other programs.
 
     DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD.

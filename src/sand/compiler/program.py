@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import weakref
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,9 @@ from .native_calls import status_and_result
 from .stage import PythonStage, Stage
 from .table import Table, words_of
 
-__all__ = ["Program", "before_first_calls", "call_stage", "has_stage", "stage_fails"]
+__all__ = ["Program", "before_first_calls", "call_stage", "has_stage", "range_of", "stage_fails"]
 
+NO_LISTS: Mapping[Any, list[Any]] = MappingProxyType({})
 _NATIVE = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 4, ctypes.c_int64)
 """Numba's calling convention of a stage: status, pointers to result and exception, table, parameters, block."""
 
@@ -86,11 +88,19 @@ class Program:
     stages : dict[int, tuple[Stage | PythonStage, Any]]
         Stage and parameters by number; other numbers have no stage.
     size : int
-        Number of entries.
+        Number of entries besides those of lists.
+    lists : dict[int, list[tuple[Stage, Any]]], optional
+        Stages, at least one, with parameters by a number that stands for all of them; they get the numbers from `size`
+        on.
     """
 
-    def __init__(self, table: Table, stages: Mapping[int, tuple[Stage | PythonStage, Any]], size: int):
-        self.stages, self.entries, self._failures = dict(stages), np.zeros((size, 3), np.int64), list[BaseException]()
+    def __init__(self, table: Table, stages: Mapping[int, Any], size: int, lists: Mapping[Any, list[Any]] = NO_LISTS):
+        self.stages, self._failures = dict(stages), list[BaseException]()
+        self.entries = np.zeros((size + sum(map(len, lists.values())), 3), np.int64)
+        for number, own in lists.items():
+            self.entries[number] = size, size + len(own), NOT_READY
+            self.stages |= zip(range(size, size + len(own)), own, strict=True)
+            size += len(own)
         self._rows, self._calls = list[np.ndarray](), list[Any]()
         self._tables = [weakref.ref(table)]  # the table of the present call
         if COMPILED:
@@ -119,8 +129,13 @@ class Program:
 
 
 def has_stage(s: Any, number: int) -> bool:
-    """Whether the program among the parts `s` has a stage of this number."""
-    return number in s.program.stages
+    """Whether the program among the parts `s` has a stage, or several, of this number."""
+    return number in s.program.stages or bool(s.program.entries[number, 0])
+
+
+def range_of(s: Any, number: int) -> tuple[int, int]:
+    """First number of the stages for which a number stands, and that after the last one."""
+    return int(s.program.entries[number, 0]), int(s.program.entries[number, 1])
 
 
 def call_stage(s: Any, number: int, block: int = 0) -> int:
@@ -187,6 +202,11 @@ def _compiled_has_stage(s, number):
     if isinstance(number, types.IntEnumMember):
         return lambda s, number: s.program[number.value, 0] != 0
     return lambda s, number: s.program[number, 0] != 0
+
+
+@compiled_form(range_of)
+def _compiled_range_of(s, number):
+    return lambda s, number: (s.program[number, 0], s.program[number, 1])
 
 
 @compiled_form(call_stage)

@@ -9,8 +9,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..analysis.clusters import cluster_labels
 from ..basics.box import Box
+from ..basics.clusters import labels_of
 from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.state import (
@@ -79,7 +79,7 @@ class ClusterCutoff(Component):
         """
         (force,), grains = self.items, setup.grains
         self.largest = 0.5 * setup.box.shortest / HALF_BOX_RATIO
-        labels = cluster_labels(len(grains), setup.touching)
+        labels = labels_of(len(grains), setup.touching)
         temperature = kinetic_temperature(grains, labels)
         pair = capturing_pair(grains, labels, temperature)
         self.first = force.for_pair(pair, grains, self.largest)
@@ -134,7 +134,7 @@ class ClusterCutoff(Component):
 
         The choice is stored in `state.cutoff`, also where half the box leaves the radius as it is.
         """
-        labels = cluster_labels(len(state.grains), state.contacts.pair[:, : state.count[CONTACTS]].T)
+        labels = labels_of(len(state.grains), state.contacts.pair[:, : state.count[CONTACTS]].T)
         pair = capturing_pair(state.grains, labels, state.cutoff[CUT_TEMPERATURE])
         before, _, temperature, time, _, _, limited = state.cutoff.tolist()
         if pair.capture <= GROWTH * state.cutoff[CUT_CAPTURE]:

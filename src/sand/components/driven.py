@@ -14,9 +14,9 @@ from ..basics.grains import Grains
 from ..basics.settings import List, Settings, Vector, Whole
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
+from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import ContactParameters
-from ..integrate.stages import StageNumber
-from .driven_stage import DrivenArrays, drive
+from .driven_stage import KICKS_AND_CONTACTS, DrivenArrays, drive
 
 AT_REST = (0.0, 0.0, 0.0)
 
@@ -68,7 +68,7 @@ class DrivenGrains(Component):
 
     name = "driven"
     noun = "driven grains"
-    keeps_order = every_step = own_columns = True
+    keeps_order = every_step = own_columns = holds = True
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""
@@ -97,13 +97,15 @@ class DrivenGrains(Component):
             for name in ("velocity", "spin"):
                 getattr(grains.arrays, name)[:, list(each.grains)] = np.array(getattr(each, name))[:, None]
 
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """The drive."""
         motion = [[each.velocity, each.spin] for each in self.items for _ in each.grains]
         velocity, spin = np.ascontiguousarray(np.moveaxis(np.array(motion, np.float64), 0, -1))
         index, own = np.array(self.heavy(), np.int64), setup.grains.arrays
         vectors = np.ascontiguousarray(velocity), np.ascontiguousarray(spin)
-        return {StageNumber.DRIVE: (drive, DrivenArrays(index, *vectors, own.mass[index], own.inertia[index]))}
+        driven = DrivenArrays(index, *vectors, own.mass[index], own.inertia[index])
+        changed = (Hook.BETWEEN_CYCLES,) if setup.forces.gas else ()
+        return {hook: [(drive, driven)] for hook in (*KICKS_AND_CONTACTS, *changed)}
 
     def heavy(self) -> list[int]:
         """Indices of all driven grains."""

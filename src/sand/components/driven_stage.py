@@ -7,15 +7,15 @@ driven grains, ½ Δt (F·v + M·ω) with the loads at either end of a step, and
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from ..basics.state import OUTSIDE
 from ..compiler.jit import loop
 from ..compiler.stage import stage
+from ..integrate.hooks import Hook
 from ..integrate.parts import DT, HEAVY
-from ..integrate.stages import HOLD, HOLD_IN_EVENTS, RELEASE, RELEASE_FROM_EVENTS
 from ..numerics.vec import add, dot, load, put, sub
 
 
@@ -27,6 +27,10 @@ class DrivenArrays(NamedTuple):
     spin: np.ndarray  # (3, K) [rad/s]
     mass: np.ndarray  # (K,) [kg], as of other grains
     inertia: np.ndarray  # (K,) [kg m²]
+
+    def for_part(self, heavy: np.ndarray, grains: int) -> Self:
+        """The same for a part in which the driven grains have other numbers."""
+        return self._replace(grain=heavy)
 
 
 @loop
@@ -78,18 +82,25 @@ def kinetic_energy(grains, driven):
 
 @stage("the drive of grains")
 def drive(grains, lost, scratch, parameters, block):
-    """Hold or release the driven grains (`parameters`, DrivenArrays), and log the work of the drive."""
-    if block == HOLD:
+    """Hold or release the driven grains (`parameters`, DrivenArrays) at a hook, and log the work of the drive."""
+    if block == Hook.BEFORE_DRIFT.value or block == Hook.BEFORE_KICK.value:
         set_masses(grains, parameters, math.inf)
-    elif block == RELEASE:
+    elif block == Hook.AFTER_DRIFT.value or block == Hook.AFTER_KICK.value:
         set_masses(grains, parameters, 1.0)
         lost[OUTSIDE] += 0.5 * scratch[DT] * work_of_loads(grains, parameters)
-    elif block == HOLD_IN_EVENTS:
+    elif block == Hook.BEFORE_CONTACTS.value:
         set_masses(grains, parameters, HEAVY)
-    elif block == RELEASE_FROM_EVENTS:
+    elif block == Hook.AFTER_CONTACTS.value:
         lost[OUTSIDE] += restore_velocities(grains, parameters)
         set_masses(grains, parameters, 1.0)
-    else:  # RESET, after drag and random kicks
+    else:  # BETWEEN_CYCLES, after drag and random kicks
         lost[OUTSIDE] += kinetic_energy(grains, parameters)
         restore_velocities(grains, parameters)
     return 0
+
+
+KICKS_AND_CONTACTS = (
+    *(Hook.BEFORE_DRIFT, Hook.AFTER_DRIFT, Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS),
+    *(Hook.BEFORE_KICK, Hook.AFTER_KICK),
+)
+"""Where driven grains are held and released."""

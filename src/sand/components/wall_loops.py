@@ -145,6 +145,13 @@ def _finish_walls(walls, contacts, numbers, dt):
             walls.work[w] -= dot(middle, impulse)
 
 
+@loop
+def move_walls_alone(walls, contacts, numbers, dt):
+    """Move walls for a step of dt [s] in which no grain is in contact with them."""
+    _start_walls(walls, numbers, dt)
+    _finish_walls(walls, contacts, numbers, dt)
+
+
 @rare
 def count_new_wall_contacts(grains, walls, contacts, numbers, dt):
     """Mark grains in contact in `walls.touching`; number of grains that touch a wall after it has moved for dt [s]."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from ..basics.state import GRAIN1, STEP
+from ..basics.state import GRAIN1, LATE, STEP
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import accelerations, half_kick_weight, record_half_kick
@@ -17,8 +16,10 @@ from ..contact.law import ContactLaw
 from ..contact.measure import ENERGIES
 from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
+from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import DT, LIMIT, Stop
-from ..integrate.stages import NEXT_STEP, StageNumber
+from ..integrate.rigid.body_touches import NEAR, TOUCHING, reach_of_plane
+from ..integrate.stages import NO_STEP
 from ..integrate.step_control import CLOSING_FRACTION, quantise_step
 from ..numerics.vec import accrue, dot, load, scale, sub
 from .wall_formulas import wall_displacements
@@ -27,6 +28,7 @@ from .wall_loops import (
     WALL_PARTS,
     WallNumbers,
     constants_loop,
+    move_walls_alone,
     relative_velocity,
     wall_height,
     wall_loop,
@@ -142,7 +144,7 @@ def wall_loads(grains, wall_contacts):
 @stage("the work of the noise of contacts with walls", parts=(*WALL_PARTS, "scratch"))
 def bath_wall_work(s, parameters, block):
     """As `integrate.stages.bath_work`, of contacts with walls; a wall with a mass is accelerated along its normal."""
-    weight = half_kick_weight(s.clock[STEP], s.scratch[DT] if block == NEXT_STEP else 0.0)
+    weight = half_kick_weight(s.clock[STEP], 0.0 if block == NO_STEP else s.scratch[DT])
     for c in range(s.wall_contacts.used[0]):
         g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
         n = load(s.walls.normal, w)
@@ -154,17 +156,43 @@ def bath_wall_work(s, parameters, block):
     return 0
 
 
-def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers) -> dict[int, tuple[Stage, Any]]:
-    """All stages by number, with their parameters."""
-    noisy = damping == THERMAL
-    of_bath: dict[int, tuple[Stage, Any]] = (
-        {StageNumber.COMPONENT_BATH_WORK: (bath_wall_work, numbers)} if noisy else {}
-    )
+OF_BODIES = Hook.NEAR_BODIES, Hook.NONE_AWAKE
+
+
+@stage("the walls that bodies may touch", parts=(*WALL_PARTS, "bodies", "gas", "flight_limits"))
+def bodies_at_walls(s, parameters, block):
+    """Mark bodies near walls (`BodyArrays.near`) for the present step; at NONE_AWAKE, move walls without contacts."""
+    grains, bodies, walls, h = s.grains, s.bodies, s.walls, s.clock[STEP]
+    if block == Hook.NONE_AWAKE.value:
+        move_walls_alone(walls, s.wall_contacts, parameters, h)
+        return 0
+    for c in range(s.wall_contacts.used[0]):
+        first = bodies.first[s.wall_contacts.pair[0, c]]
+        bodies.near[first] = max(bodies.near[first], NEAR)
+    for w in range(walls.work.size):
+        n = load(walls.normal, w)
+        # as of a grain, twice the distance by its present acceleration
+        moved = abs(dot(load(walls.force, w), n) + parameters.push[w]) / parameters.mass[w] * h * h
+        for g in range(grains.mass.size):
+            gap, first = wall_height(grains, walls, g, w) - grains.radius[g], bodies.first[g]
+            closing = -dot(relative_velocity(grains, walls, g, w), n)
+            reach = moved + reach_of_plane(grains, bodies, g, closing, s.gas, s.flight_limits.friction_rate, h)
+            if not gap > reach and bodies.asleep[g] == 1:  # also if the reach is not a number
+                bodies.near[first] = TOUCHING
+                s.count[LATE] += 1 if gap < 0.0 else 0
+            elif not gap > 2.0 * reach:
+                bodies.near[first] = max(bodies.near[first], NEAR)
+    return 0
+
+
+def wall_stages(law: ContactLaw, damping: str, numbers: WallNumbers, *, moves_bodies: bool) -> HookStages:
+    """The stages of walls at each place of a step, with their parameters."""
     return {
-        StageNumber.COMPONENT_CONTACTS: (contacts_stage(law, damping), numbers),
-        StageNumber.COMPONENT_LOADS: (wall_loads, ()),
-        StageNumber.COMPONENT_STEP: (step_stage(law), numbers),
+        Hook.LIMIT_STEP: [(step_stage(law), numbers)],
+        Hook.BATH_WORK: [(bath_wall_work, numbers)] if damping == THERMAL else [],
+        Hook.CONTACTS: [(contacts_stage(law, damping), numbers)],
+        Hook.LOADS: [(wall_loads, ())],
         # called by the engine for rows of the ledger, with an array of its own; here it is compiled with the others
-        StageNumber.COMPONENT_ENERGIES: (energies_stage(law), (np.zeros(len(ENERGIES)),)),
-        **of_bath,
+        Hook.ENERGIES: [(energies_stage(law), (np.zeros(len(ENERGIES)),))],
+        **{hook: [(bodies_at_walls, numbers)] for hook in (OF_BODIES if moves_bodies else ())},
     }

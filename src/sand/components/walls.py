@@ -1,7 +1,7 @@
 """Walls: planes to which grains stick, at rest, moving with a given velocity, or with a mass and a given force.
 
 Their energies reach the ledger in two ways: what their contacts store is added to the columns of contacts (`normal`, …)
-by the stage COMPONENT_ENERGIES, and what moving walls took from grains and contacts is `lost_walls`, in `Walls.row`.
+by a stage of `Hook.ENERGIES`, and what moving walls took from grains and contacts is `lost_walls`, in `Walls.row`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from ..contact.constants_table import constant_names
 from ..contact.law import ContactLaw
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
+from ..integrate.hooks import HookStages
+from ..integrate.integrator import moves_bodies
 from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
 from .wall_arrays import WallArrays, WallContactArrays
@@ -139,6 +141,7 @@ class Walls(Component):
 
     name = "walls"
     noun = "walls"
+    holds = True
     groups: ClassVar = {"walls": WallArrays, "wall_contacts": WallContactArrays}
 
     def problems(self, setup: Setup) -> list[str]:
@@ -166,7 +169,7 @@ class Walls(Component):
                 problems += _grain_problems(wall, setup.grains, contact)
         return problems
 
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Contacts, loads, the limit of the step, and the work of a bath."""
         contact = setup.forces.contact
         assert contact is not None
@@ -178,7 +181,7 @@ class Walls(Component):
             np.array([math.inf if wall.mass is None else wall.mass for wall in self.items]),
             np.array([wall.force or 0.0 for wall in self.items]),
         )
-        return wall_stages(law, variant_of(settings), numbers)
+        return wall_stages(law, variant_of(settings), numbers, moves_bodies=moves_bodies(setup.stepping))
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state its walls, and memory for their contacts."""

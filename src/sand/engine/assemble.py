@@ -12,13 +12,14 @@ import numpy as np
 
 from ..basics.arrays import OVER_ALLOCATION
 from ..basics.box import Box
-from ..basics.errors import BadInput, ErrorCollector
+from ..basics.errors import ErrorCollector
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import COMPARED
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.pair.ewald_force import EwaldForce
+from ..integrate.hooks import Hook
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ForceNumbers, StepParameters
 from ..integrate.stage_list import ProgramContent
@@ -80,11 +81,12 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    kind, verlet, errors = KINDS.get(stepping.name, Kind)(), stepping.contact_stepping, ErrorCollector()
+    holding, verlet, errors = [each for each in extra if each.holds], stepping.contact_stepping, ErrorCollector()
+    kind = KINDS.get(stepping.name, Kind)(holds=bool(holding))
     by_type = forces_by_type(forces, grains)
     setup = Setup(grains, by_type, box, stepping, neighbours, fresh, saved)
     warnings = errors.take(check_system, grains, forces, box, fresh=fresh, instead=[])
-    warnings += errors.take(kind.check, forces, [each.noun for each in extra if each.noun], neighbours, instead=[])
+    warnings += errors.take(kind.check, forces, neighbours, instead=[])
     errors.problems += [line for each in extra for line in each.problems(setup)]
     errors.done()
     wrapped = _wrapped(grains, box, fresh=fresh)
@@ -119,12 +121,10 @@ def build_engine(
         **dependent(forces, grains)._asdict(),
     )
     law = (by_type.contact or Contact()).contact_law
-    of_components: dict[int, tuple[Any, Any]] = {}
+    of_components: dict[Hook, list[tuple[Any, Any]]] = {}
     for each in extra:
-        stages = each.stages(setup, law, parameters.settings)
-        if stages.keys() & of_components.keys():  # the driver calls one stage of each number
-            raise BadInput(f"{each.name}: {each.noun} cannot be used together with another component; leave one out")
-        of_components |= stages
+        for hook, stages in each.stages(setup, law, parameters.settings).items():
+            of_components.setdefault(hook, []).extend(stages)
     content = ProgramContent(
         law=law,
         pair_forces=[own[1:] for own in long_range],
@@ -158,7 +158,7 @@ def build_engine(
     )
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
-        return build_engine(wrapped, others, box, verlet, search, seed, fresh=False)
+        return build_engine(wrapped, others, box, verlet, search, seed, holding, fresh=False)
 
     kind.complete(engine, forces, build)
     for each in extra:

@@ -211,9 +211,10 @@ class CompiledState:
                 compile_ahead(self.stages(table), min(cores(), threads()))
             alone = table["shorten"] and len(state.grains) < ALONE  # threads start later than one step ends
             loops = len(self.content.pair_forces), int(state.count[CONTACTS])
+            program = self.program_for(table)  # which the threads take from the table
             if workers is not None and not alone and benefits_from_workers(*loops):
                 workers.start(table)
-            return Stop(self.program_for(table).run(driver, table))
+            return Stop(program.run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(table["queue"])
             raise

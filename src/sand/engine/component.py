@@ -14,6 +14,7 @@ from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.state import State
 from ..contact.law import ContactLaw
+from ..integrate.hooks import HookStages
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
 from ..neighbours.search import Neighbours
@@ -42,7 +43,7 @@ class Component:
     At the assembly of an engine (`assemble.build_engine`) its methods are called in this order: `problems`, `prepare`,
     `at_start`, `stages` and `heavy`, `add_arrays`, `begin`.  While the engine runs it calls `update`, `next_time` and
     `contacts_changed`, between regular steps.  The ledger has its `columns` and `losses`, with the values of `row`
-    (energies stored in its contacts are added to those of all contacts by the stage COMPONENT_ENERGIES).  A change
+    (energies stored in its contacts are added to those of all contacts by a stage of `Hook.ENERGIES`).  A change
     asks `problems_of_motion` and `problems_of_arrays`, continues with what is `kept`, and calls `saved_for_change` and
     `changed`; case.toml has `parameters` and `materials`.
 
@@ -51,11 +52,13 @@ class Component:
     name : str
         Its keyword of `sand.Simulation`, and its table in case files.
     noun : str
-        What it adds, in sentences: "rigid clusters cannot have walls"; empty if it can be used with rigid clusters.
+        What it adds, in sentences: "walls cannot be used together with …".
     keeps_order : bool
         Whether grains keep the order in which they were given.
     every_step : bool
         Whether long-range forces are summed in each step, instead of once in a cycle of r-RESPA.
+    holds : bool
+        Whether it may hold grains, so that loads on their clusters do not move these as rigid bodies.
     own_columns : bool
         Whether each contact needs its own constants, also between equal grains.
     watches_contacts : bool
@@ -73,6 +76,7 @@ class Component:
     keeps_order: ClassVar[bool] = False
     every_step: ClassVar[bool] = False
     own_columns: ClassVar[bool] = False
+    holds: ClassVar[bool] = False
     watches_contacts: ClassVar[bool] = False
     groups: ClassVar[Mapping[str, type]] = {}
 
@@ -90,8 +94,8 @@ class Component:
         """The forces as they act at first."""
         return forces
 
-    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> dict[int, tuple[Any, Any]]:
-        """Stages that the driver calls, by number, with their parameters."""
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
+        """Stages that the driver calls at each place of a step, with their parameters."""
         return {}
 
     def heavy(self) -> list[int]:

@@ -76,6 +76,11 @@ class GrainSteps:
         """Take steps up to a time [s] or a step; returns why no more were taken."""
         return engine.run_driver(advance, until, last, shorten)
 
+    def loads(self, engine: Engine) -> tuple[np.ndarray, np.ndarray]:
+        """Forces [N] and torques [N m] on the grains, (N, 3)."""
+        grains = engine.state.grains
+        return grains.force.copy(), grains.torque.copy()
+
     def summary(self, state: State) -> dict[str, Any]:
         """What the summary of a run says of bodies; nothing without any."""
         return {}

@@ -23,17 +23,19 @@ class Kind:
     ----------
     integrator : str
         Name of the integrator that needs a kind of its own.
+    holds : bool
+        Whether a component may hold grains (`Component.holds`).
     """
 
     integrator: ClassVar[str] = ""
     keeps_order = False
     """Whether grains keep the order in which they were given."""
 
-    def check(self, forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
-        """Refuse what such an engine cannot do, all problems at once (BadInput); returns warnings.
+    def __init__(self, *, holds: bool):
+        self.holds = holds
 
-        `others` are the nouns of the components, such as "walls".
-        """
+    def check(self, forces: Sequence[Force], neighbours: Neighbours) -> list[str]:
+        """Refuse what such an engine cannot do, all problems at once (BadInput); returns warnings."""
         return []
 
     def pair_gap(self, grains: Grains, box: Box) -> float:

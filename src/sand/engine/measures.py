@@ -17,9 +17,10 @@ from ..forces.base import ExternalForce
 from ..forces.external_loops import external_energies_for
 from ..forces.pair.long_range_loops import long_range_energies_for
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
+from ..integrate.hooks import Hook
 from ..integrate.respa import clear_long_range_loads
-from ..integrate.stage_list import variant_of
-from ..integrate.stages import NO_STEP, StageNumber, bath_work
+from ..integrate.stage_list import hooks_of, variant_of
+from ..integrate.stages import NO_STEP
 from .compiled_state import CompiledState
 
 
@@ -104,8 +105,8 @@ def contact_energies(engine: CompiledState) -> list[float]:
     results[0][:] = 0.0
     if state.count[CONTACTS]:
         energies_stage(engine.law).run(engine.table_of(state), results)
-    if (added := engine.content.of_components.get(StageNumber.COMPONENT_ENERGIES)) is not None:
-        added[0].run(engine.table_of(state), results)
+    for stage, _ in engine.content.of_components.get(Hook.ENERGIES, ()):
+        stage.run(engine.table_of(state), results)
     return list(results[0].tolist())
 
 
@@ -130,9 +131,7 @@ def record_bath_work(engine: CompiledState, state: State) -> None:
     if variant_of(engine.parameters.settings) != THERMAL:
         return
     with engine.heavy_grains(state):
-        bath_work.run(engine.table_of(state), (), NO_STEP)
-        if (added := engine.content.of_components.get(StageNumber.COMPONENT_BATH_WORK)) is not None:
-            stage, numbers = added
+        for stage, numbers in hooks_of(engine.content, engine.parameters)[Hook.BATH_WORK]:
             stage.run(engine.table_of(state), numbers, NO_STEP)
 
 

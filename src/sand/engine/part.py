@@ -119,6 +119,8 @@ class Part:
         if self.has_bodies:
             _copy(BODY_COLUMNS, state.bodies, index, own.bodies, slice(None))
             own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
+        state.give_component_arrays(own, index, np.arange(len(index)))
+        self.engine.content.heavy[:] = np.searchsorted(index, self.prototype.content.heavy)
         own.count[COMPARED] = -1
         own.count[CHECKED] = own.count[STEP_INCREASES] = -INCREASE_INTERVAL
         # the kicks of the gas are counted with the steps of grains, so that no random number is used twice
@@ -147,6 +149,7 @@ class Part:
         if self.has_bodies:
             _copy(BODY_COLUMNS, own.bodies, slice(None), state.bodies, self.index)
             state.bodies.first[self.index] = self.index[own.bodies.first]
+        own.give_component_arrays(state, np.arange(len(self.index)), self.index)
         self._count(state, own)
         return changed
 
@@ -166,8 +169,10 @@ class Part:
             made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
         else:
             made.clusters = cluster_arrays(count)
+        state.give_component_arrays(made, self.index, np.arange(count))
         # few grains, and bodies, share no work between threads
         engine = given.for_state(made, with_threads=uses_task_queue(count) and not self.has_bodies)
+        engine.content = given.content.for_part(count)
         if len(self._engines) == MOST_ENGINES:
             self._engines.clear()
         self._engines[count] = engine

@@ -95,12 +95,7 @@ class CollisionJob(Job):
 
     def _content(self, outcomes: list[dict[str, Any]]) -> dict[str, Any]:
         counts = Counter(outcome["outcome"] for outcome in outcomes)
-        return {
-            "case": str(self.path),
-            "folder": str(self.folder),
-            "collisions": outcomes,
-            "counts": dict(counts),
-        }
+        return {"case": str(self.path), "folder": str(self.folder), "collisions": outcomes, "counts": dict(counts)}
 
     def _with_case_name(self, make: Callable[[], Any]) -> Any:
         """Call `make()`; its errors are reported as errors of the case file."""

@@ -55,12 +55,7 @@ class Job:
     PARTS: ClassVar[str] = "parts"
 
     def __init__(
-        self,
-        path: str | Path,
-        folder: str | Path | None = None,
-        *,
-        resume: bool = False,
-        overwrite: bool = False,
+        self, path: str | Path, folder: str | Path | None = None, *, resume: bool = False, overwrite: bool = False
     ):
         self.path, self.folder = Path(path), Path(folder or Path(path).stem)
         self.content = with_absolute_files(read_toml(path), path)

@@ -36,11 +36,7 @@ SCATTERING: Values = {
     "measure": {"relative_error": 0.05, "seed": 1},
 }
 """Keys in use of `sand scatter`: cross-sections of two magnetic grains of iron at two speeds."""
-GROWTH: Values = {
-    **EXAMPLES,
-    "grow": {"seeds": [1, 2, 3, 4]},
-    "run": {"until": "20 us", "frame_every": "0.1 us"},
-}
+GROWTH: Values = {**EXAMPLES, "grow": {"seeds": [1, 2, 3, 4]}, "run": {"until": "20 us", "frame_every": "0.1 us"}}
 """Keys in use of `sand grow`: the gas of the case of `sand run`, for four seeds."""
 
 

@@ -51,6 +51,7 @@ from .force_calls import (
     update_pairs_in_contact,
 )
 from .force_stages import ENERGY, WRAPPING
+from .hooks import Hook, call_hook
 from .motion import kick, wrap_all
 from .parts import DRIVER_PARTS, DT, LIMIT, SINCE, Stop
 from .respa import (
@@ -61,7 +62,7 @@ from .respa import (
     integrate_displacement,
     update_constant_loads,
 )
-from .stages import HOLD, HOLD_IN_EVENTS, NEXT_STEP, RELEASE, RELEASE_FROM_EVENTS, RESET, StageNumber
+from .stages import StageNumber
 from .step_control import cycle_steps, hold_step, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
@@ -115,17 +116,11 @@ def drift_with_work(s, dt):
         gained -= sum_external(s, start, ENERGY)
     s.scratch[DT] = dt
     blocks = blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK)
-    drives = has_stage(s, StageNumber.DRIVE)
-    if drives:
-        call_stage(s, StageNumber.DRIVE, HOLD)
+    call_hook(s, Hook.BEFORE_DRIFT)
     if s.clock[STEP] != dt:
-        if has_stage(s, StageNumber.BATH_WORK):
-            call_stage(s, StageNumber.BATH_WORK, NEXT_STEP)
-        if has_stage(s, StageNumber.COMPONENT_BATH_WORK):
-            call_stage(s, StageNumber.COMPONENT_BATH_WORK, NEXT_STEP)
+        call_hook(s, Hook.BATH_WORK)
     for_each_block(s, StageNumber.DRIFT, blocks)
-    if drives:
-        call_stage(s, StageNumber.DRIVE, RELEASE)
+    call_hook(s, Hook.AFTER_DRIFT)
     if s.external_work.time_dependent:
         gained += sum_external(s, end, ENERGY)
         gained -= sum_external(s, start, ENERGY)
@@ -153,8 +148,7 @@ def sum_loads(s, due, elapsed):
     Long-range loads are summed if `due`; within a cycle their constant part or extrapolation replaces them.
     """
     for_each_block(s, StageNumber.GATHER, blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK))
-    if has_stage(s, StageNumber.COMPONENT_LOADS):
-        call_stage(s, StageNumber.COMPONENT_LOADS)
+    call_hook(s, Hook.LOADS)
     add_external_loads(s, s.clock[TIME] + s.clock[STEP])
     if s.forces.pair == 0:
         s.count[LONG_RANGE_SUMS] += 1
@@ -170,25 +164,20 @@ def sum_loads(s, due, elapsed):
 @caller
 def loads_and_kick(s, due, elapsed):
     """Sum the loads and apply the second half kick; returns the squares of the largest speed and spin."""
-    drives = has_stage(s, StageNumber.DRIVE)
-    if has_stage(s, StageNumber.GATHER_AND_KICK):
+    in_one_loop = has_stage(s, StageNumber.GATHER_AND_KICK)
+    if not in_one_loop:
+        sum_loads(s, due, elapsed)
+    call_hook(s, Hook.BEFORE_KICK)
+    if in_one_loop:
         s.count[LONG_RANGE_SUMS] += 1
         s.scratch[DT] = 0.5 * s.clock[STEP]
         blocks = blocks_of(s.grains.mass.size, GRAINS_PER_BLOCK)
-        if drives:
-            call_stage(s, StageNumber.DRIVE, HOLD)
         for_each_block(s, StageNumber.GATHER_AND_KICK, blocks)
-        if drives:
-            s.scratch[DT] = s.clock[STEP]
-            call_stage(s, StageNumber.DRIVE, RELEASE)
-        return largest_speeds(s.queue, blocks)
-    sum_loads(s, due, elapsed)
-    if not drives:
-        return kick(s.grains, 0.5 * s.clock[STEP])
-    call_stage(s, StageNumber.DRIVE, HOLD)
-    fastest, fastest_spin = kick(s.grains, 0.5 * s.clock[STEP])
+        fastest, fastest_spin = largest_speeds(s.queue, blocks)
+    else:
+        fastest, fastest_spin = kick(s.grains, 0.5 * s.clock[STEP])
     s.scratch[DT] = s.clock[STEP]
-    call_stage(s, StageNumber.DRIVE, RELEASE)
+    call_hook(s, Hook.AFTER_KICK)
     return fastest, fastest_spin
 
 
@@ -206,16 +195,23 @@ def close_cycle(s):
 
 
 @caller
+def limit_step(s):
+    """Set the longest step that components allow; returns the value of a `Stop` that refuses any."""
+    if not has_stage(s, Hook.LIMIT_STEP):
+        return Stop.NONE.value
+    s.scratch[LIMIT] = s.criteria.longest
+    stop = call_hook(s, Hook.LIMIT_STEP)
+    hold_step(s.clock, s.count, s.scratch[LIMIT])
+    return stop
+
+
+@caller
 def first_half(s):
     """Choose the step, kick dt/2 and drift; no step was taken unless the value of `Stop.NONE` is returned.
 
     A cycle that would pass `until` [s] is not begun, or, with `shorten`, ends at this time.
     """
-    further = Stop.NONE.value
-    if has_stage(s, StageNumber.COMPONENT_STEP):
-        s.scratch[LIMIT] = s.criteria.longest
-        further = call_stage(s, StageNumber.COMPONENT_STEP)
-        hold_step(s.clock, s.count, s.scratch[LIMIT])
+    further = limit_step(s)
     grain = s.count[GRAIN1]
     dt, stop = possible_step(s.grains, s.contacts, s.pair_list, s.long_range, s.clock, s.count, s.span, s.criteria)
     if stop == Stop.NONE.value and further != Stop.NONE.value:
@@ -292,21 +288,15 @@ def second_half(s):
     formed = count_new_contacts(s.grains, s.pair_list, s.count, s.span)
     if s.count[CONTACTS] + formed > s.contacts.pair.shape[1]:
         return Stop.CONTACTS_FULL.value
-    drives = has_stage(s, StageNumber.DRIVE)
-    if drives:
-        call_stage(s, StageNumber.DRIVE, HOLD_IN_EVENTS)
-    if has_stage(s, StageNumber.COMPONENT_CONTACTS):
-        stop = call_stage(s, StageNumber.COMPONENT_CONTACTS)
-        if stop != Stop.NONE.value:
-            if drives:
-                call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)
-            return stop
-    broken = update_contacts(s)
-    if formed > 0:
+    call_hook(s, Hook.BEFORE_CONTACTS)
+    stop = call_hook(s, Hook.CONTACTS)
+    broken = stop == Stop.NONE.value and update_contacts(s)
+    if stop == Stop.NONE.value and formed > 0:
         call_stage(s, StageNumber.FORM)
         call_stage(s, StageNumber.SORT)
-    if drives:
-        call_stage(s, StageNumber.DRIVE, RELEASE_FROM_EVENTS)
+    call_hook(s, Hook.AFTER_CONTACTS)
+    if stop != Stop.NONE.value:
+        return stop
     if formed > 0 or list_rebuilt:
         call_stage(s, StageNumber.CONTACT_STEP)
     dt, elapsed = s.clock[STEP], s.clock[CYCLE] - s.clock[LEFT]
@@ -328,15 +318,10 @@ def second_half(s):
     s.clock[TIME] += dt
     s.count[STEPS] += 1
     s.count[STAGE] = 0
+    call_hook(s, Hook.END_STEP)
     if due:
-        gas, settling = has_stage(s, StageNumber.GAS_KICK), has_stage(s, StageNumber.SETTLE_CLUSTERS)
-        if gas:
-            call_stage(s, StageNumber.GAS_KICK)
-        if settling:
-            call_stage(s, StageNumber.SETTLE_CLUSTERS)
-        if gas and drives:
-            call_stage(s, StageNumber.DRIVE, RESET)
-        if gas or settling or s.respa.impulse:  # speeds changed between steps
+        call_hook(s, Hook.BETWEEN_CYCLES)
+        if has_stage(s, Hook.BETWEEN_CYCLES) or s.respa.impulse:  # speeds changed between steps
             invalidate_speeds(s.pair_list)
     return Stop.NONE.value
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,10 +30,9 @@ from .force_stages import (
     external_force_stages,
     pair_force_stages,
 )
+from .hooks import Hook, HookStages
 from .parts import ContactParameters, StepParameters
 from .stages import StageNumber
-
-NO_GRAINS = np.zeros(0, np.int64)
 
 
 class ProgramContent(NamedTuple):
@@ -47,10 +45,21 @@ class ProgramContent(NamedTuple):
     gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
-    of_components: Mapping[int, tuple[Stage, Any]] = MappingProxyType(
-        {}
-    )  # stages of components by number, with parameters
-    heavy: np.ndarray = NO_GRAINS  # grains whose mass counts as infinite in contacts
+    of_components: HookStages
+    heavy: np.ndarray  # grains whose mass counts as infinite in contacts
+
+    def for_part(self, grains: int) -> ProgramContent:
+        """The same for a part with this number of grains, among them the heavy ones, which have other numbers there.
+
+        Parameters of components that depend on these have a method `for_part`.
+        """
+        heavy = self.heavy.copy()
+
+        def own(numbers: Any) -> Any:
+            return numbers.for_part(heavy, grains) if hasattr(numbers, "for_part") else numbers
+
+        stages = {hook: [(each, own(given)) for each, given in found] for hook, found in self.of_components.items()}
+        return self._replace(heavy=heavy, of_components=stages)
 
 
 def stages_of(given: ProgramContent, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
@@ -60,7 +69,7 @@ def stages_of(given: ProgramContent, parameters: StepParameters) -> dict[int, tu
         StageNumber.DRIFT: stages.drift_stage(given.magnetic, given.wide),
         StageNumber.EXPLAIN: stages.explain_stop,
     }
-    if given.pair_forces or given.external_forces or StageNumber.COMPONENT_LOADS in given.of_components:
+    if given.pair_forces or given.external_forces or given.of_components.get(Hook.LOADS):
         found[StageNumber.GATHER] = stages.gather_stage(given.wide)
     else:
         found[StageNumber.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
@@ -72,12 +81,9 @@ def stages_of(given: ProgramContent, parameters: StepParameters) -> dict[int, tu
         found[StageNumber.PREPARE_RATES] = taylor.prepare_rates
         found[StageNumber.STORE_POSITIONS] = taylor.store_summation_positions
         found[StageNumber.EXTRAPOLATE] = taylor.extrapolate
-    if given.gas:
-        found[StageNumber.GAS_KICK] = stages.kick_by_gas
     if given.flight is not None:
         found[StageNumber.FLIGHT] = given.flight
     program: dict[int, tuple[Stage | PythonStage, Any]] = {number: (each, ()) for number, each in found.items()}
-    program |= given.of_components
     number: int = StageNumber.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:
@@ -105,27 +111,34 @@ def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[i
     settings, damping = parameters.settings, variant_of(parameters.settings)
     adhesive = bool((settings.pairings[Pairing._fields.index("surface_energy")] > 0.0).all())
     variant = PassVariant(damping, any(parameters.span), settings.follow, adhesive)
-    events = stages.contact_event_stages(given.law, damping)
-    found: dict[int, Stage] = {
+    found: dict[int, Stage] = stages.contact_event_stages(given.law, damping) | {
         StageNumber.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
         StageNumber.INNER_LIST: stages.inner_list,
         StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, variant, given.wide),
-        StageNumber.SLIP_AND_BREAK: events[StageNumber.SLIP_AND_BREAK],
-        StageNumber.FORM: events[StageNumber.FORM],
         StageNumber.SORT: resort_contacts_by_grain,
         StageNumber.CONTACT_STEP: stages.set_contact_step,
         StageNumber.REMOVE_BROKEN: stages.remove_broken,
     }
-    if damping == THERMAL:
-        found[StageNumber.BATH_WORK] = stages.bath_work
-    if settings.follow:
-        found[StageNumber.STIFFNESS_WORK] = events[StageNumber.STIFFNESS_WORK]
-    if settings.settling_time < math.inf:
-        found[StageNumber.SETTLE_CLUSTERS] = stages.settle
+    if not settings.follow:
+        del found[StageNumber.STIFFNESS_WORK]
     return found
+
+
+def hooks_of(given: ProgramContent, parameters: StepParameters) -> HookStages:
+    """The stages at each place of a step: those of contacts, gas and settling, then those of components."""
+    found: dict[Hook, list[tuple[Any, Any]]] = {}
+    if variant_of(parameters.settings) == THERMAL:
+        found[Hook.BATH_WORK] = [(stages.bath_work, ())]
+    if given.gas:
+        found[Hook.BETWEEN_CYCLES] = [(stages.kick_by_gas, ())]
+    if parameters.settings.on and parameters.settings.settling_time < math.inf:
+        found.setdefault(Hook.BETWEEN_CYCLES, []).append((stages.settle, ()))
+    for hook, own in given.of_components.items():
+        found.setdefault(hook, []).extend(own)
+    return {hook: own for hook, own in found.items() if own}
 
 
 def build_program(given: ProgramContent, parameters: StepParameters, table: Table) -> Program:
     """The program of a simulation, for the parts in a table; stages are compiled when they are first called."""
     size = StageNumber.FIRST_FORCE + PAIR_STAGES * len(given.pair_forces) + EXTERNAL_STAGES * len(given.external_forces)
-    return Program(table, stages_of(given, parameters), size)
+    return Program(table, stages_of(given, parameters), size, hooks_of(given, parameters))

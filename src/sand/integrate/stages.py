@@ -5,7 +5,7 @@ law and are compiled once for each; those of forces are in `force_stages`.
 """
 
 import math
-from enum import IntEnum
+from enum import IntEnum, auto
 
 import numpy as np
 
@@ -25,51 +25,40 @@ from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
+from .hooks import FIRST_STAGE
 from .motion import UNBOUNDED, drift_for, gather_and_kick
 from .parts import DT, Stop
 from .step_control import find_limiting_grains, first_not_finite
 from .step_parts import first_too_fast
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
 
-HOLD, RELEASE, HOLD_IN_EVENTS, RELEASE_FROM_EVENTS, RESET = range(5)
-"""What the stage DRIVE does: masses before and after kicks, and around contact events; velocities after drag."""
-
 
 class StageNumber(IntEnum):
-    """Entries of the program of a simulation (`stage_list.build_program`), and where each is."""
+    """Entries of the program of a simulation (`stage_list.build_program`) after its hooks, and where each stage is."""
 
-    DRIFT = 0  # motion: drift
-    VERLET_LIST = 1  # neighbours.cell_list
-    PAIR_LIST = 2  # neighbours.pair_list: candidates for contact
-    INNER_LIST = 3  # the nearest candidates
-    CONTACT_PASS = 4  # contact.update: all contacts of a step
-    STIFFNESS_WORK = 5  # contact.stiffness_work
-    SLIP_AND_BREAK = 6  # contact.events: contacts beyond a limit
-    FORM = 7  # contact.events: new contacts
-    SORT = 8  # contact.gather: contacts of each grain
-    CONTACT_STEP = 9  # the step that contacts allow
-    REMOVE_BROKEN = 10  # contact.events
-    GATHER = 11  # contact.gather: loads of contacts on grains, if there are other loads
-    GATHER_AND_KICK = 12  # motion.gather_and_kick: the same, and the kick, with loads of contacts alone
-    PREPARE_RATES = 13  # taylor
-    STORE_POSITIONS = 14  # taylor
-    EXTRAPOLATE = 15  # taylor
-    GAS_KICK = 16  # forces.gas_loops
-    FLIGHT = 17  # of an integrator of the user
-    EXPLAIN = 18  # step_control: which grains caused a stop
-    SETTLE_CLUSTERS = 19  # contact.settling: damping of clusters
-    DRIVE = 20  # components.driven_stage
-    COMPONENT_CONTACTS = 21  # of components: contacts other than those between grains,
-    COMPONENT_LOADS = 22  # their loads on grains,
-    COMPONENT_STEP = 23  # and the longest step that they allow
-    BATH_WORK = 24  # contact.bath_work
-    COMPONENT_BATH_WORK = 25  # the work of the bath in further contacts
-    COMPONENT_ENERGIES = 26  # adds the energies stored in further contacts to an array
-    FIRST_FORCE = 27  # from here on the stages of forces, see `force_stages`
+    DRIFT = FIRST_STAGE  # motion: drift
+    VERLET_LIST = auto()  # neighbours.cell_list
+    PAIR_LIST = auto()  # neighbours.pair_list: candidates for contact
+    INNER_LIST = auto()  # the nearest candidates
+    CONTACT_PASS = auto()  # contact.update: all contacts of a step
+    STIFFNESS_WORK = auto()  # contact.stiffness_work
+    SLIP_AND_BREAK = auto()  # contact.events: contacts beyond a limit
+    FORM = auto()  # contact.events: new contacts
+    SORT = auto()  # contact.gather: contacts of each grain
+    CONTACT_STEP = auto()  # the step that contacts allow
+    REMOVE_BROKEN = auto()  # contact.events
+    GATHER = auto()  # contact.gather: loads of contacts on grains, if there are other loads
+    GATHER_AND_KICK = auto()  # motion.gather_and_kick: the same, and the kick, with loads of contacts alone
+    PREPARE_RATES = auto()  # taylor
+    STORE_POSITIONS = auto()  # taylor
+    EXTRAPOLATE = auto()  # taylor
+    FLIGHT = auto()  # of an integrator of the user
+    EXPLAIN = auto()  # step_control: which grains caused a stop
+    FIRST_FORCE = auto()  # from here on the stages of forces, see `force_stages`, then those of the hooks
 
 
-NEXT_STEP, NO_STEP = range(2)
-"""What follows the work of a bath: a step of `scratch[DT]`, or none, as at a row of the ledger."""
+NO_STEP = -1
+"""In place of a block of `Hook.BATH_WORK`: no step follows, as at a row of the ledger."""
 INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
 
@@ -179,7 +168,7 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
 @stage("the work of the noise of contacts")
 def bath_work(grains, contacts, clock, count, lost, scratch, span, block):
     """Record the work of the half kick that ended the last step, and take back that of the next one."""
-    weight = half_kick_weight(clock[STEP], scratch[DT] if block == NEXT_STEP else 0.0)
+    weight = half_kick_weight(clock[STEP], 0.0 if block == NO_STEP else scratch[DT])
     record_half_kicks(grains, contacts, count, lost, span, weight)
     return 0
 

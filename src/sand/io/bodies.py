@@ -42,8 +42,8 @@ class ReadGrains(NamedTuple):
 
 MASSES = 1e3
 """Largest factor between a mass in a file and that of a sphere of the material; beyond, its unit must be another."""
-Choice = tuple[Material | None, Mapping[str, Material], Material | None]
-"""Parameters of `read_grains`: material, materials, otherwise."""
+# parameters of `read_grains`: material, materials, otherwise
+_Choice = tuple[Material | None, Mapping[str, Material], Material | None]
 
 
 def read_grains(
@@ -92,7 +92,7 @@ def read_grains(
 
 
 def read_frame(
-    path: str | Path, opened: GrainFile, radius: Any, length: str | None, choice: Choice, frame: int
+    path: str | Path, opened: GrainFile, radius: Any, length: str | None, choice: _Choice, frame: int
 ) -> ReadGrains:
     """Read a frame of an open file of another program; parameters and errors as for `read_grains`."""
     if not -opened.frame_count <= frame < opened.frame_count:
@@ -107,7 +107,7 @@ def read_frame(
     return _in_si(path, data, radius, length, choice)
 
 
-def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: Choice) -> ReadGrains:
+def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, choice: _Choice) -> ReadGrains:
     """Grains and box in SI.  Raises BadInput."""
     if data.refused:
         raise BadInput(data.refused)
@@ -126,7 +126,7 @@ def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, c
     return ReadGrains(grains, box, centre, None, tuple(data.notes), data.time, data.step)
 
 
-def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: Choice) -> Grains:
+def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choice: _Choice) -> Grains:
     """Grains in SI.  Raises BadInput."""
     if data.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains: radius = '0.1 um', for example")

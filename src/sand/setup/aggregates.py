@@ -130,9 +130,7 @@ def hexagonal(
     i, j, k = _sites(nx, ny, nz).T
     i, j, k = i - i.min(), j - j.min(), k - k.min()
     odd = k % 2
-    grid = np.column_stack(
-        [i + 0.5 * ((j + odd) % 2), np.sqrt(0.75) * (j + odd / 3.0), np.sqrt(2.0 / 3.0) * k],
-    )
+    grid = np.column_stack([i + 0.5 * ((j + odd) % 2), np.sqrt(0.75) * (j + odd / 3.0), np.sqrt(2.0 / 3.0) * k])
     return _regular(grid, radius, material, moment, moments, magnetic, random_streams(seed))
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..analysis.clusters import labels_of
 from ..basics.box import Box
+from ..basics.clusters import labels_of
 from ..basics.errors import BadInput, first_problems
 from ..basics.grains import ROUNDED, Grains
 from ..basics.initial_pairs import MOST_MESSAGES, at_same_place, most_overlap

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.clusters import closes_through_boundary, in_one_piece
 from ..basics.box import Box
+from ..basics.clusters import closes_through_boundary, in_one_piece
 from ..basics.errors import BadInput, warn
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts

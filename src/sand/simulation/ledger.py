@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..analysis.body_motion import temperatures_of
-from ..analysis.clusters import labels_of, mean_size
+from ..analysis.clusters import mean_size
 from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
+from ..basics.clusters import labels_of
 from ..basics.constants import BOLTZMANN
 from ..basics.errors import BadInput
 from ..basics.grains import Grains

@@ -14,16 +14,7 @@ import numpy as np
 
 from ..basics.errors import BadInput, FilesFailed
 from ..basics.paths import user_path
-from ..basics.state import (
-    CLOCK,
-    CONTACT_STEPS,
-    COUNT,
-    CUTOFF,
-    GRAINS_AWAKE,
-    LARGEST_OVERLAP,
-    LOST,
-    STAGE,
-)
+from ..basics.state import CLOCK, CONTACT_STEPS, COUNT, CUTOFF, GRAINS_AWAKE, LARGEST_OVERLAP, LOST, STAGE
 from ..basics.version import __version__
 from ..compiler.jit import cache_folder
 from ..io import run_folder as files

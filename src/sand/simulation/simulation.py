@@ -306,13 +306,15 @@ class Simulation(ReadOnlySettings):
         -------
         dict[str, Any]
             `force` (N, 3) [N], `torque` (N, 3) [N m], `field` (N, 3) [T], and `energy`, a dictionary [J] by name.
+            Those of contacts are left out on grains of clusters that move as rigid bodies.
         """
         self._begin()
         row = self._log_row()
         names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *force_columns(self._engine)))
+        force, torque = self._engine.stepper.loads(self._engine)
         return {
-            "force": self.grains.force.copy(),
-            "torque": self.grains.torque.copy(),
+            "force": force,
+            "torque": torque,
             "field": self.grains.field.copy(),
             "energy": {name: row[name] for name in names},
         }

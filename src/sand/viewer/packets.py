@@ -94,11 +94,7 @@ def grains_packet(frame: Any, unit: float) -> bytes:
     """
     if len(frame.materials) > 256:
         raise BadInput(f"the run has {len(frame.materials)} materials; the viewer supports at most 256")
-    arrays = {
-        "radius": frame.radius / unit,
-        "mass": frame.mass,
-        "material": frame.material.astype(np.uint8),
-    }
+    arrays = {"radius": frame.radius / unit, "mass": frame.mass, "material": frame.material.astype(np.uint8)}
     return encode({}, arrays)
 
 

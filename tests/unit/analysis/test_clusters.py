@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from sand.analysis.clusters import FEW, cluster_labels, cluster_sizes, mean_cluster_size, unwrapped
+from sand.analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size, unwrapped
 from sand.basics.box import Box
+from sand.basics.clusters import FEW
 
 
 @pytest.mark.parametrize("seed", range(5))

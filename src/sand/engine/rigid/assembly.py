@@ -19,7 +19,9 @@ from ...contact.law import ContactLaw, Pairing, contact_constants
 from ...contact.model import Contact
 from ...forces.base import Force
 from ...forces.pair.ewald_force import EwaldForce
+from ...integrate.hooks import Hook
 from ...integrate.parts import ContactParameters
+from ...integrate.rigid.awake_clusters import HeldLoads, add_held_loads
 from ...integrate.rigid.body_friction import LARGEST_DEVIATE
 from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
@@ -44,7 +46,7 @@ class BodiesKind(Kind):
 
     keeps_order = True
 
-    def check(self, forces: Sequence[Force], others: Sequence[str], neighbours: Neighbours) -> list[str]:
+    def check(self, forces: Sequence[Force], neighbours: Neighbours) -> list[str]:
         """Refuse what rigid clusters cannot do, all problems at once; returns warnings."""
         contact = next((f for f in forces if isinstance(f, Contact)), None)
         problems = []
@@ -64,7 +66,6 @@ class BodiesKind(Kind):
             )
         ramps = [f"{force.name}.{name}" for force in forces for name in ramps_of(force)]
         problems += [f"rigid clusters cannot follow the ramp {name}; use a number, or {GRAINS}" for name in ramps]
-        problems += [f"rigid clusters cannot have {noun}; {GRAINS}" for noun in others]
         if neighbours.order == "curve":
             problems.append(
                 f"rigid clusters need order = 'as given' or 'auto' in [neighbours], not 'curve'; or {GRAINS}"
@@ -111,7 +112,7 @@ class BodiesKind(Kind):
             longest_awake=awake,
             smallest_radius=float(grains.radius.min()),
             friction_rate=rate,
-            substeps=True,
+            substeps=not self.holds,
         )
 
     def complete(self, engine: Engine, forces: Sequence[Force], build: Build) -> None:
@@ -128,12 +129,17 @@ class BodiesKind(Kind):
         state.bodies = body_arrays(len(state.grains), in_gas=parameters.gas.gas.on)
         near = [_between_all(force) for force in forces]
         inner = build(near, Neighbours("all pairs", order="as given"))
+        if self.holds and engine.content.pair_forces:
+            stages = dict(inner.content.of_components)
+            none = HeldLoads(np.zeros((3, 0)), np.zeros((3, 0)))
+            stages[Hook.LOADS] = [*stages.get(Hook.LOADS, ()), (add_held_loads, none)]
+            inner.content = inner.content._replace(of_components=stages).for_part(len(state.grains))
         limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
         steps = BodySteps(Part(inner, CONTACT_STEPS))
         of_quick = dataclasses.replace(inner, parameters=own, warnings=engine.warnings, stepper=steps)
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
-        engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), quick)
+        engine.stepper = BodySteps(Part(inner, CONTACT_STEPS), None if self.holds else quick)
 
 
 def _between_all(force: Force) -> Force:

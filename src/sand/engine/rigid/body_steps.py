@@ -37,16 +37,19 @@ from ...basics.state import (
 from ...compiler.stage import PythonStage, Stage
 from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
+from ...integrate.hooks import Hook
 from ...integrate.parts import DT, Stop
 from ...integrate.rigid.awake_clusters import (
     ClusterMeasures,
+    add_held_loads,
     cluster_measures,
     kick_clusters,
     measure_clusters_stage,
     store_rest,
 )
+from ...integrate.rigid.body_touches import CLEAR, LOADED, NEAR
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
-from ...integrate.rigid.rigid_driver import CLEAR, LOADED, advance_bodies, mark_near_bodies
+from ...integrate.rigid.rigid_driver import advance_bodies, mark_near_bodies
 from ...integrate.stages import finish_gas
 from ..engine import Engine, GrainSteps
 from ..measures import external_energy
@@ -74,6 +77,7 @@ SPANS = (
     "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
     "rigid body, and takes contact steps all the time; use a larger box"
 )
+LOADS = ("force", "torque")
 MOVING_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
 """Arrays of bodies that change in a step."""
 
@@ -129,7 +133,7 @@ class BodySteps(GrainSteps):
     def begin(self, engine: Engine) -> None:
         """Make a body of each grain without contacts; clusters are awake."""
         state = engine.regular_state
-        form_bodies(state)
+        form_bodies(state, np.union1d(engine.content.heavy, state.held_grains()))
         self._list_awake(state)
         if self._grains.size:  # the search for touches needs mass and inertia of awake clusters
             present = self._take_awake(state)
@@ -138,6 +142,19 @@ class BodySteps(GrainSteps):
             for _, own in self._awake_clusters():
                 describe_body(state, self._grains[own], present.clusters.offset[:, own])
         self.sum_outer_loads(engine)
+
+    def loads(self, engine: Engine) -> tuple[np.ndarray, np.ndarray]:
+        """As `GrainSteps.loads`, with those of the contacts of awake clusters."""
+        state = engine.state.copy()
+        contacts, grains = state.contacts, state.grains.arrays
+        columns = contacts_of(state, state.bodies.asleep == 0)
+        for side, sign, torque in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
+            index = contacts.pair[side, columns]
+            np.add.at(grains.force.T, index, sign * contacts.force.T[columns])
+            np.add.at(grains.torque.T, index, torque.T[columns])
+        for stage, numbers in engine.content.of_components.get(Hook.LOADS, ()):
+            stage.run(engine.table_of(state), numbers)
+        return state.grains.force, state.grains.torque
 
     def summary(self, state: State) -> dict[str, Any]:
         """Time awake, steps of each level, and the largest load at rest."""
@@ -252,7 +269,10 @@ class BodySteps(GrainSteps):
         if self._measures.size.size != len(self._grains):
             self._measures = cluster_measures(len(self._grains))
             self._remainder = np.zeros((2, 3, len(self._grains)))
-        return self.part.take(state, self._grains, self._columns)
+        taken = self.part.take(state, self._grains, self._columns)
+        for loads in self._held_loads():
+            loads[...] = 0.0
+        return taken
 
     def _take_contact_steps(self, engine: Engine) -> Stop:
         """Contact steps of the awake grains for one step of the bodies."""
@@ -268,7 +288,7 @@ class BodySteps(GrainSteps):
         present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
         inner.drive(-math.inf, 1)
         present.count[STEPS] = 0
-        self._kick_by_far_loads(state)
+        self._begin_far_loads(state)
         self._vibrated = np.zeros(len(self._grains), bool)
         pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / _limits(engine).longest_awake)
         for k in range(1, pieces):
@@ -282,6 +302,8 @@ class BodySteps(GrainSteps):
             return stop
         if engine.parameters.gas.gas.on:  # since their last kick, so that none is left for the next step
             finish_gas.run(inner.table_of(present))
+            for stage, numbers in inner.content.of_components.get(Hook.BETWEEN_CYCLES, ()):
+                stage.run(inner.table_of(present), numbers, Hook.BETWEEN_CYCLES)
         self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
         self.part.give_back(state)
         self._columns = self.part.columns
@@ -308,13 +330,48 @@ class BodySteps(GrainSteps):
         starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
         return list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
 
-    def _kick_by_far_loads(self, state: State) -> None:
-        """Half a kick of the awake clusters by the loads of all grains that the inner engine does not sum."""
+    def _sum_far_loads(self, state: State) -> bool:
+        """Set `_remainder` to the loads of all grains that the inner engine does not sum; returns whether it is set."""
         full, near = state.long_range, self.part.state.long_range
         if full.force.size:
             self._remainder[0] = full.force[:, self._grains] - near.force
             self._remainder[1] = full.torque[:, self._grains] - near.torque
+        return full.force.size > 0
+
+    def _held_loads(self) -> tuple[np.ndarray, ...]:
+        """Forces and torques (3, n) that act on awake grains for the whole step; none where rigid kicks do."""
+        found = self.part.engine.content.of_components.get(Hook.LOADS, ())
+        return next((numbers for stage, numbers in found if stage is add_held_loads), ())
+
+    def _begin_far_loads(self, state: State) -> None:
+        """Hold the far loads for the step, or kick the awake clusters by half of them."""
+        if not self._sum_far_loads(state):
+            return
+        for loads, far, name in zip(held := self._held_loads(), self._remainder, LOADS, strict=False):
+            loads[...] = far
+            getattr(self.part.state.grains.arrays, name)[...] += far
+        if not held:
             self._kick(float(state.clock[STEP]))
+
+    def _end_far_loads(self, state: State) -> None:
+        """Kick the awake clusters by half of the far loads, or by half of the change of those that were held."""
+        if not self._sum_far_loads(state):
+            return
+        if self._held_loads():
+            self._end_held_loads(state)
+        else:
+            self._kick(float(state.clock[STEP]))
+
+    def _end_held_loads(self, state: State) -> None:
+        """Half a kick of the awake grains by the change of the held loads in this step; logs the work of a drive."""
+        force, torque = (far - held for far, held in zip(self._remainder, self._held_loads(), strict=True))
+        grains, heavy = self.part.state.grains.arrays, self.part.engine.content.heavy
+        half, power = 0.5 * float(state.clock[STEP]), 0.0
+        for loads, motion, inertia in ((force, grains.velocity, grains.mass), (torque, grains.spin, grains.inertia)):
+            power += float((loads[:, heavy] * motion[:, heavy]).sum())
+            loads[:, heavy] = 0.0
+            motion += half * loads / inertia
+        state.lost[OUTSIDE] += half * power
 
     def _kick(self, step: float) -> None:
         """Half a kick of the awake clusters by the loads `_remainder`, for a step [s]."""
@@ -369,7 +426,7 @@ class BodySteps(GrainSteps):
             self.kick_awake(state, *self.quick.slow_loads(state), float(state.clock[STEP]))
             return
         present, bodies = self.part.state, state.bodies
-        self._kick_by_far_loads(state)
+        self._end_far_loads(state)
         self._store_velocities(state)
         measures = self._measures
         self._measure_vibrations(engine)
@@ -383,7 +440,7 @@ class BodySteps(GrainSteps):
         bodies.offset[:, self._grains] = present.clusters.offset
         bodies.orientation[:, self._grains] = np.array([[0.0], [0.0], [0.0], [1.0]])
         bodies.inner_field[:, self._grains] = 0.0
-        mark_near_bodies.run(engine.table_of(state))
+        self._mark_near(engine)
         rested = False
         for k, own in clusters:
             first = int(self._grains[k])
@@ -403,6 +460,15 @@ class BodySteps(GrainSteps):
                 rested = True
         if rested:
             self.sort_members(state)
+
+    def _mark_near(self, engine: Engine) -> None:
+        """Mark bodies near others or walls, and those with driven grains, which do not come to rest."""
+        state, table = engine.regular_state, engine.table_of(engine.regular_state)
+        mark_near_bodies.run(table)
+        for stage, numbers in engine.content.of_components.get(Hook.NEAR_BODIES, ()):
+            stage.run(table, numbers, Hook.NEAR_BODIES)
+        firsts = state.bodies.first[engine.content.heavy]
+        state.bodies.near[firsts] = np.maximum(state.bodies.near[firsts], NEAR)
 
     def _fits(self, engine: Engine, own: np.ndarray) -> bool:
         """Whether a cluster extends over less than half of the box along each periodic axis.

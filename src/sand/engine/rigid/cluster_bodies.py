@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...analysis.clusters import cluster_labels
 from ...basics.arrays import LOADS_OF_BODIES
+from ...basics.clusters import labels_of
 from ...basics.state import BODIES, CONTACTS, State
 from ...forces.gas_loops import GasParameters
 from ...integrate.rigid.body_friction import friction_modes
@@ -41,10 +41,13 @@ def sort_members(state: State) -> None:
     bodies.start[: len(starts)], bodies.start[len(starts) :] = starts, len(state.grains)
 
 
-def form_bodies(state: State) -> None:
-    """Make a body of each grain without contacts, at rest, and of each cluster, awake and not yet described."""
+def form_bodies(state: State, held: np.ndarray) -> None:
+    """Make a body of each grain without contacts, at rest, and of each cluster, awake and not yet described.
+
+    Single grains among the `held` ones are awake, too.
+    """
     bodies, n = state.bodies, len(state.grains)
-    labels = cluster_labels(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
+    labels = labels_of(n, state.contacts.pair[:, : state.count[CONTACTS]].T)
     first = np.full(labels.max(initial=-1) + 1, n)
     np.minimum.at(first, labels, np.arange(n))
     bodies.first[:], bodies.asleep[:] = first[labels], 0
@@ -56,7 +59,7 @@ def form_bodies(state: State) -> None:
     bodies.changed[:] = bodies.load[:] = 0.0
     bodies.reserve[:] = math.inf
     bodies.strength[...] = math.inf
-    for i in np.flatnonzero(np.bincount(bodies.first, minlength=n) == 1).tolist():
+    for i in np.setdiff1d(np.flatnonzero(np.bincount(bodies.first, minlength=n) == 1), held).tolist():
         rest_grain(state, i)
 
 

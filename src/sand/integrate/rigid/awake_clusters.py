@@ -1,7 +1,7 @@
 """Clusters of rigid-body runs that are awake: rigid kicks by other bodies, and what tells whether they are at rest."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -75,6 +75,26 @@ def kick_clusters(grains, contacts, clusters, span, scratch, parameters):
             i = clusters.member[k]
             accrue(grains.velocity, i, add(velocity, cross(rotation, load(clusters.offset, i))))
             accrue(grains.spin, i, rotation)
+    return 0
+
+
+class HeldLoads(NamedTuple):
+    """Loads on grains that are constant during a step of bodies."""
+
+    force: np.ndarray  # (3, n) [N]
+    torque: np.ndarray  # (3, n) [N m]
+
+    def for_part(self, heavy: np.ndarray, grains: int) -> Self:
+        """Memory for another number of grains."""
+        return self._replace(force=np.zeros((3, grains)), torque=np.zeros((3, grains)))
+
+
+@stage("the held loads on awake clusters")
+def add_held_loads(grains, parameters):
+    """Add `HeldLoads` to the loads of the grains."""
+    for i in range(grains.mass.size):
+        accrue(grains.force, i, load(parameters.force, i))
+        accrue(grains.torque, i, load(parameters.torque, i))
     return 0
 
 

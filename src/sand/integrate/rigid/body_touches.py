@@ -42,6 +42,13 @@ def reach_of_pair(grains, bodies, i, j, apart, gas, friction_rate, h):
     return reach
 
 
+@formula
+def reach_of_plane(grains, bodies, i, closing, gas, friction_rate, h):
+    """As `reach_of_pair`, of grain i and a plane, which approach each other at the speed `closing`."""
+    reach = TOUCH_SPEED * max(closing, 0.0) * h + _approach(grains, bodies, i, h)
+    return reach + (gas_displacement(grains, bodies, i, friction_rate, gas.gas, h) if gas.gas.on else 0.0)
+
+
 @loop
 def find_near_bodies(grains, bodies, pair_list, count, span, gas, friction_rate, h):
     """Mark bodies near others (`BodyArrays.near`) for a step of h [s]."""

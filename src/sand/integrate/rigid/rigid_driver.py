@@ -36,6 +36,7 @@ from ...numerics.quaternion import turned
 from ...numerics.vec import accrue, dot, load, load4, nearest_image, norm, put, sub
 from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
+from ..hooks import Hook, call_hook
 from ..motion import wrap_all
 from ..parts import DRIVER_PARTS, Stop
 from ..respa import add_long_range_loads
@@ -235,10 +236,11 @@ def first_half(s, some_awake):
             s.bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
         h = s.until - s.clock[TIME]
+    s.clock[STEP] = h
     if not takes_substeps:
         find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
+        call_hook(s, Hook.NEAR_BODIES)
     find_loaded_bodies(s.grains, s.bodies, s.clock, s.count)
-    s.clock[STEP] = h
     if any_has_to_wake(s.bodies, s.count):
         s.bodies.quick[:] = 0
         return Stop.HAS_TO_WAKE.value
@@ -246,6 +248,8 @@ def first_half(s, some_awake):
         return Stop.SUBSTEPS.value
     kick_bodies(s.bodies, s.count, 0.5 * h)
     drift_with_work(s, h)
+    if not some_awake:
+        call_hook(s, Hook.NONE_AWAKE)
     s.count[STAGE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 

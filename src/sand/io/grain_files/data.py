@@ -41,14 +41,7 @@ COMPONENTS = {
     if start or not joint
 }
 WHOLE = {name: quantity for table in (VECTORS, SCALARS) for quantity, names in table.items() for name in names}
-UNITS = {
-    "velocity": "m/s",
-    "spin": "rad/s",
-    "moment": "A m^2",
-    "charge": "C",
-    "mass": "kg",
-    "density": "kg/m^3",
-}
+UNITS = {"velocity": "m/s", "spin": "rad/s", "moment": "A m^2", "charge": "C", "mass": "kg", "density": "kg/m^3"}
 """Units of SI of the quantities that are not lengths."""
 DERIVED = frozenset(
     (

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...analysis.clusters import cluster_labels
+from ...basics.clusters import labels_of
 from ...basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from ...forces.gas import Gas
 
@@ -40,7 +40,7 @@ class Bodies(NamedTuple):
 def bodies_of(simulation: Simulation) -> Bodies:
     """The bodies of a simulation at its start."""
     grains, box = simulation.start, simulation.box
-    labels = cluster_labels(len(grains), grains.touching(box)[0])
+    labels = labels_of(len(grains), grains.touching(box)[0])
     count = int(labels.max()) + 1
 
     def summed(values: np.ndarray) -> np.ndarray:
