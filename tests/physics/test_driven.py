@@ -127,6 +127,54 @@ def test_a_gas_with_driven_grains_closes_its_ledger_and_is_resumed_bit_for_bit(t
 
 
 @pytest.mark.compiled("contacts")
+def test_settling_leads_to_the_motion_of_a_driven_grain(record_bound):
+    """A grain on a driven one: x¨ + x˙/τ + ω²x = 0 relative to it, whatever its velocity; the ledger closes.
+
+    The energy of the oscillation is E₀ e^(−t/τ) (1 + b), |b| ≤ 1/(2ωτ), with E₀ = ½ m v₀²; ω² = k/m, above 4e10/s for
+    0.1 μm grains, and τ = 20 ns: b ≤ 7e-4.  What settling takes is the same in the frame of the driven grain, at rest
+    or moving with 3 v₀: the velocity u of a mass 2³⁰ m has a rounding error of 2⁻⁵³ u, so that each of the 30
+    applications books up to 2⁻²³ m u² wrongly, in all 30 × 18 × 2⁻²³ = 6e-5 of E₀.
+    """
+    v, tau, taken = 1e-3, 2e-8, []
+    for u in (0.0, 3.0 * v):
+        grains = row_of_grains(2, velocity=[[u, 0, 0], [u + v, 0, 0]])
+        contact = sand.Contact(settling_time=tau)
+        sim = sand.Simulation(grains, [contact], driven=sand.Driven([0], velocity=[u, 0, 0]))
+        sim.run(until=1.5 * tau)
+        energy = 0.5 * grains.mass[0] * v**2
+        taken.append(sim.ledger["lost_settling"][-1] / energy)
+        assert sim.grains.velocity[0].tolist() == [u, 0.0, 0.0]
+        row, first = sim.ledger.rows[-1], sim.ledger.rows[0]
+        # velocity Verlet with 25 steps per period: (2π/25)²/8 of the energy
+        error = abs(row["total"] - first["total"]) / energy
+        record_bound("drift over E₀", error, most=(2.0 * math.pi / 25) ** 2 / 8)
+    record_bound("settled over E₀ (1 − e^(−1.5))", taken[0] / (1.0 - math.exp(-1.5)), least=0.995, most=1.005)
+    assert taken[1] == pytest.approx(taken[0], abs=1e-3)
+
+
+@pytest.mark.compiled("contacts")
+def test_a_chain_turns_with_its_driven_grain():
+    """Settling of a chain at rest, whose first grain is driven to turn: v → w×s and ω → w, at e^(−t/2τ).
+
+    The energy of the motion relative to the rigid rotation, ½ Σ m (w s)² + I w² at first, falls as e^(−t/τ), so that
+    after 12 τ no grain is slower or faster than w×s by more than e^(−6) w s √3 = 0.5 % of that of the last grain; to
+    this the contacts' modes add less than 1/(2ωτ) of it.  The drive gives the kinetic energy, and what settling takes.
+    """
+    radius, tau, w = 1e-8, 2e-8, 1e5
+    chain = sand.setup.chain(3, radius=radius, material="silica")
+    driven = sand.Driven([0], spin=[0, 0, w])
+    sim = sand.Simulation(chain, [sand.Contact(settling_time=tau)], driven=driven)
+    sim.run(until=12 * tau)
+    s = sim.grains.position - sim.grains.position[0]
+    rigid, fastest = np.cross([0, 0, w], s), w * np.linalg.norm(s[2])
+    assert np.abs(sim.grains.velocity - rigid).max() < 0.01 * fastest
+    assert np.abs(sim.grains.spin - [0, 0, w]).max() < 0.02 * w
+    row, first = sim.ledger.rows[-1], sim.ledger.rows[0]
+    assert row["moved"] == 0 and row["lost_settling"] > 0.0 > row["lost_outside"]
+    assert abs(row["total"] - first["total"]) < 0.01 * row["lost_settling"]
+
+
+@pytest.mark.compiled("contacts")
 def test_changes_keep_the_prescribed_motion():
     """`change` of free grains goes on with the drive; of driven ones it is refused, one line for each quantity."""
     sim = sand.Simulation(row_of_grains(3), [sand.Contact()], driven=sand.Driven([2], velocity=[0.01, 0, 0]))
@@ -147,15 +195,14 @@ WRONG = {
     "run(sand.Driven([0, 1, 2]))": ["all 3 grains are driven"],
     "run('all')": ["driven = 'a'"],
     "run(sand.Driven([0]), stepping=ForestRuth(), neighbours=sand.Neighbours(order='curve'))": ["forest-ruth", "curve"],
-    "run(sand.Driven([0]), settling='1 us')": ["settling_time"],
 }
 
 
 @pytest.mark.parametrize("wrong", WRONG)
 def test_each_mistake_is_one_line(wrong):
-    def run(*driven, settling=None, **options):
+    def run(*driven, **options):
         given = driven[0] if isinstance(driven[0], str) else driven
-        sand.Simulation(row_of_grains(3, 1e-8), [sand.Contact(settling_time=settling)], driven=given, **options)
+        sand.Simulation(row_of_grains(3, 1e-8), [sand.Contact()], driven=given, **options)
 
     with pytest.raises(BadInput) as error:
         eval(wrong, {"run": run, "sand": sand, "ForestRuth": ForestRuth})

@@ -72,7 +72,7 @@ def test_components_share_the_places_of_a_step():
     assert (number == [1, 2] * 9).all() and (hook == np.repeat(places, 2).tolist() * 3).all()
     assert (steps == np.concatenate([[k, k, k + 1, k + 1, k + 1, k + 1] for k in range(3)])).all()
     assert (contacts == 2).all()
-    assert engine.regular_time == 3 * STEP
+    assert engine.regular_state.time == 3 * STEP
 
 
 @pytest.mark.compiled("contacts")

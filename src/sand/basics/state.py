@@ -193,6 +193,15 @@ class State:
         """Which grains (N,) belong to clusters at rest, single grains included; None without rigid clusters."""
         return self.bodies.asleep == 1 if self.bodies.asleep.size else None
 
+    def limiting_grains(self) -> tuple[int, ...]:
+        """Indices of the grains that caused the last stop."""
+        return tuple(sorted({int(self.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))
+
+    def begin_empty_step(self) -> None:
+        """Be in the middle of a step of 0 s, whose second half sums the loads."""
+        self.count[STAGE] = 1
+        self.clock[STEP] = self.clock[CYCLE] = self.clock[LEFT] = 0.0
+
     def held_grains(self) -> np.ndarray:
         """Grains in tables of components, such as those in contact with walls."""
         found = [
@@ -270,16 +279,10 @@ class State:
 
     def grow(self, name: str, minimum: int = 0) -> None:
         """Allocate more columns, at least `minimum`, in the table of contacts, candidate pairs or a component."""
-        group = self.of_components.get(name) or getattr(self, name)
-        uniform = [key for key, each in arrays_of(group).items() if each.fewer == 1 and self.uniform_contacts]
-        self._put(name, grown(group, minimum, uniform))
-
-    def _put(self, name: str, group: Any) -> None:
-        """Replace a group."""
-        if name in GROUPS:
-            setattr(self, name, group)
-        else:
-            self.of_components[name] = group
+        groups = self.of_components if name in self.of_components else vars(self)
+        declared = arrays_of(groups[name])
+        uniform = [key for key, each in declared.items() if each.fewer == 1 and self.uniform_contacts]
+        groups[name] = grown(groups[name], minimum, uniform)
 
     def grow_of_components(self) -> None:
         """Allocate more columns in the tables of components, one of which is full."""

@@ -1,6 +1,6 @@
 """Components of a simulation: the user gives walls and driven grains, others follow from the forces.
 
-Each has a line in `GIVEN` or `OF_FORCES`.
+Each has a line in `COMPONENTS`.
 """
 
 from __future__ import annotations
@@ -14,26 +14,32 @@ from ..engine.component import Component
 from ..forces.base import Force
 from .cluster_cutoff import ClusterCutoff
 from .driven import DrivenGrains, read_driven
+from .gas import GasKicks
 from .ramps import Ramps
+from .settling import Settling
 from .walls import Walls, read_walls
 
-GIVEN = {"walls": (read_walls, Walls), "driven": (read_driven, DrivenGrains)}
-"""By keyword of `sand.Simulation`, which is the table of case files: what reads the user's value, and the component; in
-the order in which they act."""
-OF_FORCES = (ClusterCutoff, Ramps)
-"""Components that follow from the forces, in the order in which they act."""
+COMPONENTS: tuple[type[Component], ...] = (ClusterCutoff, Ramps, Walls, GasKicks, DrivenGrains, Settling)
+"""All components, in the order in which they act at the same place.
+
+Between two cycles each grain moves in the gas, then driven grains return to their prescribed motion, and what settling
+finds is the motion of clusters, and that of their grains relative to it.
+"""
+GIVEN = {"walls": read_walls, "driven": read_driven}
+"""What reads a component that the user gives, by keyword of `sand.Simulation`, which is the table of case files."""
 
 
 def read_components(**given: Any) -> dict[str, Component]:
     """The components that the user gives, by keyword.  Raises BadInput."""
-    return {name: component(read(given[name])) for name, (read, component) in GIVEN.items()}
+    return {each.name: each(GIVEN[each.name](given[each.name])) for each in COMPONENTS if each.name in GIVEN}
 
 
-def components_of(forces: Sequence[Force], grains: Grains, box: Box) -> list[Component]:
-    """The components that follow from the forces on these grains."""
-    return [component for each in OF_FORCES if (component := each.of(forces, grains, box)).items]
+def components_of(given: Mapping[str, Component], forces: Sequence[Force], grains: Grains, box: Box) -> list[Component]:
+    """All components that a simulation has: those that the user gave, and those that follow from the forces."""
+    found = [given.get(each.name) or each.of(forces, grains, box) for each in COMPONENTS]
+    return [each for each in found if each.items]
 
 
 def groups() -> list[Mapping[str, type]]:
     """Groups of arrays of each component, of which checkpoints have those of the components in use."""
-    return [component.groups for component in (*(each for _, each in GIVEN.values()), *OF_FORCES)]
+    return [each.groups for each in COMPONENTS]

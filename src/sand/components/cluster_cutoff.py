@@ -149,7 +149,7 @@ class ClusterCutoff(Component):
 
     def choices(self) -> dict[str, str]:
         """The cut-off at the start."""
-        return {"dipoles cut-off": f"{format_quantity(self.first.radius or 0.0, 'm')} ({self.first.reason})"}
+        return {"dipoles cut-off": str(self.first)}
 
     def present_choices(self, state: State) -> dict[str, str]:
         """The present cut-off, if it was chosen during the run."""

@@ -14,9 +14,9 @@ from ..basics.grains import Grains
 from ..basics.settings import List, Settings, Vector, Whole
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
-from ..integrate.hooks import Hook, HookStages
+from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
-from .driven_stage import KICKS_AND_CONTACTS, DrivenArrays, drive
+from .driven_stage import CHANGES, CONTACTS, KICKS, DrivenArrays, drive
 
 AT_REST = (0.0, 0.0, 0.0)
 
@@ -27,7 +27,8 @@ class Driven(Settings):
     """Grains with prescribed velocity and spin, by default held at rest.
 
     Their contacts and all forces on other grains act as usual; loads on them do not change their motion, as if mass and
-    moment of inertia were infinite. The work of the drive is recorded in `lost_outside`.
+    moment of inertia were infinite. The work of the drive is recorded in `lost_outside`. Settling
+    (`Contact.settling_time`) of their clusters leads to their rigid motion.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ class DrivenGrains(Component):
 
     name = "driven"
     noun = "driven grains"
-    keeps_order = every_step = own_columns = holds = True
+    keeps_order = every_step = own_columns = holds = in_parts = True
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""
@@ -87,8 +88,6 @@ class DrivenGrains(Component):
             problems.append(f"driven: stepping = '{setup.stepping.name}' cannot drive grains; use sand.Verlet()")
         if setup.neighbours.order == "curve":
             problems.append("driven: neighbours order = 'curve' cannot drive grains; use order = 'as given'")
-        if setup.forces.contact is not None and setup.forces.contact.settling_time is not None:
-            problems.append("driven: contact settling_time acts on whole clusters and cannot be used; remove it")
         return problems
 
     def prepare(self, grains: Grains) -> None:
@@ -104,8 +103,9 @@ class DrivenGrains(Component):
         index, own = np.array(self.heavy(), np.int64), setup.grains.arrays
         vectors = np.ascontiguousarray(velocity), np.ascontiguousarray(spin)
         driven = DrivenArrays(index, *vectors, own.mass[index], own.inertia[index])
-        changed = (Hook.BETWEEN_CYCLES,) if setup.forces.gas else ()
-        return {hook: [(drive, driven)] for hook in (*KICKS_AND_CONTACTS, *changed)}
+        changes = setup.forces.gas or getattr(setup.forces.contact, "settling_time", None) is not None
+        hooks = (*KICKS, *CONTACTS, *CHANGES) if changes else (*KICKS, *CONTACTS)
+        return {hook: [(drive, driven)] for hook in hooks}
 
     def heavy(self) -> list[int]:
         """Indices of all driven grains."""

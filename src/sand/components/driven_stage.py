@@ -1,8 +1,9 @@
 """Grains whose velocity and spin are prescribed.
 
 Their loads are computed as those of all grains, but in the parts of a step that change velocities they have another
-mass and moment of inertia: infinite in kicks, which then change nothing, and so large in contact events that impulses
-between two grains act with the reduced mass of the other one.  The work of the drive is minus that of the loads on
+mass and moment of inertia: infinite in kicks, which then change nothing, and so large in contact events and in the
+settling of clusters that impulses between two grains act with the mass of the other one; the rigid motion of a cluster,
+to which settling leads, is then that of its driven grains.  The work of the drive is minus that of the loads on
 driven grains, ½ Δt (F·v + M·ω) with the loads at either end of a step, and minus J·v for an impulse J.
 """
 
@@ -90,17 +91,17 @@ def drive(grains, lost, scratch, parameters, block):
         lost[OUTSIDE] += 0.5 * scratch[DT] * work_of_loads(grains, parameters)
     elif block == Hook.BEFORE_CONTACTS.value:
         set_masses(grains, parameters, HEAVY)
-    elif block == Hook.AFTER_CONTACTS.value:
+    elif block == Hook.AFTER_CONTACTS.value or block == Hook.AFTER_CHANGES.value:
         lost[OUTSIDE] += restore_velocities(grains, parameters)
         set_masses(grains, parameters, 1.0)
-    else:  # BETWEEN_CYCLES, after drag and random kicks
+    else:  # after drag and random kicks; BETWEEN_CYCLES, the settling of clusters follows
         lost[OUTSIDE] += kinetic_energy(grains, parameters)
         restore_velocities(grains, parameters)
+        set_masses(grains, parameters, HEAVY if block == Hook.BETWEEN_CYCLES.value else 1.0)
     return 0
 
 
-KICKS_AND_CONTACTS = (
-    *(Hook.BEFORE_DRIFT, Hook.AFTER_DRIFT, Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS),
-    *(Hook.BEFORE_KICK, Hook.AFTER_KICK),
-)
-"""Where driven grains are held and released."""
+KICKS = Hook.BEFORE_DRIFT, Hook.AFTER_DRIFT, Hook.BEFORE_KICK, Hook.AFTER_KICK
+CONTACTS = Hook.BEFORE_CONTACTS, Hook.AFTER_CONTACTS
+CHANGES = Hook.BETWEEN_CYCLES, Hook.AFTER_CHANGES, Hook.END_OF_BODIES
+"""Where driven grains are held and released; in CHANGES if a gas or settling changes velocities."""

@@ -50,13 +50,11 @@ class Ramps(Component):
         forces = [force_at(force, state.time) for force in self.items]
         now: dict[str, Any] = {force.name: force for force in forces if force.name in self._names}
         engine.set_parameters(**engine.force_dependent(forces, state.grains)._asdict())
-        engine.set_forces(
-            [
-                (force, sums, numbers._replace(own=now[force.name].constants()) if force.name in now else numbers)
-                for force, sums, numbers in engine.long_range
-            ],
-            [now.get(force.name, force) for force in engine.external],
-        )
+        long_range = [
+            (force, sums, numbers._replace(own=now[force.name].constants()) if force.name in now else numbers)
+            for force, sums, numbers in engine.long_range
+        ]
+        engine.set_forces(long_range, [now.get(force.name, force) for force in engine.external])
 
     def update(self, engine: Engine) -> None:
         """Change parameters if the regular state is in new intervals of the ramps, and compute loads anew.

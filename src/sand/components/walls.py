@@ -141,7 +141,7 @@ class Walls(Component):
 
     name = "walls"
     noun = "walls"
-    holds = True
+    holds = in_parts = True
     groups: ClassVar = {"walls": WallArrays, "wall_contacts": WallContactArrays}
 
     def problems(self, setup: Setup) -> list[str]:

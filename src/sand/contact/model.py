@@ -69,9 +69,9 @@ class Contact(Settings):
     settling_time : float or str, optional
         τ [s] > 0: velocities of grains relative to the rigid motion of their cluster are multiplied by
         e^(−t/τ). The energy of modes with ω > 1/2τ decays as e^(−t/τ), whereas dashpots hardly damp slow
-        collective modes. Momentum and angular momentum of every cluster are kept; slow restructuring is slowed
-        down as well. Energy removed: `lost_settling`. No noise belongs to it: with a bath, contacts are colder
-        than T. Default: none.
+        collective modes. Momentum and angular momentum of every cluster are kept; the rigid motion of a cluster
+        with driven grains (`sand.Driven`) is that of these. Slow restructuring is slowed down as well. Energy removed:
+        `lost_settling`. No noise belongs to it: with a bath, contacts are colder than T. Default: none.
     mixing : str, optional
         γ_eff of unequal materials: "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
     law : str, optional

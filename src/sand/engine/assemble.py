@@ -130,15 +130,13 @@ def build_engine(
         pair_forces=[own[1:] for own in long_range],
         external_forces=[(force.formula, force.numbers()) for force in by_type.external],
         flight=stepping.flight,
-        gas=bool(by_type.gas),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
         of_components=of_components,
         heavy=np.array([i for each in extra for i in each.heavy()], np.int64),
     )
-    capacity = int(OVER_ALLOCATION * len(touching))
-    over_all_pairs = any(not own and not sums.own_memory for own, sums in zip(listed, loops, strict=True))
-    state = new_state(wrapped, box, parameters, content, capacity, over_all_pairs=over_all_pairs)
+    all_pairs = any(not own and not sums.own_memory for own, sums in zip(listed, loops, strict=True))
+    state = new_state(wrapped, box, parameters, content, int(OVER_ALLOCATION * len(touching)), over_all_pairs=all_pairs)
     state.count[COMPARED] = 0 if any(each.watches_contacts for each in extra) else -1
     for each in extra:
         each.add_arrays(state, law, parameters.settings)
@@ -158,7 +156,8 @@ def build_engine(
     )
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
-        return build_engine(wrapped, others, box, verlet, search, seed, holding, fresh=False)
+        own = [each for each in extra if each.in_parts]
+        return build_engine(wrapped, others, box, verlet, search, seed, own, fresh=False)
 
     kind.complete(engine, forces, build)
     for each in extra:

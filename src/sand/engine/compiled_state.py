@@ -34,6 +34,8 @@ from ..integrate.task_queue import (
 from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.spatial_sort import inverse, reorder_grains
 
+LongRangeLoops = Sequence[tuple[LongRangeForce, LongRangeSums, Any]]
+"""Long-range forces with their loops and numbers."""
 ALONE = 2000
 """Grains from which on several threads take the shorter step to a time of output."""
 
@@ -68,8 +70,8 @@ class CompiledState:
         What the program is made of.
     external : Sequence[ExternalForce]
         Per-grain forces.
-    long_range : Sequence[tuple[LongRangeForce, Any, Any]]
-        Long-range forces that act on at least one grain, with their loops and numbers.
+    long_range : LongRangeLoops
+        Long-range forces that act on at least one grain.
     table : Table
         The parts of the simulation, with the arrays of the regular state.
     program : Program or None
@@ -84,7 +86,7 @@ class CompiledState:
     parameters: StepParameters
     content: ProgramContent
     external: Sequence[ExternalForce]
-    long_range: Sequence[tuple[LongRangeForce, LongRangeSums, Any]]
+    long_range: LongRangeLoops
     table: Table = field(init=False)
     program: Program | None = field(init=False, default=None)
     workers: WorkerThreads | None = field(init=False, default=None)
@@ -226,11 +228,7 @@ class CompiledState:
             self.table.set(name, value)
         self.program = None
 
-    def set_forces(
-        self,
-        long_range: Sequence[tuple[LongRangeForce, LongRangeSums, Any]],
-        external: Sequence[ExternalForce],
-    ) -> None:
+    def set_forces(self, long_range: LongRangeLoops, external: Sequence[ExternalForce]) -> None:
         """Use other numbers of the same forces from the next step on; loads and contacts stay as they are."""
         self.long_range, self.external = long_range, external
         self.content = self.content._replace(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.state import State
 from ..contact.law import ContactLaw
+from ..forces.base import Force
 from ..integrate.hooks import HookStages
 from ..integrate.integrator import Integrator
 from ..integrate.parts import ContactParameters
@@ -64,6 +65,12 @@ class Component:
     watches_contacts : bool
         Whether `contacts_changed` is called; the driver then returns after each step in which a contact formed or
         broke.
+    in_parts : bool
+        Whether it also acts on grains of awake clusters within a step of rigid bodies.
+    last_action : int or None
+        Entry of the clock with the time of its last action, which is the present one when a change adds it.
+    own_stages : HookStages
+        Its stages, if they are the same in all simulations.
     groups : Mapping[str, type]
         Groups of its arrays (`basics.array_groups`) by name: parts of a simulation that stages take by this name,
         `State.of_components`, and its arrays in a checkpoint.
@@ -78,10 +85,23 @@ class Component:
     own_columns: ClassVar[bool] = False
     holds: ClassVar[bool] = False
     watches_contacts: ClassVar[bool] = False
+    in_parts: ClassVar[bool] = False
+    last_action: ClassVar[int | None] = None
+    own_stages: ClassVar[HookStages] = {}
     groups: ClassVar[Mapping[str, type]] = {}
 
     def __init__(self, items: Sequence[Any]):
         self.items = tuple(items)
+
+    @classmethod
+    def of(cls, forces: Sequence[Force], grains: Grains, box: Box) -> Self:
+        """What there is of it for these forces, grains and box."""
+        return cls([force for force in forces if cls.follows_from(force)])
+
+    @staticmethod
+    def follows_from(force: Force) -> bool:
+        """Whether there is such a component because of this force."""
+        return False
 
     def problems(self, setup: Setup) -> list[str]:
         """Why it does not fit to the other parts of a simulation, a sentence each."""
@@ -95,8 +115,8 @@ class Component:
         return forces
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
-        """Stages that the driver calls at each place of a step, with their parameters."""
-        return {}
+        """Stages that the driver calls at each place of a step, with their parameters: by default, `own_stages`."""
+        return self.own_stages
 
     def heavy(self) -> list[int]:
         """Grains whose mass counts as infinite in contacts."""

@@ -18,10 +18,6 @@ from ..basics.state import (
     COMPARED,
     CONTACT_STEP,
     CONTACT_STEPS,
-    CYCLE,
-    GRAIN1,
-    GRAIN2,
-    LEFT,
     LISTED,
     LONG_RANGE_SUMS,
     MADE,
@@ -29,8 +25,6 @@ from ..basics.state import (
     REBUILT,
     REJECTED,
     SLIPPED,
-    STAGE,
-    STEP,
     STEP_INCREASES,
     STEPS,
     SUBSTEPS,
@@ -113,7 +107,7 @@ class Engine(CompiledState):
     neighbours : Neighbours
         Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
     force_dependent : callable
-        `(forces, grains)` → `kinds.ForceDependent`: the parameters of steps that follow from numbers of the forces.
+        `(forces, grains)` → `step_parameters.ForceDependent`: what follows from numbers of the forces.
     components : Sequence
         Components (`component.Component`); the engine calls their methods for Python at fixed places.
     stepper : GrainSteps
@@ -133,8 +127,7 @@ class Engine(CompiledState):
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Engine:
         """A copy with a table of its own."""
-        own = {each.name: copy.deepcopy(getattr(self, each.name), memo) for each in fields(self) if each.init}
-        other = type(self)(**own)
+        other = type(self)(**{f.name: copy.deepcopy(getattr(self, f.name), memo) for f in fields(self) if f.init})
         other._is_sorted, other._output_time = self._is_sorted, self._output_time
         return other
 
@@ -294,7 +287,7 @@ class Engine(CompiledState):
     def begin(self) -> None:
         """Form contacts between grains that touch at the start, with no energy booked, and compute the first loads."""
         state = self.state
-        state.count[STAGE] = 1
+        state.begin_empty_step()
         state.count[CHECKED] = state.count[STEP_INCREASES] = -INCREASE_INTERVAL
         state.clock[CONTACT_STEP] = math.inf
         self.drive(-math.inf, 1)
@@ -314,8 +307,7 @@ class Engine(CompiledState):
         state = self.stored_state
         steps, sums = state.steps, int(state.count[LONG_RANGE_SUMS])
         record_bath_work(self, state)  # the loads that follow have no noise
-        state.count[STAGE] = 1
-        state.clock[STEP] = state.clock[CYCLE] = state.clock[LEFT] = 0.0
+        state.begin_empty_step()
         self.drive(-math.inf, steps + 1)
         state.count[STEPS], state.count[LONG_RANGE_SUMS] = steps, sums
 
@@ -350,7 +342,3 @@ class Engine(CompiledState):
             return False
         moved = state.box.nearest((state.grains.arrays.position - state.long_range.anchor).T)
         return bool((moved**2).sum(axis=1).max() <= (0.5 * self.parameters.search.margin) ** 2)
-
-    def limiting_grains(self) -> tuple[int, ...]:
-        """Indices of the grains that caused the last stop."""
-        return tuple(sorted({int(self.state.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))

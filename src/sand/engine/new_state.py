@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ..basics.arrays import (
     ALWAYS_RECORDED,
     CELL_ARRAYS,
@@ -71,6 +69,6 @@ def new_state(
             all_blocks(grains) if pair_forces and over_all_pairs else 0,
             unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
-        clusters=cluster_arrays(count if settings.settling_time < math.inf else 0),
+        clusters=cluster_arrays(0),
         uniform_contacts=uniform_contacts,
     )

@@ -111,13 +111,11 @@ def respa_settings(
     most = verlet.max_cycle_steps if forces.long_range and not every_step else 1
     scheme = verlet.far if forces.contact and most > 1 else "every step"
     taylor = scheme.startswith("taylor")
-    if taylor:
-        without = [force.name for force, sums, _ in loops if sums.rates is None]
-        if without:
-            raise BadInput(
-                f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "
-                "lacks; use far = 'impulse' or 'every step'"
-            )
+    if without := [force.name for force, sums, _ in loops if taylor and sums.rates is None]:
+        raise BadInput(
+            f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "
+            "lacks; use far = 'impulse' or 'every step'"
+        )
     return RespaSettings(most, verlet.far == "taylor-literal", scheme == "impulse", taylor)
 
 
@@ -136,10 +134,8 @@ def longest_displacement(grains: Grains, box: Box, found: ChosenSearch) -> float
 
 def external_work(external: Sequence[ExternalForce], box: Box) -> ExternalWork:
     """Whether the energy of external forces depends on time, or on a position that periodic boundaries make jump."""
-    position_dependent = any(getattr(f, "position_dependent", False) for f in external)
-    return ExternalWork(
-        any(getattr(f, "time_dependent", False) for f in external), position_dependent and not box.is_open
-    )
+    of_position = not box.is_open and any(getattr(f, "position_dependent", False) for f in external)
+    return ExternalWork(any(getattr(f, "time_dependent", False) for f in external), of_position)
 
 
 def _gas_settings(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
@@ -149,9 +145,11 @@ def _gas_settings(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
 
 
 def step_criteria(grains: Grains, stepping: Verlet, forces: ForcesByType, pair_gap: float) -> StepCriteria:
-    """Parameters of the choice of the step size."""
+    """Parameters of the choice of the step size; `IDLE` is in units of r √(ρ/E) of the smallest grain of a material."""
     steps = [own() for f in forces.external if (own := getattr(f, "longest_step", None)) is not None]
-    idle = IDLE * min(_sound_crossing(grains, number) for number in range(len(grains.materials)))
+    steps += [GAS_PERIOD_FRACTION * gas.shortest_time(grains) for gas in forces.gas]
+    smallest = [float(grains.radius[grains.material == k].min()) for k in range(len(grains.materials))]
+    times = [r * math.sqrt(m.density / m.young_modulus) for r, m in zip(smallest, grains.materials, strict=True)]
     return StepCriteria(
         fixed=0.0 if stepping.step == "auto" else stepping.step,
         pair_gap=pair_gap,
@@ -159,15 +157,8 @@ def step_criteria(grains: Grains, stepping: Verlet, forces: ForcesByType, pair_g
         accuracy=stepping.accuracy,
         outer_field=math.fsum(f.flux_density_size() for f in forces.external),
         impact=IMPACT_DISPLACEMENT / stepping.steps_per_period,
-        longest=min([idle, *steps, *(GAS_PERIOD_FRACTION * gas.shortest_time(grains) for gas in forces.gas)]),
+        longest=min([IDLE * min(times), *steps]),
     )
-
-
-def _sound_crossing(grains: Grains, number: int) -> float:
-    """Sound-crossing time r √(ρ/E) [s] of the smallest grain of one material."""
-    material = grains.materials[number]
-    radius = float(grains.radius[grains.material == number].min())
-    return radius * math.sqrt(material.density / material.young_modulus)
 
 
 def _contact_parameters(

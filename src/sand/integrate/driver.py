@@ -321,6 +321,7 @@ def second_half(s):
     call_hook(s, Hook.END_STEP)
     if due:
         call_hook(s, Hook.BETWEEN_CYCLES)
+        call_hook(s, Hook.AFTER_CHANGES)
         if has_stage(s, Hook.BETWEEN_CYCLES) or s.respa.impulse:  # speeds changed between steps
             invalidate_speeds(s.pair_list)
     return Stop.NONE.value

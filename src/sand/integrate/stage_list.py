@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -42,7 +41,6 @@ class ProgramContent(NamedTuple):
     pair_forces: Sequence[tuple[LongRangeSums, Any]]  # loops and parameters of each
     external_forces: Sequence[tuple[Callable, Any]]  # formula and parameters of each
     flight: Stage | None  # takes one step while there are no contacts (integrator.Integrator); None: velocity Verlet
-    gas: bool  # drag and Brownian kicks
     magnetic: bool  # some grain has a moment
     wide: bool  # enough grains for the longest SIMD vectors
     of_components: HookStages
@@ -125,14 +123,10 @@ def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[i
 
 
 def hooks_of(given: ProgramContent, parameters: StepParameters) -> HookStages:
-    """The stages at each place of a step: those of contacts, gas and settling, then those of components."""
+    """The stages at each place of a step: those of contacts, then those of components."""
     found: dict[Hook, list[tuple[Any, Any]]] = {}
     if variant_of(parameters.settings) == THERMAL:
         found[Hook.BATH_WORK] = [(stages.bath_work, ())]
-    if given.gas:
-        found[Hook.BETWEEN_CYCLES] = [(stages.kick_by_gas, ())]
-    if parameters.settings.on and parameters.settings.settling_time < math.inf:
-        found.setdefault(Hook.BETWEEN_CYCLES, []).append((stages.settle, ()))
     for hook, own in given.of_components.items():
         found.setdefault(hook, []).extend(own)
     return {hook: own for hook, own in found.items() if own}

@@ -4,23 +4,19 @@ Their numbers are the entries of the program of a simulation (`stage_list.build_
 law and are compiled once for each; those of forces are in `force_stages`.
 """
 
-import math
 from enum import IntEnum, auto
 
 import numpy as np
 
-from ..basics.state import CONTACT_STEPS, CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
-from ..compiler.jit import loop
+from ..basics.state import CONTACTS, GRAIN1, STEP, STEPS
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..contact.bath_work import half_kick_weight, record_half_kicks
 from ..contact.events import compact_contacts, forming_loops, slip_and_break_loop
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
-from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import ContactStep, PassVariant, contact_pass_loop, contact_step, store_contact_sums
-from ..forces.gas_loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
@@ -214,43 +210,6 @@ def gather_and_kick_stage(long_vectors: bool) -> Stage:
         return 0
 
     return gather_loads_and_kick
-
-
-@loop
-def _kick_by_gas(grains, clock, count, lost, gas, elapsed):
-    """Drag and Brownian kicks of `elapsed` seconds; their numbers are those of steps, also of awake clusters."""
-    # the steps of grains of awake clusters are counted from 0 in each step of the bodies, CONTACT_STEPS before it
-    number = count[STEPS] + count[CONTACT_STEPS]
-    lost[GAS] += gas_kick(grains, gas.seed, number, elapsed, gas.gas)
-    clock[KICKED] = clock[TIME]
-
-
-@stage("the drag and noise of the gas")
-def kick_by_gas(grains, clock, count, lost, gas):
-    """Drag and Brownian kicks for the time since the last; at ends of steps or cycles, about once per gas period."""
-    elapsed = clock[TIME] - clock[KICKED]
-    if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= gas.period:
-        _kick_by_gas(grains, clock, count, lost, gas, elapsed)
-    return 0
-
-
-@stage("the drag and noise of the gas on awake clusters")
-def finish_gas(grains, clock, count, lost, gas):
-    """As `kick_by_gas`, for any time since the last, at the end of a step of the bodies."""
-    if clock[TIME] > clock[KICKED]:
-        _kick_by_gas(grains, clock, count, lost, gas, clock[TIME] - clock[KICKED])
-    return 0
-
-
-@stage("the settling of clusters")
-def settle(grains, contacts, clusters, clock, lost, span, settings):
-    """Settling of clusters for the time since the last; at ends of steps or cycles, about every τ/20."""
-    elapsed = clock[TIME] - clock[SETTLED]
-    if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= PERIOD_FRACTION * settings.settling_time:
-        part = -math.expm1(-elapsed / settings.settling_time)
-        lost[SETTLING] += settle_clusters(grains, contacts, clusters, span, clock[SETTLED], part)
-        clock[SETTLED] = clock[TIME]
-    return 0
 
 
 @stage(

@@ -25,7 +25,6 @@ from ..basics.state import (
     CONTACTS,
     FLIGHT,
     FORMING,
-    KICKED,
     MADE,
     NEEDED,
     STEP_INCREASES,
@@ -45,7 +44,6 @@ from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
 from ..engine.measures import force_columns
 from ..forces.base import Force, LongRangeForce
-from ..forces.gas import Gas
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..numerics.quaternion import turned_back
 from .settings import read_forces
@@ -412,7 +410,7 @@ def changed_engine(
     arrays = {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
     same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
     forces = fitting_forces(forces, engine.stepping)
-    extra = [*in_use(given), *components_of(forces, same, change.box)]
+    extra = components_of(given, forces, same, change.box)
     saved = {name: array for each in extra for name, array in each.saved_for_change(state, change.box).items()}
     parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed, extra)
     new = build_engine(*parts, fresh=False, saved=saved)
@@ -439,8 +437,9 @@ def changed_engine(
     # the next step is chosen anew, as after a start
     count[CHECKED] = count[STEP_INCREASES] = count[NEEDED] = count[STEPS] - INCREASE_INTERVAL
     clock[FLIGHT] = 0.0
-    if any(isinstance(force, Gas) for force in forces) > any(isinstance(force, Gas) for force in present):
-        clock[KICKED] = clock[TIME]
+    for each in extra:
+        if each.last_action is not None and each.name not in {own.name for own in engine.components}:
+            clock[each.last_action] = clock[TIME]
     new.load_state(arrays)
     new.refresh_loads()
     if regroups:

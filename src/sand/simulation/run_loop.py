@@ -252,7 +252,7 @@ class RunLoop:
     def close(self, outcome: Outcome) -> Result:
         """The result of the run, after its last row, warnings and files.  Raises Interrupted after a signal."""
         simulation = self._simulation
-        grains = simulation._engine.limiting_grains() if outcome.is_physics else ()
+        grains = simulation._engine.state.limiting_grains() if outcome.is_physics else ()
         if outcome is Outcome.RUNAWAY:
             grains = tuple(sorted(np.argsort(np.add(*kinetic_energies(simulation.grains)))[-2:].tolist()))
         if outcome.is_physics:

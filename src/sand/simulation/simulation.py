@@ -173,7 +173,7 @@ class Simulation(ReadOnlySettings):
         self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         forces = fitting_forces(forces, integrator)
-        extra = [*in_use(given), *components_of(forces, grains, box)]
+        extra = components_of(given, forces, grains, box)
         parts = (grains, forces, box, integrator, neighbours or Neighbours(), int(seed or 0), extra)
         arrays, meta = ({}, {}) if restart is None else restart
         is_new = restart is None
@@ -290,11 +290,8 @@ class Simulation(ReadOnlySettings):
         choices = {"start": self.origin} if self.origin else {}
         choices["boundary"] = self.box.describe()
         for force in self.forces:
-            choose = getattr(force, "choose", None)
-            if choose is not None:
-                radius, reason = choose(self.start, self.box)
-                length = "none" if radius is None else format_quantity(radius, "m")
-                choices[f"{force.name} cut-off"] = f"{length} ({reason})"
+            if choose := getattr(force, "choose", None):
+                choices[f"{force.name} cut-off"] = str(choose(self.start, self.box))
         choices |= {name: text for each in engine.components for name, text in each.choices().items()}
         return choices | {"neighbours": engine.search} | present
 

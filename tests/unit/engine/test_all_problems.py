@@ -21,8 +21,6 @@ def test_problems_of_box_forces_engine_and_components_are_reported_together():
         "grain 0 lies outside the box",
         "dipoles: cutoff = 3 um exceeds half the box",
         "stepping: without damping no cluster comes to rest",
-        "stepping: rigid clusters cannot have walls",
-        "stepping: rigid clusters cannot have driven grains",
         "walls: the normal of 'wall1' has a component along z, along which the box is periodic",
         "driven: there is no grain 7",
     ]

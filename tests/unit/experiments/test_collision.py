@@ -102,6 +102,7 @@ def test_a_case_in_processes(tmp_path):
         assert CollisionJob(path, tmp_path / "there").run(pool)["collisions"] == here
 
 
+@pytest.mark.draws
 @pytest.mark.compiled("contacts", "small")
 def test_the_command(tmp_path, capsys, monkeypatch):
     """Many seeds: collision.json and a figure; one seed: a run folder; an existing folder is refused."""
@@ -111,7 +112,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     message = json.loads(capsys.readouterr().out)
     assert len(message["collisions"]) == 2
     assert sum(message["counts"].values()) == 2
-    assert (tmp_path / "hit" / "figure.png").stat().st_size > 0
+    assert (tmp_path / "hit" / "figure.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "hit" / "collision.json").read_text()) == message
     assert main(["collide", "hit.toml"]) == 2
     assert "not empty" in capsys.readouterr().err

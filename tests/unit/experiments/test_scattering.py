@@ -147,6 +147,7 @@ def test_hit_map():
     assert found.edges[:, -1] == pytest.approx(1.2 * found.capture, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.draws
 @pytest.mark.compiled("scattering")
 def test_the_command(tmp_path, capsys):
     """Two speeds: files, figure, JSON; the folder is not overwritten; resuming computes no trajectory."""

@@ -15,11 +15,9 @@ from ...basics.state import (
     BODIES,
     CONTACT_STEPS,
     CONTACTS,
-    CYCLE,
     GRAINS_AWAKE,
     LARGEST_LOAD,
     LATE,
-    LEFT,
     LONG_RANGE_SUMS,
     OUTSIDE,
     QUIETING,
@@ -50,7 +48,6 @@ from ...integrate.rigid.awake_clusters import (
 from ...integrate.rigid.body_touches import CLEAR, LOADED, NEAR
 from ...integrate.rigid.rigid_clusters import SAMPLES, RigidLimits
 from ...integrate.rigid.rigid_driver import advance_bodies, mark_near_bodies
-from ...integrate.stages import finish_gas
 from ..engine import Engine, GrainSteps
 from ..measures import external_energy
 from ..part import MOVING, Part
@@ -125,7 +122,6 @@ class BodySteps(GrainSteps):
             (kick_clusters, (self._remainder,)),
             (resort_contacts_by_grain, ()),
         ]
-        own += [(finish_gas, ())] if engine.parameters.gas.gas.on else []
         of_inner = inner.table_for_call()
         found = [*super().stages(engine, table), *((table, *each) for each in of_bodies)]
         return [*found, *inner.stages(of_inner), *((of_inner, *each) for each in own)]
@@ -284,8 +280,7 @@ class BodySteps(GrainSteps):
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in engine.external:
                 state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
-        present.count[STAGE] = 1
-        present.clock[STEP] = present.clock[CYCLE] = present.clock[LEFT] = 0.0
+        present.begin_empty_step()
         inner.drive(-math.inf, 1)
         present.count[STEPS] = 0
         self._begin_far_loads(state)
@@ -300,10 +295,8 @@ class BodySteps(GrainSteps):
             stop = inner.drive(end, math.inf, shorten=True)
         if stop is not Stop.TIME_REACHED:
             return stop
-        if engine.parameters.gas.gas.on:  # since their last kick, so that none is left for the next step
-            finish_gas.run(inner.table_of(present))
-            for stage, numbers in inner.content.of_components.get(Hook.BETWEEN_CYCLES, ()):
-                stage.run(inner.table_of(present), numbers, Hook.BETWEEN_CYCLES)
+        for stage, numbers in inner.content.of_components.get(Hook.END_OF_BODIES, ()):
+            stage.run(inner.table_of(present), numbers, Hook.END_OF_BODIES)
         self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
         self.part.give_back(state)
         self._columns = self.part.columns

@@ -28,6 +28,9 @@ class CutoffChoice(NamedTuple):
     radius: float | None
     reason: str
 
+    def __str__(self) -> str:
+        return f"{'none' if self.radius is None else format_quantity(self.radius, 'm')} ({self.reason})"
+
 
 def cutoff_for(radius: float | None, cut: str) -> Cutoff:
     """Parameters of the weight S(r²) for a cut-off radius [m]."""
