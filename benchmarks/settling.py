@@ -20,7 +20,7 @@ from scipy.linalg import eig
 import sand
 from sand.contact.damping import damping_load, dashpots_of, loads_on_grains, relative_motion, surface_rotation
 from sand.contact.law import LAWS, contact_constants
-from sand.contact.mechanics import Pose, contact_load
+from sand.contact.mechanics import contact_load, pose_of
 
 TABLE = Path(__file__).parents[1] / "docs" / "physics" / "settling.csv"
 COLUMNS = (
@@ -53,16 +53,15 @@ def pair_loads(moved: np.ndarray, rates: np.ndarray, distance: float, constants)
     axis = np.array([1.0, 0.0, 0.0])
     separation = distance * axis + x[0] - x[1]
     apart = float(np.linalg.norm(separation))
-    n = tuple(separation / apart)
     pointers = tuple(turned(-axis, rotation[0])), tuple(turned(axis, rotation[1]))
-    pose = Pose(n, apart, *pointers, float((rotation[0] - rotation[1]) @ axis))
+    pose = pose_of(tuple(separation), *pointers, float((rotation[0] - rotation[1]) @ axis))
     law, overlap = LAWS[CONTACT.law], 2 * RADIUS - apart
     y = law.radius_root(overlap, constants)
     elastic = contact_load(pose, law.force(overlap, y, constants), RADIUS, RADIUS, constants)
-    rolling = surface_rotation(tuple(w[0]), tuple(w[1]), RADIUS, RADIUS)
-    motion = relative_motion(tuple(separation), tuple(v[0] - v[1]), rolling, tuple(w[0]), tuple(w[1]))
+    rolling = surface_rotation(tuple(w[0]), tuple(w[1]), 0.5)
+    n, motion = pose.n, relative_motion(tuple(separation), tuple(v[0] - v[1]), rolling, tuple(w[0]), tuple(w[1]))
     dashpots = dashpots_of(law.contact_radius(overlap, y, constants), constants)
-    damped = loads_on_grains(damping_load(motion, n, dashpots), tuple(separation), RADIUS, RADIUS)
+    damped = loads_on_grains(damping_load(motion, n, dashpots), tuple(separation), 0.5)
     force, torque1, torque2 = (np.add(a, b) for a, b in zip(elastic, damped, strict=True))
     return np.concatenate([force, torque1, -force, torque2])
 

@@ -19,6 +19,7 @@ from sand.contact.damping import NONE
 from sand.contact.law import LAWS, ContactLaw, contact_constants, register, ringing_energy
 from sand.contact.measure import contacts_stage, energies_stage
 from sand.contact.model import Contact
+from sand.contact.update import PassVariant
 from sand.integrate.stages import contact_event_stages, contact_pass_stage, pair_list_stage
 from sand.numerics.quaternion import turn, turned
 from sand.numerics.vec import add, cross, dot, scale, sub
@@ -69,10 +70,9 @@ class Pair:
 
     def pose(self):
         apart = sub(self.x1, self.x2)
-        distance = math.sqrt(dot(apart, apart))
         n1 = turned(self.q1, scale(-1.0, self.n0))
         n2 = turned(self.q2, self.n0)
-        return mechanics.Pose(scale(1.0 / distance, apart), distance, n1, n2, self.twist)
+        return mechanics.pose_of(apart, n1, n2, self.twist)
 
     def overlap(self):
         return self.r1 + self.r2 - self.pose().distance
@@ -197,7 +197,7 @@ def test_swapping_the_grains_swaps_the_loads(law, ratio, push, turn1, turn2):
     pair = Pair(ratio, push, turn1, turn2, law=law)
     force, torque1, torque2 = pair.load()
     p = pair.pose()
-    swapped = mechanics.Pose(scale(-1.0, p.n), p.distance, p.n2, p.n1, p.twist)
+    swapped = mechanics.pose_of(scale(-p.distance, p.n), p.n2, p.n1, p.twist)
     back, other1, other2 = mechanics.contact_load(swapped, pair.normal_force(), pair.r2, pair.r1, pair.constants)
     assert back == pytest.approx(scale(-1.0, force), rel=1e-9, abs=1e-22)
     assert other1 == pytest.approx(torque2, rel=1e-9, abs=1e-29)
@@ -213,7 +213,7 @@ def test_pointers_for_given_displacements(ratio, slide, roll):
     wish_slide = scale(size, sub(slide, scale(dot(slide, n), n)))
     wish_roll = scale(size, sub(roll, scale(dot(roll, n), n)))
     n1, n2 = tangential.pointers_for(wish_slide, wish_roll, n, r1, r2)
-    pose = mechanics.Pose(n, r1 + r2, n1, n2, 0.0)
+    pose = mechanics.pose_of(scale(r1 + r2, n), n1, n2, 0.0)
     strain = mechanics.displacements_of(pose, 0.0, r1, r2, constants)
     across_n = sub(strain.roll, scale(dot(strain.roll, n), n))
     # rounding: coordinates of size r1 are subtracted
@@ -393,7 +393,7 @@ def test_code_with_a_formula_of_the_user_is_cached_by_its_source():
 
     def digests(law):
         stages = [
-            contact_pass_stage(law, NONE, False),
+            *(contact_pass_stage(law, PassVariant(adhesive=adhesive), False) for adhesive in (False, True)),
             *contact_event_stages(law, NONE).values(),
             pair_list_stage(law, False),
         ]
@@ -403,7 +403,7 @@ def test_code_with_a_formula_of_the_user_is_cached_by_its_source():
     assert None not in before and before == digests(jkr.LAW._replace())
     assert all(before.isdisjoint(digests(law)) for name, law in LAWS.items() if name != "jkr")
     formulas = [name for name, member in jkr.LAW._asdict().items() if callable(member) and name != "constants_type"]
-    assert len(formulas) == 10
+    assert len(formulas) == 12
     for name in formulas:
         found = digests(jkr.LAW._replace(**{name: formula(lambda *numbers: 0.0)}))
         assert (found == before) is (name == "warning"), name
@@ -417,7 +417,10 @@ def test_code_with_constants_of_the_user_is_cached_by_their_order():
         constants = namedtuple("Constants", names, module="users_module")
         law = jkr.LAW._replace(constants_type=constants)
         digests.append(
-            [code_digest(each.function) for each in (contact_pass_stage(law, NONE, False), energies_stage(law))]
+            [
+                code_digest(each.function)
+                for each in (contact_pass_stage(law, PassVariant(), False), energies_stage(law))
+            ]
         )
     assert digests[0] == digests[2]
     assert all(one != other for one, other in zip(*digests[:2], strict=True))

@@ -214,7 +214,10 @@ def test_the_normal_force_of_jkr(material, radius):
     numbers = contact(material, radius)
     overlaps = numbers.pull_off_overlap * np.concatenate([[1e-6], np.linspace(0.05, 50, 40)])
     ours = np.array(
-        [jkr.force_at(jkr.root(jkr.stretch(d, numbers.pull_off_overlap)), numbers.pull_off_force) for d in overlaps]
+        [
+            jkr.force_at(jkr.root(jkr.stretch(d, 1.0 / numbers.pull_off_overlap)), numbers.pull_off_force)
+            for d in overlaps
+        ]
     )
     theirs = lammps_force(material, radius, overlaps)
     assert theirs == pytest.approx(ours, rel=1e-6, abs=1e-6 * numbers.pull_off_force)

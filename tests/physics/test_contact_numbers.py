@@ -213,7 +213,7 @@ def test_rigid_motion_causes_no_displacement(steps):
         rigid_body.step(there - here + drift, np.tile(angle * axis, (12, 1)))
     from sand.contact import mechanics
     from sand.contact.constants_table import column_loops
-    from sand.contact.update import pose_at
+    from sand.contact.poses import pose_at
 
     g = rigid_body.sim.state.grains.arrays
     for c in range(used):

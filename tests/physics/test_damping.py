@@ -158,7 +158,7 @@ def random_contact(rng):
 
 def motion_of(x, v, w, r):
     separation = tuple(x[0] - x[1])
-    rolling = surface_rotation(tuple(w[0]), tuple(w[1]), *r)
+    rolling = surface_rotation(tuple(w[0]), tuple(w[1]), r[0] / sum(r))
     return separation, relative_motion(separation, tuple(v[0] - v[1]), rolling, tuple(w[0]), tuple(w[1]))
 
 
@@ -170,7 +170,7 @@ def test_work_on_both_grains_is_the_power_of_the_dashpots():
         separation, motion = motion_of(x, v, w, r)
         n = np.array(separation) / np.linalg.norm(separation)
         load = damping_load(motion, tuple(n), dashpots)
-        force, torque1, torque2 = (np.array(each) for each in loads_on_grains(load, separation, *r))
+        force, torque1, torque2 = (np.array(each) for each in loads_on_grains(load, separation, r[0] / sum(r)))
         assert np.abs(torque1 + torque2 + np.cross(separation, force)).max() < 1e-13
         work = force @ (v[0] - v[1]) + torque1 @ w[0] + torque2 @ w[1]
         power = np.dot(load.force, motion.velocity) + np.dot(load.torque, motion.spin)
@@ -194,9 +194,9 @@ def test_losses_of_a_step_are_the_work_of_velocity_verlet():
         loads = [DampingLoad(*map(tuple, rng.normal(size=(2, 3)))) for _ in range(2)]
         work = 0.0
         for load, apart in zip(loads, (np.array(separation) - dt * (v[0] - v[1]), separation), strict=True):
-            force, torque1, torque2 = loads_on_grains(load, tuple(apart), *r)
+            force, torque1, torque2 = loads_on_grains(load, tuple(apart), r[0] / sum(r))
             work += 0.5 * dt * (np.dot(force, v[0] - v[1]) + np.dot(torque1, w[0]) + np.dot(torque2, w[1]))
-        rolling = surface_rotation(tuple(w[0]), tuple(w[1]), *r)
+        rolling = surface_rotation(tuple(w[0]), tuple(w[1]), r[0] / sum(r))
         losses = damping_losses(*loads, n, tuple(v[0] - v[1]), motion, rolling, dt)
         assert sum(losses) == pytest.approx(-work, rel=1e-12, abs=1e-12)
 

@@ -258,7 +258,7 @@ def test_kernels_against_plain_python_loops():
 
         n1 = Rotation.from_quat(g.orientation[i]).apply(w.contacts.pointer1[:, c])
         n2 = Rotation.from_quat(g.orientation[j]).apply(w.contacts.pointer2[:, c])
-        pose = mechanics.Pose(tuple(apart / distance), distance, tuple(n1), tuple(n2), w.contacts.twist[c])
+        pose = mechanics.pose_of(tuple(apart), tuple(n1), tuple(n2), w.contacts.twist[c])
         overlap = g.radius[i] + g.radius[j] - distance
         normal = jkr.LAW.force(overlap, jkr.LAW.radius_root(overlap, constants), constants)
         f, t1, t2 = mechanics.contact_load(pose, normal, g.radius[i], g.radius[j], constants)

@@ -39,6 +39,8 @@ class ContactArrays(NamedTuple):
     lost: Annotated[np.ndarray, Array(("channels", USED), "J", summed=True)]
     # motion and loads of the dashpots, rows of contact.damping; no columns without damping
     damping: Annotated[np.ndarray, Array((DAMPING_ROWS, USED), fewer=0)]
+    # ζ and R (n1 + n2) [m] at the start of a step, and which step, see contact.slip_rules
+    kept: Annotated[np.ndarray, Array((7, USED), required=False)]
     force: Annotated[np.ndarray, Array((3, USED), "N")]  # force on grain 1
     torque1: Annotated[np.ndarray, Array((3, USED), "N m")]
     torque2: Annotated[np.ndarray, Array((3, USED), "N m")]

@@ -37,7 +37,7 @@ class WallContactArrays(NamedTuple):
     pointer2: Annotated[np.ndarray, Array((3, USED), "m")]
     twist: Annotated[np.ndarray, Array((USED,), "rad")]
     formed: Annotated[np.ndarray, Array((USED,), "s")]
-    constants: Annotated[np.ndarray, Array(("constants", USED))]
+    constants: Annotated[np.ndarray, Array(("constants", USED), rule="no nan")]  # a wall has an infinite radius
     lost: Annotated[np.ndarray, Array(("channels", USED), "J", summed=True)]
     damping: Annotated[np.ndarray, Array((DAMPING_ROWS, USED), fewer=0)]
     force: Annotated[np.ndarray, Array((3, USED), "N")]
@@ -46,3 +46,4 @@ class WallContactArrays(NamedTuple):
     # written by what contacts of two grains share with these, and not used
     torque2: Annotated[np.ndarray, Array((3, USED), "N m", saved=False)]
     every_step: Annotated[np.ndarray, Array((USED,), dtype="u1", saved=False)]
+    kept: Annotated[np.ndarray, Array((0, USED), saved=False)]

@@ -5,6 +5,7 @@ anchor, that is fixed to the wall.  Limits, slip, losses and stored energies are
 """
 
 import functools
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -82,6 +83,7 @@ def wall_constants(law: ContactLaw) -> Callable:
 
     @formula
     def constants_at_wall(pairing, radius, mass, wall_mass):
-        return constants_of(pairing, radius, 1.0 / mass + 1.0 / wall_mass, 2.5 / (mass * radius * radius))
+        inverse_inertia = 2.5 / (mass * radius * radius)
+        return constants_of(pairing, radius, (radius, math.inf), 1.0 / mass + 1.0 / wall_mass, inverse_inertia)
 
     return constants_at_wall

@@ -88,15 +88,15 @@ def _at_step_start(pose, velocity, spin, twist, dt):
 
 
 @loop
-def surfaces_at_wall(bodies, contacts, c, pose):
+def surfaces_at_wall(bodies, contacts, c, held):
     """The two sides of contact c, for `bodies` = (grains, walls): `damping.surfaces_of_pair` for r2 → ∞."""
     grains, walls = bodies
     g, w = contacts.pair[0, c], contacts.pair[1, c]
     velocity, spin = relative_velocity(grains, walls, g, w), load(grains.spin, g)
-    arm = scale(grains.radius[g], pose.n)
+    arm = scale(grains.radius[g], held.pose.n)
     motion = relative_motion(arm, velocity, spin, spin, ZERO)
     ids = grains.id[g], LAST_ID - np.uint32(w)
-    return Surfaces((grains.radius[g], 0.0), velocity, arm, ZERO, motion, ids)
+    return Surfaces(1.0, velocity, arm, ZERO, motion, ids)
 
 
 @caller

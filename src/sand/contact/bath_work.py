@@ -51,6 +51,6 @@ def record_half_kicks(grains, contacts, count, lost, span, weight):
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         first, turn1 = accelerations(grains, i)
         second, turn2 = accelerations(grains, j)
-        rolling = surface_rotation(turn1, turn2, grains.radius[i], grains.radius[j])
+        rolling = surface_rotation(turn1, turn2, grains.radius[i] / (grains.radius[i] + grains.radius[j]))
         change = relative_motion(apart, sub(first, second), rolling, turn1, turn2)
         record_half_kick(contacts, lost, c, scale(1.0 / dot(apart, apart) ** 0.5, apart), change, weight)

@@ -58,7 +58,7 @@ class Surfaces(NamedTuple):
     A wall is the limit r2 → ∞: W → 0, while W×(x1 − x2) → r1 ω1×n and a1 → r1.
     """
 
-    radii: tuple  # r1, r2 [m]; (r1, 0) at a wall, so that a1 = |x1 − x2| r1/(r1 + r2)
+    share: float  # r1/(r1 + r2), so that a1 = |x1 − x2| r1/(r1 + r2); 1 at a wall, where |x1 − x2| is r1
     velocity: tuple  # v1 − v2 [m/s]
     separation: tuple  # x1 − x2 [m]; r1 n at a wall
     rolling: tuple  # W [1/s] of `surface_rotation`; 0 at a wall
@@ -88,9 +88,12 @@ def dashpots_of(contact_radius, constants):
 
 
 @formula
-def surface_rotation(spin1, spin2, r1, r2):
-    """Mean spin W = (r1 ω1 + r2 ω2)/(r1 + r2) [1/s], of which W×(x1 − x2) is the part of U due to spins."""
-    return axpy(r1 / (r1 + r2), sub(spin1, spin2), spin2)
+def surface_rotation(spin1, spin2, share):
+    """Mean spin W = (r1 ω1 + r2 ω2)/(r1 + r2) [1/s], of which W×(x1 − x2) is the part of U due to spins.
+
+    `share` is r1/(r1 + r2).
+    """
+    return axpy(share, sub(spin1, spin2), spin2)
 
 
 @formula
@@ -167,9 +170,9 @@ def extrapolated(before, now, dt):
 
 
 @formula
-def loads_on_grains(damping, separation, r1, r2):
-    """Force on grain 1 and torques on both grains, for x1 − x2 [m]."""
-    moment, share = cross(separation, damping.force), r1 / (r1 + r2)
+def loads_on_grains(damping, separation, share):
+    """Force on grain 1 and torques on both grains, for x1 − x2 [m] and r1/(r1 + r2)."""
+    moment = cross(separation, damping.force)
     torque1 = axpy(-share, moment, damping.torque)
     return damping.force, torque1, sub(axpy(share, moment, scale(-1.0, damping.torque)), moment)
 
@@ -247,16 +250,16 @@ def measured_load(contacts, c):
 
 
 @loop
-def surfaces_of_pair(grains, contacts, c, pose):
-    """The two sides of contact c between grains."""
+def surfaces_of_pair(grains, contacts, c, held):
+    """The two sides of contact c between grains; `held` has its pose and constants."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    r1, r2 = grains.radius[i], grains.radius[j]
+    share, pose = held.constants.derived.radius1 * held.constants.derived.inverse_sum, held.pose
     velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
     w1, w2 = load(grains.spin, i), load(grains.spin, j)
     separation = scale(pose.distance, pose.n)
-    rolling = surface_rotation(w1, w2, r1, r2)
+    rolling = surface_rotation(w1, w2, share)
     motion = relative_motion(separation, velocity, rolling, w1, w2)
-    return Surfaces((r1, r2), velocity, separation, rolling, motion, (grains.id[i], grains.id[j]))
+    return Surfaces(share, velocity, separation, rolling, motion, (grains.id[i], grains.id[j]))
 
 
 class Held(NamedTuple):
@@ -280,7 +283,7 @@ class DampingVariant(NamedTuple):
 
 @functools.cache
 def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> DampingVariant:
-    """The dashpots of contacts with `surfaces_of(bodies, contacts, c, pose)`, in one variant of the contact update."""
+    """The dashpots of contacts with `surfaces_of(bodies, contacts, c, held)`, in one variant of the contact update."""
     if damping == NONE:
         return NO_DAMPING
     thermal = damping == THERMAL
@@ -291,7 +294,7 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
 
         If it is not `active`, the stored loads stay those of the start of the step, and nothing is lost.
         """
-        r, velocity, separation, rolling, motion, ids = surfaces_of(bodies, contacts, c, held.pose)
+        share, velocity, separation, rolling, motion, ids = surfaces_of(bodies, contacts, c, held)
         n = held.pose.n
         before = Motion(load_rows(contacts.damping, VELOCITY, c), load_rows(contacts.damping, SPIN, c))
         start = stored_load(contacts, c)
@@ -309,7 +312,7 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
         store_rows(contacts.damping, SPIN, c, _chosen(active, motion.spin, before.spin))
         store_rows(contacts.damping, FORCE, c, _chosen(active, end.force, start.force))
         store_rows(contacts.damping, TORQUE, c, _chosen(active, end.torque, start.torque))
-        force, torque1, torque2 = loads_on_grains(end, separation, r[0], r[1])
+        force, torque1, torque2 = loads_on_grains(end, separation, share)
         return (add(loads[0], force), add(loads[1], torque1), add(loads[2], torque2)), lost
 
     @loop
@@ -320,7 +323,7 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
 
     @loop
     def at_touch(bodies, contacts, lost, c, held, closing, elapsed, step):
-        motion = surfaces_of(bodies, contacts, c, held.pose).motion
+        motion = surfaces_of(bodies, contacts, c, held).motion
         store_rows(contacts.damping, VELOCITY, c, motion.velocity)
         store_rows(contacts.damping, SPIN, c, motion.spin)
         store_rows(contacts.damping, FORCE, c, NO_LOAD.force)
@@ -334,14 +337,14 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
         return impulse
 
     @loop
-    def at_break(bodies, contacts, lost, c, pose, opening, elapsed, dt):
+    def at_break(bodies, contacts, lost, c, broken, elapsed, dt):
         # the loads of the start of the step acted for half a step in the velocity Verlet kick; along n, the impulse of
         # the break extends this to the time until the break, dt − elapsed
-        _, velocity, _, rolling, motion, _ = surfaces_of(bodies, contacts, c, pose)
+        _, velocity, _, rolling, motion, _ = surfaces_of(bodies, contacts, c, broken)
         start = stored_load(contacts, c)
-        losses = damping_losses(start, NO_LOAD, pose.n, velocity, motion, rolling, dt)
-        normal = dot(start.force, pose.n)
-        add_damping_energies(lost, (-normal * opening * (dt - elapsed), losses[1], losses[2], losses[3]))
+        losses = damping_losses(start, NO_LOAD, broken.pose.n, velocity, motion, rolling, dt)
+        normal = dot(start.force, broken.pose.n)
+        add_damping_energies(lost, (-normal * broken.opening * (dt - elapsed), losses[1], losses[2], losses[3]))
         return normal
 
     return DampingVariant(update, single, at_touch, at_break)
@@ -369,7 +372,7 @@ def _no_touch(bodies, contacts, lost, c, held, closing, elapsed, step):
 
 
 @loop
-def _no_break(bodies, contacts, lost, c, pose, opening, elapsed, dt):
+def _no_break(bodies, contacts, lost, c, broken, elapsed, dt):
     return 0.0
 
 

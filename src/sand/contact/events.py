@@ -29,9 +29,19 @@ from .damping import NONE, Held, damping_loops
 from .gather import sort_contacts_by_grain
 from .law import ContactLaw
 from .losses import record_slip
-from .mechanics import displacements_of, exceeds_limits, release_loss, scaled_stiffness, slip_losses, time_since
+from .mechanics import (
+    after_slip,
+    displacements_of,
+    exceeds_limits,
+    release_loss,
+    scaled_stiffness,
+    slip_losses,
+    time_since,
+)
+from .poses import displacements_before, pose_at
+from .slip_rules import STEP_KEPT, slipped_pose
 from .transitions import BROKEN_FLAG, PENDING_FLAG, Break, Touch, breaking_loop, clear_contact, touch_loop
-from .update import displacements_before, overlap_share, pose_at, single_contact_loop, slipped_pose
+from .update import single_contact_loop
 
 
 @loop
@@ -98,7 +108,8 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
                     mark_separated(pair_list, count, i, j)
                     broken = True
                     continue
-                new_pose = slipped_pose(reached, pose, r1, r2, constants, step.settings.reset)
+                target = after_slip(reached, pose.n, constants, step.settings.reset)
+                new_pose = slipped_pose(target, pose, constants)
                 left = displacements_of(new_pose, overlap, r1, r2, constants)
                 record_slip(contacts, lost, c, slip_losses(start, reached, left, present))
                 put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), new_pose.n1))
@@ -133,6 +144,8 @@ def compact_contacts(contacts, number):
                     contacts.constants[row, kept] = contacts.constants[row, c]
             for row in range(contacts.lost.shape[0]):
                 contacts.lost[row, kept] = contacts.lost[row, c]
+            for row in range(contacts.kept.shape[0]):
+                contacts.kept[row, kept] = contacts.kept[row, c]
             if contacts.damping.shape[1] > 0:
                 for row in range(contacts.damping.shape[0]):
                     contacts.damping[row, kept] = contacts.damping[row, c]
@@ -207,6 +220,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
         put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), scale(-1.0, n)))
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n))
         clear_contact(contacts, c, formed)
+        contacts.kept[STEP_KEPT, c] = 0.0
         constants = constants_of_pair(grains, settings.pairings, i, j)
         first, last = (0, contacts.constants.shape[1]) if settings.uniform_contacts else (c, c + 1)
         if c == 0 or not settings.uniform_contacts:
@@ -230,11 +244,10 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
             formed = clock[TIME] + step.dt - time_since(overlap, closing, step.dt)
             c = add_contact(grains, contacts, count, step.span, step.settings, i, j, formed)
-            share = overlap_share(overlap, grains.radius[i], grains.radius[j])
-            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], share)
             pairing = load_pairing(step.settings.pairings, grains.material[i], grains.material[j])
             reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
             pose, constants = pose_at(grains, contacts, step.span, c, 0.0), constants_at(contacts, c)
+            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], overlap * constants.derived.inverse_radius)
             radius = contact_radius(overlap, radius_root(overlap, constants), constants)
             touched = Touch(n, Held(pose, radius, constants), overlap, closing, reduced, pairing.modulus)
             apply_pair_impulse(grains, i, j, n, touch(grains, contacts, lost, clock, c, touched, step))

@@ -54,17 +54,12 @@ def polynomial_root(s):
 
     The polynomial for p(s) is followed by one Newton step.
     """
-    c = POLYNOMIAL
-    p = c[9] + s * c[10]
-    p = c[8] + s * p
-    p = c[7] + s * p
-    p = c[6] + s * p
-    p = c[5] + s * p
-    p = c[4] + s * p
-    p = c[3] + s * p
-    p = c[2] + s * p
-    p = c[1] + s * p
-    p = c[0] + s * p
+    c, t = POLYNOMIAL, s * s
+    even, odd = c[8] + t * c[10], c[7] + t * c[9]  # powers apart: half as many operations that wait for each other
+    even, odd = c[6] + t * even, c[5] + t * odd
+    even, odd = c[4] + t * even, c[3] + t * odd
+    even, odd = c[2] + t * even, c[1] + t * odd
+    p = (c[0] + t * even) + s * odd
     z = s * p
     p -= (p * p * (_A + z * (_B + z)) - _K) / (p * (2.0 * _A + z * (3.0 * _B + 4.0 * z)))
     return ROOT_AT_BREAK + s * p
@@ -84,9 +79,9 @@ def root(s):
 
 
 @formula
-def stretch(overlap, pull_off_overlap):
-    """s = √(1 + δ/δ_c); 0 beyond the breaking point."""
-    return math.sqrt(max(1.0 + overlap / pull_off_overlap, 0.0))
+def stretch(overlap, inverse_pull_off_overlap):
+    """s = √(1 + δ/δ_c) from δ [m] and 1/δ_c [1/m]; 0 beyond the breaking point."""
+    return math.sqrt(max(1.0 + overlap * inverse_pull_off_overlap, 0.0))
 
 
 @formula
@@ -185,19 +180,24 @@ def _normal_mode(surface_energy, modulus, reduced):
 
 @formula
 def _radius_root(overlap, c):
-    return root(stretch(overlap, c.normal.pull_off_overlap))
+    return root(stretch(overlap, c.derived.inverse_break_overlap))
 
 
 @formula
 def _fast_radius_root(overlap, c):
-    s = stretch(overlap, c.normal.pull_off_overlap)
+    s = stretch(overlap, c.derived.inverse_break_overlap)
     return polynomial_root(s), s <= POLYNOMIAL_RANGE
+
+
+@formula
+def _adhesive_force(overlap, y, c):
+    return force_at(y, c.normal.pull_off_force)
 
 
 @formula
 def _force(overlap, y, c):
     pressed = max(overlap, 0.0)
-    return force_at(y, c.normal.pull_off_force) + c.normal.hertz * pressed * math.sqrt(pressed)
+    return _adhesive_force(overlap, y, c) + c.normal.hertz * pressed * math.sqrt(pressed)
 
 
 @formula
@@ -214,9 +214,14 @@ def _stiffness(overlap, y, c):
 
 
 @formula
+def _adhesive_radius(overlap, y, c):
+    return c.rest_radius * y * y
+
+
+@formula
 def _contact_radius(overlap, y, c):
     pressed = math.sqrt(c.reduced_radius * max(overlap, 0.0))
-    return c.rest_radius * y * y + (pressed if c.normal.hertz > 0.0 else 0.0)
+    return _adhesive_radius(overlap, y, c) + (pressed if c.normal.hertz > 0.0 else 0.0)
 
 
 @formula
@@ -254,5 +259,7 @@ LAW = register(
         at_touch=_at_touch,
         at_break=_at_break,
         warning=_warning,
+        adhesive_force=_adhesive_force,
+        adhesive_radius=_adhesive_radius,
     )
 )

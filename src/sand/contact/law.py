@@ -49,6 +49,9 @@ class ContactLaw(NamedTuple):
     at_touch: Callable  # (c) → energy [J] at δ = 0, just after the contact has formed
     at_break: Callable  # (c) → energy [J] and force [N] at δ = −break_overlap, just before the contact breaks
     warning: Callable[[float, float, float], str]  # (γ_eff, E*, R) → why the law is inaccurate, or ""
+    # for simulations in which all contacts adhere, γ_eff > 0; None: as for all contacts
+    adhesive_force: Callable | None = None
+    adhesive_radius: Callable | None = None
 
 
 LAWS: dict[str, ContactLaw] = {}
@@ -65,7 +68,7 @@ def register(law: ContactLaw) -> ContactLaw:
     """
     if law.name in LAWS and LAWS[law.name] != law:
         raise BadInput(f"contact law '{law.name}' exists already; choose another name")
-    missing = [field for field, member in law._asdict().items() if member is None]
+    missing = [field for field, member in law._asdict().items() if member is None and field not in law._field_defaults]
     if missing:
         raise BadInput(f"contact law '{law.name}' lacks {', '.join(missing)}")
     return LAWS.setdefault(law.name, law)
@@ -87,6 +90,38 @@ class Pairing(NamedTuple):
     damping_ratio: float  # ζ, share of the critical damping of each mode
 
 
+class Derived(NamedTuple):
+    """Numbers that follow from the other constants, stored so that the loop over contacts need not compute them."""
+
+    roll_torque_stiffness: float  # R² k_r [N m]
+    squared_slide_limit: float  # ζ_c² [m²]
+    squared_roll_limit: float  # ξ_c² [m²]
+    inverse_break_overlap: float  # −1/δ where a contact breaks [1/m]; 1/R if it breaks at δ = 0
+    radius1: float  # r1 [m]
+    radius2: float  # r2 [m]; infinite at a wall
+    inverse_radius1: float  # 1/r1 [1/m]
+    inverse_radius2: float  # 1/r2 [1/m]
+    inverse_radius: float  # 1/r of the smaller grain [1/m]
+    inverse_sum: float  # 1/(r1 + r2) [1/m]
+
+
+@formula
+def derived_constants(reduced, roll_stiffness, slide_limit, roll_limit, break_overlap, r1, r2):
+    """`Derived` of one contact, from R [m], k_r [N/m], limits [m], −δ where it breaks [m] and radii [m]."""
+    return Derived(
+        reduced * reduced * roll_stiffness,
+        slide_limit * slide_limit,
+        roll_limit * roll_limit,
+        1.0 / (break_overlap if break_overlap > 0.0 else reduced),
+        r1,
+        r2,
+        1.0 / r1,
+        1.0 / r2,
+        1.0 / min(r1, r2),
+        1.0 / (r1 + r2),
+    )
+
+
 class ContactConstants(NamedTuple):
     """Constants of one contact, computed by `contact_constants` and stored as a column of `ContactArrays.constants`."""
 
@@ -106,6 +141,7 @@ class ContactConstants(NamedTuple):
     twist_damping: float  # C_t [N m s]
     max_squared_frequency: float  # ω² of the fastest mode of the pair [1/s²]
     normal: Any  # `ContactLaw.constants_type`: constants that only this law has
+    derived: Derived
 
 
 PULLS = 200
@@ -126,24 +162,24 @@ def contact_constants(law: ContactLaw) -> Callable:
     @formula
     def constants_of_pair(pairing, r1, r2, m1, m2):
         inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
-        return constants_of(pairing, r1 * r2 / (r1 + r2), 1.0 / m1 + 1.0 / m2, inverse_inertia)
+        return constants_of(pairing, r1 * r2 / (r1 + r2), (r1, r2), 1.0 / m1 + 1.0 / m2, inverse_inertia)
 
     return constants_of_pair
 
 
 @functools.cache
 def reduced_constants(law: ContactLaw) -> Callable:
-    """The formula `(pairing, reduced, inverse_mass, inverse_inertia)` → `ContactConstants` of a law.
+    """The formula `(pairing, reduced, radii, inverse_mass, inverse_inertia)` → `ContactConstants` of a law.
 
-    The arguments are R [m], 1/m1 + 1/m2 [1/kg] and 1/I1 + 1/I2 [1/(kg m²)].  `max_squared_frequency` is that of the
-    fastest of the four modes of the free pair, or of their damping.  A damping ratio ζ gives each mode of stiffness k
-    and effective mass m the coefficient 2ζ√(k m): 1/m = 1/m1 + 1/m2 for the normal mode, 7/2 of it for sliding,
-    1/I1 + 1/I2 for rolling (stiffness k_r R²) and for twisting.
+    The arguments are R [m], (r1, r2) [m], 1/m1 + 1/m2 [1/kg] and 1/I1 + 1/I2 [1/(kg m²)].
+    `max_squared_frequency` is that of the fastest of the four modes of the free pair, or of their damping.  A damping
+    ratio ζ gives each mode of stiffness k and effective mass m the coefficient 2ζ√(k m): 1/m = 1/m1 + 1/m2 for the
+    normal mode, 7/2 of it for sliding, 1/I1 + 1/I2 for rolling (stiffness k_r R²) and for twisting.
     """
     normal_mode = law.normal_mode
 
     @formula
-    def constants_of(pairing, reduced, inverse_mass, inverse_inertia):
+    def constants_of(pairing, reduced, radii, inverse_mass, inverse_inertia):
         adhesive = pairing.surface_energy > 0.0
         normal = normal_mode(pairing.surface_energy, pairing.modulus, reduced)
         a0 = normal.rest_radius
@@ -163,6 +199,8 @@ def reduced_constants(law: ContactLaw) -> Callable:
         c_t = share * math.sqrt(k_t / inverse_inertia)
         stiffest = c_n + pairing.damping_per_radius * normal.stiff_radius
         fastest_decay = max(max(stiffest, 3.5 * c_s) * inverse_mass, max(c_r, c_t) * inverse_inertia)
+        # without springs no contact slides; a limit of 0 would be exceeded by rounding errors
+        slide_limit = tangential.slide_limit(pairing.shear, pairing.twist_shear, a0) if adhesive else reduced
         return ContactConstants(
             reduced,
             a0,
@@ -170,8 +208,7 @@ def reduced_constants(law: ContactLaw) -> Callable:
             k_s,
             k_r,
             k_t,
-            # without springs no contact slides; a limit of 0 would be exceeded by rounding errors
-            tangential.slide_limit(pairing.shear, pairing.twist_shear, a0) if adhesive else reduced,
+            slide_limit,
             pairing.roll_limit,
             tangential.TWIST_LIMIT,
             c_n,
@@ -181,6 +218,7 @@ def reduced_constants(law: ContactLaw) -> Callable:
             c_t,
             max(squared_frequency, (DAMPING_FACTOR * fastest_decay) ** 2),
             normal.constants,
+            derived_constants(reduced, k_r, slide_limit, pairing.roll_limit, normal.break_overlap, *radii),
         )
 
     return constants_of

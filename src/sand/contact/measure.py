@@ -10,8 +10,8 @@ from .constants_table import column_loops
 from .damping import loads_on_grains, measured_load
 from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
+from .poses import pose_at
 from .settling import list_cluster, rigid_motion
-from .update import pose_at
 
 ENERGIES = ("normal", "sliding", "rolling", "twisting")
 """Energies [J] of contacts that `measure_energies` computes."""
@@ -145,7 +145,7 @@ def contacts_stage(law: ContactLaw) -> Stage:
             for mode in range(4):
                 out[13 + mode, c] = stored[mode]
             force, torque1, torque2 = contact_load(pose, normal, r1, r2, constants)
-            more, more1, more2 = loads_on_grains(damping, scale(pose.distance, pose.n), r1, r2)
+            more, more1, more2 = loads_on_grains(damping, scale(pose.distance, pose.n), r1 / (r1 + r2))
             force, torque1, torque2 = add(force, more), add(torque1, more1), add(torque2, more2)
             for axis in range(3):
                 out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from ..compiler.jit import formula
 from ..numerics.vec import across, add, axpy, cross, dot, scale, sub
 from . import tangential
-from .law import ContactConstants
+from .law import ContactConstants, Derived
 
 
 class Pose(NamedTuple):
@@ -19,9 +19,18 @@ class Pose(NamedTuple):
 
     n: tuple  # unit vector from grain 2 to grain 1
     distance: float  # D [m]
+    inverse_distance: float  # 1/D [1/m]
     n1: tuple  # contact pointers: unit vectors from each centre to the contact, laboratory frame
     n2: tuple
     twist: float  # φ [rad]
+
+
+@formula
+def pose_of(separation, n1, n2, twist):
+    """Pose of two grains with x1 − x2 [m], contact pointers n1, n2 in the laboratory frame and twist φ [rad]."""
+    distance = math.sqrt(dot(separation, separation))
+    inverse = 1.0 / distance
+    return Pose(scale(inverse, separation), distance, inverse, n1, n2, twist)
 
 
 class Displacements(NamedTuple):
@@ -58,6 +67,18 @@ def scaled_stiffness(constants, y, follow):
         constants.twist_damping,
         constants.max_squared_frequency,
         constants.normal,
+        Derived(
+            constants.derived.roll_torque_stiffness * (y2 * y),
+            constants.derived.squared_slide_limit,
+            constants.derived.squared_roll_limit,
+            constants.derived.inverse_break_overlap,
+            constants.derived.radius1,
+            constants.derived.radius2,
+            constants.derived.inverse_radius1,
+            constants.derived.inverse_radius2,
+            constants.derived.inverse_radius,
+            constants.derived.inverse_sum,
+        ),
     )
 
 
@@ -83,7 +104,7 @@ def contact_load(pose, normal, r1, r2, constants):
         Constants with the present stiffnesses (see `scaled_stiffness`).
     """
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    pull = constants.slide_stiffness * along / pose.distance
+    pull = constants.slide_stiffness * along * pose.inverse_distance
     force, torque1, torque = load_on_grain(pose, pose.n2, zeta, pull, normal, r1, constants)
     return force, torque1, add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
 
@@ -110,7 +131,7 @@ def load_on_grain(pose, n2, slide, pull, normal, radius, constants):
         Constants with the present stiffnesses.
     """
     force = axpy(normal, pose.n, scale(pull, slide))
-    rolling_torque = scale(constants.reduced_radius**2 * constants.roll_stiffness, cross(pose.n1, n2))
+    rolling_torque = scale(constants.derived.roll_torque_stiffness, cross(pose.n1, n2))
     torque = axpy(constants.twist_stiffness * pose.twist, pose.n, rolling_torque)
     return force, sub(scale(-radius * constants.slide_stiffness, cross(pose.n1, slide)), torque), torque
 
@@ -125,20 +146,40 @@ def displacements_of(pose, overlap, r1, r2, constants):
 @formula
 def exceeds_limits(displacements, n, constants):
     """Whether a displacement exceeds its limit, so that the contact must slip or break."""
-    xi = across(displacements.roll, n)
-    return (
-        (displacements.overlap < -constants.break_overlap)
-        | (dot(displacements.slide, displacements.slide) > constants.slide_limit * constants.slide_limit)
-        | (dot(xi, xi) > constants.roll_limit * constants.roll_limit)
-        | (abs(displacements.twist) > constants.twist_limit)
-    )
+    slides = exceeds_sliding_or_twisting(displacements, constants)
+    return breaks(displacements, constants) | slides | exceeds_rolling(displacements, n, constants)
 
 
 @formula
-def _slip_factor(size, limit, reset):
-    """Factor by which slip reduces a displacement: 1 below the limit, else limit/size or, with `reset`, 0."""
-    kept = 0.0 if reset else limit  # one choice after the other, so that no branches remain in the loop over contacts
-    return kept / size if size > limit else 1.0
+def breaks(displacements, constants):
+    """Whether the contact is stretched beyond breaking."""
+    return displacements.overlap < -constants.break_overlap
+
+
+@formula
+def exceeds_sliding_or_twisting(displacements, constants):
+    """Whether ζ or φ exceeds its limit."""
+    squared_slide = dot(displacements.slide, displacements.slide)
+    return (squared_slide > constants.derived.squared_slide_limit) | (abs(displacements.twist) > constants.twist_limit)
+
+
+@formula
+def exceeds_rolling(displacements, n, constants):
+    """Whether ξ exceeds its limit."""
+    return _squared_rolling(displacements.roll, n) > constants.derived.squared_roll_limit
+
+
+@formula
+def _squared_rolling(roll, n):
+    """ξ² = q² − (q·n)² [m²] for q = R (n1 + n2), where q·n is of second order."""
+    along = dot(roll, n)
+    return dot(roll, roll) - along * along
+
+
+@formula
+def _slip_factor(size, limit, share, reset):
+    """Factor by which slip reduces a displacement: 1 below the limit, else `share` = limit/size or, with `reset`, 0."""
+    return share * (1.0 - reset) if size > limit else 1.0  # a choice by `reset` would be a branch in loops
 
 
 @formula
@@ -147,12 +188,29 @@ def after_slip(displacements, n, constants, reset):
 
     The returned `roll` is the tangential displacement ξ′ for which new contact pointers are computed.
     """
-    xi = across(displacements.roll, n)
-    slide_size = math.sqrt(dot(displacements.slide, displacements.slide))
-    slide = scale(_slip_factor(slide_size, constants.slide_limit, reset), displacements.slide)
-    roll = scale(_slip_factor(math.sqrt(dot(xi, xi)), constants.roll_limit, reset), xi)
-    twist = _slip_factor(abs(displacements.twist), constants.twist_limit, reset) * displacements.twist
-    return Displacements(displacements.overlap, slide, roll, twist)
+    xi, slide = across(displacements.roll, n), displacements.slide
+    slide_limit, roll_limit = constants.derived.squared_slide_limit, constants.derived.squared_roll_limit
+    slide2, roll2, twist = dot(slide, slide), _squared_rolling(displacements.roll, n), abs(displacements.twist)
+    a, b, c = max(slide2, slide_limit), max(roll2, roll_limit), max(twist, constants.twist_limit)
+    inverse = 1.0 / (a * b * c)  # one division for three
+    slide_share, roll_share = math.sqrt(slide_limit * (b * c * inverse)), math.sqrt(roll_limit * (a * c * inverse))
+    twist_share = constants.twist_limit * (a * b * inverse)
+    return Displacements(
+        displacements.overlap,
+        scale(_slip_factor(slide2, slide_limit, slide_share, reset), slide),
+        scale(_slip_factor(roll2, roll_limit, roll_share, reset), xi),
+        _slip_factor(twist, constants.twist_limit, twist_share, reset) * displacements.twist,
+    )
+
+
+@formula
+def after_rolling(displacements, n, constants, reset):
+    """As `after_slip`, for a contact that is beyond the limit of rolling alone."""
+    xi, limit = across(displacements.roll, n), constants.derived.squared_roll_limit
+    roll2 = _squared_rolling(displacements.roll, n)
+    share = math.sqrt(limit / max(roll2, limit))
+    roll = scale(_slip_factor(roll2, limit, share, reset), xi)
+    return Displacements(displacements.overlap, displacements.slide, roll, displacements.twist)
 
 
 @formula
@@ -194,13 +252,18 @@ def slip_losses(start, end, left, constants):
         Constants of the contact.
     """
     slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))
-    roll = dot(add(start.roll, left.roll), sub(end.roll, left.roll))
     twist = (start.twist + left.twist) * (end.twist - left.twist)
     return (
         0.5 * constants.slide_stiffness * slide,
-        0.5 * constants.roll_stiffness * roll,
+        roll_loss(start.roll, end.roll, left.roll, constants),
         0.5 * constants.twist_stiffness * twist,
     )
+
+
+@formula
+def roll_loss(start, end, left, constants):
+    """As `slip_losses` of rolling alone, from the vectors R (n1 + n2) [m]."""
+    return 0.5 * constants.roll_stiffness * dot(add(start, left), sub(end, left))
 
 
 @formula

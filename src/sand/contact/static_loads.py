@@ -20,8 +20,8 @@ from ..numerics.vec import across
 from .constants_table import column_loops
 from .law import ContactLaw
 from .mechanics import displacements_of, scaled_stiffness
+from .poses import pose_at
 from .tangential import sliding
-from .update import pose_at
 
 
 class Responses(NamedTuple):

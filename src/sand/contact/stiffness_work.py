@@ -9,7 +9,7 @@ from .constants_table import column_loops
 from .law import ContactLaw
 from .losses import record_stiffness_loss
 from .mechanics import displacements_of, scaled_stiffness, stiffness_loss
-from .update import displacements_before, pose_at
+from .poses import displacements_before, pose_at
 
 
 @functools.cache

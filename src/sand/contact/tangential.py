@@ -25,14 +25,14 @@ def rolling(n1, n2, reduced_radius):
 
 
 @formula
-def twisting_rate(n, spin1, spin2, across_speed, distance, dt):
-    """Twisting rate dφ/dt = (ω1 − ω2)·n [rad/s] with n in the middle of the step.
+def twisting_rate(n, turn, speed, inverse_distance, dt):
+    """Twisting rate dφ/dt = Ω·n [rad/s] with n in the middle of the step, from Ω = ω1 − ω2, v1 − v2 and 1/D.
 
     `n` is the axis at the end of the step.  Half a step earlier the axis is n − (dt/2) v_across/D, to second order in
-    dt.
+    dt, and Ω·v_across = Ω·v − (Ω·n)(v·n).
     """
-    turn = sub(spin1, spin2)
-    return dot(turn, n) - 0.5 * dt / distance * dot(turn, across_speed)
+    along = dot(turn, n)
+    return along - 0.5 * dt * inverse_distance * (dot(turn, speed) - along * dot(speed, n))
 
 
 @formula
@@ -41,9 +41,15 @@ def pointers_for(slide, roll, n, r1, r2):
 
     t1 = ξ/r1 + ζ/(r1+r2), t2 = ξ/r2 − ζ/(r1+r2), n1 = −n√(1−t1²) + t1, n2 = n√(1−t2²) + t2
     """
-    shared = scale(1.0 / (r1 + r2), slide)
-    t1 = axpy(1.0 / r1, roll, shared)
-    t2 = sub(scale(1.0 / r2, roll), shared)
+    return pointers_by(slide, roll, n, 1.0 / r1, 1.0 / r2, 1.0 / (r1 + r2))
+
+
+@formula
+def pointers_by(slide, roll, n, inverse1, inverse2, inverse_sum):
+    """As `pointers_for`, from 1/r1, 1/r2 and 1/(r1 + r2) [1/m]."""
+    shared = scale(inverse_sum, slide)
+    t1 = axpy(inverse1, roll, shared)
+    t2 = sub(scale(inverse2, roll), shared)
     return pointer(-1.0, n, t1), pointer(1.0, n, t2)
 
 

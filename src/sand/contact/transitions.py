@@ -17,9 +17,9 @@ from .law import ContactLaw
 from .losses import FORMING_ROW
 from .mechanics import contact_speed_gain, time_since
 
-PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG = 1, 2, 3
+PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG, SLID_FLAG = 1, 2, 3, 4
 """Flags of contacts beyond a limit: to be handled by `events.slip_and_break_loop`; broken in this step; slipped in this
-step in the pass over contacts.
+step in the pass over contacts, in rolling only; also, or only, in sliding or twisting.
 """
 ZERO = (0.0, 0.0, 0.0)
 
@@ -75,7 +75,7 @@ def breaking_loop(law: ContactLaw, dashpots: DampingVariant) -> Callable:
         elapsed = time_since(broken.stretched, broken.opening, dt)
         energy, force = at_break(broken.constants)
         lost[BREAKING] += energy
-        force += damping_of_break(bodies, contacts, lost, c, broken.pose, broken.opening, elapsed, dt)
+        force += damping_of_break(bodies, contacts, lost, c, broken, elapsed, dt)
         contacts.flag[c] = BROKEN_FLAG
         store_loads(contacts, c, (ZERO, ZERO, ZERO))
         return force * (0.5 * dt - elapsed)

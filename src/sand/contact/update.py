@@ -5,11 +5,11 @@ contact from its two grains and stores them per contact; no two iterations write
 vectorises.  The gather pass over grains (`gather`) then sums the stored forces and torques of the contacts of each
 grain in a fixed order.
 
-The update (`contact_loop`) exists in two variants that give the same results.  `_flag_contact` only flags contacts
-beyond a limit, which `events.slip_and_break_loop` then handles one by one.  In strongly excited aggregates most
-contacts slip in every step: blocks in which more than 10 % of the contacts were flagged in the last step use
-`_slip_contact`, which computes slip for every contact and selects the result where a limit is exceeded.  Both are free
-of branches.
+The update (`contact_loop`) exists with three rules for limits (`slip_rules`) that give the same results.  Contacts that
+a rule only flags are handled one by one by `events.slip_and_break_loop`.  In strongly excited aggregates most contacts
+slip in every step: blocks in which more than 10 % of the contacts were beyond a limit in the last step use a loop in
+which contacts slip in rolling, and if more than 5 % of them slid, twisted, broke or were left to the events, one in
+which they slip in any mode.  All are free of branches.
 """
 
 import functools
@@ -20,38 +20,36 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arrays import CONTACTS_PER_BLOCK
-from ..basics.state import (
-    CONTACT_STEP,
-    CONTACTS,
-    SLIPPED,
-)
-from ..compiler.jit import COMPILED, formula, loop, rare
-from ..numerics.quaternion import turned, turned_back, turned_by
+from ..basics.state import CONTACT_STEP, CONTACTS, SLIPPED
+from ..compiler.jit import COMPILED, loop, rare
 from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
-from ..numerics.vec import across, axpy, dot, load, load4, nearest_image, put, scale, sub
-from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads
 from .law import ContactLaw
-from .losses import add_damping_energies, add_slip_energies, add_slip_losses
-from .mechanics import (
-    Pose,
-    after_slip,
-    contact_load,
-    displacements_of,
-    exceeds_limits,
-    scaled_stiffness,
-    slip_losses,
-)
+from .losses import add_damping_energies, add_slip_energies
+from .mechanics import contact_load, displacements_of, scaled_stiffness
 from .pair_types import pair_type_count
+from .poses import nearest_separation, pose_at, pose_at_step_end, separation_of
+from .slip_rules import Reached, flag_contact, kept_loop, roll_contact, slip_contact
 from .transitions import PENDING_FLAG, SLIPPED_FLAG
 
 BLOCK_SIZE = np.uint64(CONTACTS_PER_BLOCK)
 """Contacts per block."""
 SLIP_FRACTION = 0.1
-"""Fraction of a block's contacts flagged in the last step, above which the block uses `_slip_contact`."""
+"""Fraction of a block's contacts beyond a limit in the last step, above which contacts slip in the loop."""
+OTHER_FRACTION = 0.05
+"""Fraction of them that did not only slip in rolling, above which contacts slip in any mode."""
 MIN_REMAINDER = 4
 """Remaining contacts from which a padded SIMD vector is faster than a scalar loop."""
+
+
+class PassVariant(NamedTuple):
+    """What the pass over contacts computes; loops are compiled without what a simulation does not need."""
+
+    damping: str = NONE  # of `damping`: NONE, DASHPOTS or THERMAL
+    periodic: bool = True  # nearest images; False for open boxes
+    follow: bool = False  # stiffnesses that follow the contact radius
+    adhesive: bool = False  # whether all contacts adhere
 
 
 class ContactStep(NamedTuple):
@@ -72,16 +70,6 @@ class ContactRange(NamedTuple):
     column: Any  # column of the constants of the first contact; those of the others follow
 
 
-class Reached(NamedTuple):
-    """A contact at the end of a step, before slip."""
-
-    pose: Any  # mechanics.Pose
-    displacements: Any  # mechanics.Displacements
-    constants: Any  # law.ContactConstants
-    present: Any  # these with the present stiffnesses
-    valid: bool  # whether the contact radius is
-
-
 class ContactSums(NamedTuple):
     """Counts, energy losses and the largest overlap of a pass over contacts."""
 
@@ -97,126 +85,14 @@ class ContactSums(NamedTuple):
     deepest: float  # largest overlap, in radii of the smaller grain; 0 if no grains overlap
 
 
-@formula
-def overlap_share(overlap, r1, r2):
-    """Overlap in radii of the smaller grain; 0 or less for separated surfaces."""
-    return overlap / (r1 if r1 < r2 else r2)
-
-
-@loop
-def pose_at(grains, contacts, span, c, twist):
-    """Relative pose of the grains of contact c now, with the given twist φ [rad]."""
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    distance = math.sqrt(dot(separation, separation))
-    return Pose(
-        scale(1.0 / distance, separation),
-        distance,
-        turned(load4(grains.orientation, i), load(contacts.pointer1, c)),
-        turned(load4(grains.orientation, j), load(contacts.pointer2, c)),
-        twist,
-    )
-
-
-@loop
-def twist_increment(grains, contacts, c, pose, dt):
-    """Increase of the twist [rad] in the step that led to this pose, from mid-step velocities and spins."""
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    transverse = across(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    rate = tangential.twisting_rate(pose.n, load(grains.spin, i), load(grains.spin, j), transverse, pose.distance, dt)
-    return dt * rate
-
-
-@loop
-def pose_at_step_end(grains, contacts, span, c, dt):
-    """Relative pose at the end of a step of dt [s], with the twist accumulated in the step."""
-    pose = pose_at(grains, contacts, span, c, 0.0)
-    twist = contacts.twist[c] + twist_increment(grains, contacts, c, pose, dt)
-    return Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
-
-
-@loop
-def _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt):
-    """Displacements at the start of the step that led to this pose; `twist` is the twist at that time."""
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
-    separation = axpy(-dt, relative_velocity, scale(pose.distance, pose.n))
-    distance = math.sqrt(dot(separation, separation))
-    start_pose = Pose(
-        scale(1.0 / distance, separation),
-        distance,
-        turned_by(scale(-dt, load(grains.spin, i)), pose.n1),
-        turned_by(scale(-dt, load(grains.spin, j)), pose.n2),
-        twist,
-    )
-    r1, r2 = grains.radius[i], grains.radius[j]
-    return displacements_of(start_pose, r1 + r2 - distance, r1, r2, constants)
-
-
-@loop
-def displacements_before(grains, contacts, c, pose, constants, dt):
-    """Displacements at the start of the step, for a contact whose stored twist is that at the end."""
-    twist = pose.twist - twist_increment(grains, contacts, c, pose, dt)
-    return _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt)
-
-
-@formula
-def _select(condition, u, v):
-    """Vector u where the condition holds, else v."""
-    return u[0] if condition else v[0], u[1] if condition else v[1], u[2] if condition else v[2]
-
-
-@formula
-def slipped_pose(displacements, pose, r1, r2, constants, reset):
-    """Pose after slip: the pointers and the twist represent the displacements of `mechanics.after_slip`."""
-    target = after_slip(displacements, pose.n, constants, reset)
-    n1, n2 = tangential.pointers_for(target.slide, target.roll, pose.n, r1, r2)
-    return Pose(pose.n, pose.distance, n1, n2, target.twist)
-
-
-@loop
-def _flag_contact(grains, contacts, c, reached, step):
-    """Only flag a contact beyond a limit; returns its pose, the energies [J] dissipated by slip, and its flag."""
-    exceeded = exceeds_limits(reached.displacements, reached.pose.n, reached.constants) | (not reached.valid)
-    return reached.pose, (0.0, 0.0, 0.0), PENDING_FLAG if exceeded else 0
-
-
-@loop
-def _slip_contact(grains, contacts, c, reached, step):
-    """As `_flag_contact`, but let a contact beyond a limit slip.
-
-    Contacts that break, or whose contact radius is not valid, are only flagged.
-    """
-    pose, displacements, constants, present, valid = reached
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    r1, r2 = grains.radius[i], grains.radius[j]
-    pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
-    needs_event = (displacements.overlap < -constants.break_overlap) | (not valid)
-    slips = exceeds_limits(displacements, pose.n, constants) & (not needs_event)
-    # both cases are computed and selected from at the end: branches and conditional stores prevent vectorisation
-    start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, step.dt)
-    slipped = slipped_pose(displacements, pose, r1, r2, constants, step.settings.reset)
-    body1 = turned_back(load4(grains.orientation, i), slipped.n1)
-    body2 = turned_back(load4(grains.orientation, j), slipped.n2)
-    n1, n2 = _select(slips, slipped.n1, pose.n1), _select(slips, slipped.n2, pose.n2)
-    new_pose = Pose(pose.n, pose.distance, n1, n2, slipped.twist if slips else pose.twist)
-    left = displacements_of(new_pose, displacements.overlap, r1, r2, constants)
-    lost = slip_losses(start, displacements, left, present)
-    lost = _select(slips, lost, (0.0, 0.0, 0.0))
-    put(contacts.pointer1, c, _select(slips, body1, pointer1))
-    put(contacts.pointer2, c, _select(slips, body2, pointer2))
-    add_slip_losses(contacts.lost, c, lost)
-    return new_pose, lost, PENDING_FLAG if needs_event else SLIPPED_FLAG if slips else 0
-
-
 @functools.cache
-def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) -> Callable:
-    """The loop that updates a range of contacts, for a contact law, a rule for limits and a variant of damping.
-
-    The rule is `_flag_contact` or `_slip_contact`, the variant of `damping`: NONE, DASHPOTS or THERMAL.
-    """
-    load_constants, radius_root, normal_force = column_loops(law).load, law.fast_radius_root, law.force
-    contact_radius, damp = law.contact_radius, damping_loops(damping).update
+def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant) -> Callable:
+    """The loop that updates a range of contacts, for a contact law and a rule of `slip_rules`."""
+    load_constants, radius_root = column_loops(law).load, law.fast_radius_root
+    normal_force = (law.adhesive_force if variant.adhesive else None) or law.force
+    contact_radius = (law.adhesive_radius if variant.adhesive else None) or law.contact_radius
+    damp, follow = damping_loops(variant.damping).update, variant.follow
+    apart = nearest_separation if variant.periodic else separation_of
 
     @loop
     def update_contacts(grains, contacts, part, step):
@@ -242,19 +118,18 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
         deepest = float_bits(0.0)  # the bits of a negative number are below 0
         for k in range(part.last - part.first):
             c = part.first + k
-            i, j = contacts.pair[0, c], contacts.pair[1, c]
             constants = load_constants(contacts.constants, part.column + k)
-            r1, r2 = grains.radius[i], grains.radius[j]
-            pose = pose_at_step_end(grains, contacts, step.span, c, step.dt)
+            r1, r2 = constants.derived.radius1, constants.derived.radius2
+            pose = pose_at_step_end(grains, contacts, apart(grains, contacts, step.span, c), c, step.dt)
             overlap = r1 + r2 - pose.distance
             y, valid = radius_root(overlap, constants)
-            present = scaled_stiffness(constants, y, step.settings.follow)
-            displacements = displacements_of(pose, overlap, r1, r2, constants)
-            reached = Reached(pose, displacements, constants, present, valid)
+            present = scaled_stiffness(constants, y, True) if follow else constants
+            reached = Reached(pose, displacements_of(pose, overlap, r1, r2, constants), constants, valid)
             pose, lost, flag = handle_limits(grains, contacts, c, reached, step)
             normal = normal_force(overlap, y, constants)
             # a flagged contact is damped by events.slip_and_break_loop; padding columns hold no grains
-            active = (flag != PENDING_FLAG) & (c < part.used)
+            used = c < part.used
+            active = (flag != PENDING_FLAG) & used
             radius, springs = contact_radius(overlap, y, constants), contact_load(pose, normal, r1, r2, present)
             loads, dissipated = damp(grains, contacts, c, Held(pose, radius, constants), springs, active, step)
             damped1 += dissipated[0]
@@ -264,12 +139,12 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) 
             contacts.twist[c] = pose.twist
             store_loads(contacts, c, loads)
             contacts.flag[c] = flag
-            pending += 1 if (flag == PENDING_FLAG) & (c < part.used) else 0
-            slipped += 1 if flag == SLIPPED_FLAG else 0
-            deepest = max(deepest, float_bits(overlap_share(overlap, r1, r2) if c < part.used else 0.0))
-            slid += lost[0]
-            rolled += lost[1]
-            twisted += lost[2]
+            pending += 1 if (flag == PENDING_FLAG) & used else 0
+            slipped += 1 if (flag >= SLIPPED_FLAG) & used else 0
+            deepest = max(deepest, float_bits(overlap * constants.derived.inverse_radius if used else 0.0))
+            slid += lost[0] if used else 0.0
+            rolled += lost[1] if used else 0.0
+            twisted += lost[2] if used else 0.0
         return ContactSums(
             float(pending), float(slipped), slid, rolled, twisted, damped1, damped2, damped3, damped4,
             float_from_bits(deepest),
@@ -289,10 +164,12 @@ def padded_contact_count(contacts, number):
 
 
 @functools.cache
-def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
-    """The pass over a range of contacts, block by block, for one contact law and variant of damping."""
-    flag_contacts = contact_loop(law, _flag_contact, damping)
-    slip_contacts = contact_loop(law, _slip_contact, damping)
+def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
+    """The pass over a range of contacts, block by block, for one contact law."""
+    flag_contacts, complete_kept = contact_loop(law, flag_contact, variant), kept_loop(law)
+    roll_contacts = flag_contacts if variant.follow else contact_loop(law, roll_contact, variant)
+    slip_contacts = flag_contacts if variant.follow else contact_loop(law, slip_contact, variant)
+    fraction = math.inf if variant.follow else SLIP_FRACTION
 
     @loop
     def contact_pass(grains, contacts, first, last, step):
@@ -307,19 +184,26 @@ def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
             begin = first + b * BLOCK_SIZE
             end = begin + BLOCK_SIZE if begin + BLOCK_SIZE < last else last
             column = np.uint64(0) if uniform_contacts(contacts) else begin
-            slipped_before = 0.0
+            beyond = 0.0
             for k in range(end - begin):
-                slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
-            if slipped_before > SLIP_FRACTION * (end - begin) and not step.settings.follow:
-                part = slip_contacts(grains, contacts, ContactRange(begin, end, end, column), step)
-                slipped += part.slipped
-                slid += part.slid
-                rolled += part.rolled
-                twisted += part.twisted
+                beyond += 1.0 if contacts.flag[begin + k] > 0 else 0.0
+            block = ContactRange(begin, padded_contact_count(contacts, end), end, column)
+            if beyond <= fraction * (end - begin):
+                part = flag_contacts(grains, contacts, block, step)
             else:
-                padded = padded_contact_count(contacts, end)
-                part = flag_contacts(grains, contacts, ContactRange(begin, padded, end, column), step)
+                complete_kept(grains, contacts, ContactRange(begin, end, end, column), step)
+                others = beyond
+                for k in range(end - begin):
+                    others -= 1.0 if contacts.flag[begin + k] == SLIPPED_FLAG else 0.0
+                if others <= OTHER_FRACTION * (end - begin):
+                    part = roll_contacts(grains, contacts, block, step)
+                else:
+                    part = slip_contacts(grains, contacts, block, step)
             pending += part.pending
+            slipped += part.slipped
+            slid += part.slid
+            rolled += part.rolled
+            twisted += part.twisted
             damped1 += part.damped_normal
             damped2 += part.damped_sliding
             damped3 += part.damped_rolling

@@ -121,6 +121,7 @@ def regrouped_arrays(state: State, kept: np.ndarray, grains: Grains, target: Sta
     elif uniform:  # one column, also without contacts
         constants = saved["contacts/constants"][:, :1] if constants.size else np.zeros((len(constants), 1))
     out["contacts/constants"] = constants
+    out["contacts/kept"][:] = 0.0  # grains may have been moved: displacements are computed in the next step
     owner = pair.T.ravel()  # entry 2c + k is grain k of contact c
     out["contacts/side"] = np.argsort(owner, kind="stable").astype(np.uint32)
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(grains)))])

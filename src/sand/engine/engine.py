@@ -33,6 +33,7 @@ from ..basics.state import (
 )
 from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
+from ..contact.constants_table import with_derived
 from ..contact.gather import resort_contacts_by_grain
 from ..forces.base import Force
 from ..integrate.driver import advance
@@ -320,7 +321,7 @@ class Engine(CompiledState):
     def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
         """Restore the regular state of a checkpoint, with `state` at a time of output [s]; sum loads, rebuild lists."""
         state, self._output_time = self.regular_state, output_time
-        state.from_arrays(self.stepper.with_missing(self, saved))
+        state.from_arrays(with_derived(self.law, self.stepper.with_missing(self, saved)))
         if not any(each.watches_contacts for each in self.components):
             state.count[COMPARED] = -1
         if state.order.size:  # the order of the lists depends on it

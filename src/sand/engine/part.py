@@ -43,7 +43,7 @@ from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
 
-NOT_COPIED = ("pair", "constants", "every_step", "side", "start", "gather_order")
+NOT_COPIED = ("pair", "constants", "every_step", "kept", "side", "start", "gather_order")
 CONTACT_COLUMNS = tuple(name for name in ContactArrays._fields if name not in NOT_COPIED)
 """Arrays of contacts that a part needs and changes; pairs are numbered anew, the others follow."""
 MOVING = ("position", "velocity", "orientation", "spin", "moment", "image")
@@ -190,6 +190,7 @@ class Part:
         else:
             own.contacts.constants[:, :used] = contacts.constants[:, self.columns]
         own.contacts.every_step[:] = 0
+        own.contacts.kept[:] = 0.0  # displacements of another step, before the clusters moved as rigid bodies
         own.count[CONTACTS] = used
 
     def _same_contacts(self, state: State, own: State) -> np.ndarray:

@@ -12,7 +12,8 @@ from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import DASHPOTS, NONE, THERMAL
 from ..contact.gather import resort_contacts_by_grain
-from ..contact.law import ContactLaw
+from ..contact.law import ContactLaw, Pairing
+from ..contact.update import PassVariant
 from ..forces.pair.long_range_loops import LongRangeSums
 from . import stages, taylor
 from .force_stages import (
@@ -105,16 +106,18 @@ def variant_of(settings: ContactParameters) -> str:
 
 def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[int, Stage]:
     """The stages of contacts by number."""
-    damping = variant_of(parameters.settings)
+    settings, damping = parameters.settings, variant_of(parameters.settings)
+    adhesive = bool((settings.pairings[Pairing._fields.index("surface_energy")] > 0.0).all())
+    variant = PassVariant(damping, any(parameters.span), settings.follow, adhesive)
     found: dict[int, Stage] = stages.contact_event_stages(given.law, damping) | {
         StageNumber.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
         StageNumber.INNER_LIST: stages.inner_list,
-        StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, damping, given.wide),
+        StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, variant, given.wide),
         StageNumber.SORT: resort_contacts_by_grain,
         StageNumber.CONTACT_STEP: stages.set_contact_step,
         StageNumber.REMOVE_BROKEN: stages.remove_broken,
     }
-    if not parameters.settings.follow:
+    if not settings.follow:
         del found[StageNumber.STIFFNESS_WORK]
     return found
 

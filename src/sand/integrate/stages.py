@@ -16,7 +16,7 @@ from ..contact.events import compact_contacts, forming_loops, slip_and_break_loo
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.stiffness_work import stiffness_work_loop
-from ..contact.update import ContactStep, contact_pass_loop, contact_step, store_contact_sums
+from ..contact.update import ContactStep, PassVariant, contact_pass_loop, contact_step, store_contact_sums
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
@@ -115,9 +115,9 @@ def inner_list(grains, pair_list, count, span, criteria):
 
 
 @factory
-def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Stage:
+def contact_pass_stage(law: ContactLaw, variant: PassVariant, long_vectors: bool) -> Stage:
     """Update of a block of contacts; stores its sums."""
-    contact_pass = contact_pass_loop(law, damping)
+    contact_pass = contact_pass_loop(law, variant)
 
     @stage("the contact forces", long_vectors=long_vectors, seconds=3.5)
     def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):

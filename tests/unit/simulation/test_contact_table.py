@@ -6,7 +6,7 @@ import pytest
 import sand
 from sand.contact import jkr, mechanics
 from sand.contact.constants_table import column_loops
-from sand.contact.update import pose_at
+from sand.contact.poses import pose_at
 from sand.simulation.contact_table import COLUMNS
 
 from ...physics.setups import random_aggregate

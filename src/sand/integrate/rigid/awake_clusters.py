@@ -12,8 +12,8 @@ from ...compiler.stage import Stage, stage
 from ...contact.constants_table import column_loops
 from ...contact.law import ContactLaw
 from ...contact.mechanics import displacements_of
+from ...contact.poses import pose_at
 from ...contact.settling import list_cluster, rigid_motion, solve_symmetric
-from ...contact.update import pose_at
 from ...forces.pair.dipole_formulas import pair_load
 from ...numerics.quaternion import turned_back
 from ...numerics.vec import accrue, across, add, cross, dot, load, load4, nearest_image, norm, put, scale, sub
