@@ -37,7 +37,8 @@ ONE_WALL = {k: v for name in ("walls", "wall_contacts") for k, v in saved(name, 
 BODIES = saved("bodies", body_arrays(4))
 BODIES["bodies/first"][:] = np.arange(4)
 CROSSINGS = {"grains/image": np.zeros((3, 4), np.int32)}
-WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES, **CROSSINGS}
+KEPT = {"contacts/kept": np.zeros((7, ARRAYS["contacts/pair"].shape[1]))}
+WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES, **CROSSINGS, **KEPT}
 FAR = 2**31 - 1
 """An index out of range."""
 
