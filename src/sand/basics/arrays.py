@@ -41,7 +41,8 @@ class ContactArrays(NamedTuple):
     damping: Annotated[np.ndarray, Array((DAMPING_ROWS, USED), fewer=0)]
     # ζ and R (n1 + n2) [m] at the start of a step, and which step, see contact.slip_rules
     kept: Annotated[np.ndarray, Array((7, USED), required=False)]
-    force: Annotated[np.ndarray, Array((3, USED), "N")]  # force on grain 1
+    # force on grain 1, and torques; with r-RESPA impulses they also have the pair forces of the two grains
+    force: Annotated[np.ndarray, Array((3, USED), "N")]
     torque1: Annotated[np.ndarray, Array((3, USED), "N m")]
     torque2: Annotated[np.ndarray, Array((3, USED), "N m")]
     # 0 within all limits, else one of the flags of contact.transitions

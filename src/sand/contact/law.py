@@ -108,10 +108,11 @@ class Derived(NamedTuple):
 @formula
 def derived_constants(reduced, roll_stiffness, slide_limit, roll_limit, break_overlap, r1, r2):
     """`Derived` of one contact, from R [m], k_r [N/m], limits [m], −δ where it breaks [m] and radii [m]."""
+    reachable = min(roll_limit, 4.0 * reduced)  # |R (n1 + n2)| is at most 2R; the square of a huge limit would overflow
     return Derived(
         reduced * reduced * roll_stiffness,
         slide_limit * slide_limit,
-        roll_limit * roll_limit,
+        reachable * reachable,
         1.0 / (break_overlap if break_overlap > 0.0 else reduced),
         r1,
         r2,

@@ -157,7 +157,9 @@ def build_engine(
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
         own = [each for each in extra if each.in_parts]
-        return build_engine(wrapped, others, box, verlet, search, seed, own, fresh=False)
+        # where loads are held they are those that a part does not sum, and with impulses it sums no pairs in contact
+        steps = dataclasses.replace(verlet, far="every step") if holding else verlet
+        return build_engine(wrapped, others, box, steps, search, seed, own, fresh=False)
 
     kind.complete(engine, forces, build)
     for each in extra:

@@ -107,7 +107,7 @@ class BodySteps(GrainSteps):
     _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
-    _remainder: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+    _far: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
     _had_substeps: bool = field(init=False, default=False)  # of the present step
     _changed_forces: Sequence[Force] | None = field(init=False, default=None)  # which the parts do not have yet
 
@@ -125,7 +125,7 @@ class BodySteps(GrainSteps):
         of_bodies = (advance_bodies, ()), (mark_near_bodies, ()), (store_rest, ()), *quick
         own: list[tuple[Stage, Any]] = [
             (measure_clusters_stage(inner.law), cluster_measures(1)),
-            (kick_clusters, (self._remainder,)),
+            (kick_clusters, (self._far,)),
             (resort_contacts_by_grain, ()),
         ]
         of_inner = inner.table_for_call()
@@ -149,12 +149,17 @@ class BodySteps(GrainSteps):
     def loads(self, engine: Engine) -> tuple[np.ndarray, np.ndarray]:
         """As `GrainSteps.loads`, with those of the contacts of awake clusters."""
         state = engine.state.copy()
-        contacts, grains = state.contacts, state.grains.arrays
-        columns = contacts_of(state, state.bodies.asleep == 0)
-        for side, sign, torque in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
-            index = contacts.pair[side, columns]
-            np.add.at(grains.force.T, index, sign * contacts.force.T[columns])
-            np.add.at(grains.torque.T, index, torque.T[columns])
+        grains = state.grains.arrays
+        self._list_awake(state)
+        if self._grains.size:
+            self._update_parts(engine)
+            # after a step of no length, which begins without marks of r-RESPA, these are the loads of contacts alone
+            present = self._sum_near_loads(state)
+            contacts, used = present.contacts, int(present.count[CONTACTS])
+            for side, sign, torque in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
+                index = self._grains[contacts.pair[side, :used]]
+                np.add.at(grains.force.T, index, sign * contacts.force.T[:used])
+                np.add.at(grains.torque.T, index, torque.T[:used])
         for stage, numbers in engine.content.of_components.get(Hook.LOADS, ()):
             stage.run(engine.table_of(state), numbers)
         return state.grains.force, state.grains.torque
@@ -292,26 +297,32 @@ class BodySteps(GrainSteps):
         """The state of the awake grains, with contacts as they are and everything else as at a start."""
         if self._measures.size.size != len(self._grains):
             self._measures = cluster_measures(len(self._grains))
-            self._remainder = np.zeros((2, 3, len(self._grains)))
+            self._far = np.zeros((2, 3, len(self._grains)))
         taken = self.part.take(state, self._grains, self._columns)
         for loads in self._held_loads():
             loads[...] = 0.0
         return taken
+
+    def _sum_near_loads(self, state: State) -> State:
+        """The state of the awake grains, with all loads that their engine sums."""
+        present = self._take_awake(state)
+        present.begin_empty_step()
+        self.part.engine.drive(-math.inf, 1)
+        present.count[STEPS] = 0
+        return present
 
     def _take_contact_steps(self, engine: Engine) -> Stop:
         """Contact steps of the awake grains for one step of the bodies."""
         self._had_substeps = False
         self._update_parts(engine)
         state = engine.regular_state
-        present, inner = self._take_awake(state), self.part.engine
+        present = self._sum_near_loads(state)
+        inner = self.part.engine
         before, end = state.time, state.time + float(state.clock[STEP])
         if engine.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in engine.external:
                 state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
-        present.begin_empty_step()
-        inner.drive(-math.inf, 1)
-        present.count[STEPS] = 0
         self._begin_far_loads(state)
         self._vibrated = np.zeros(len(self._grains), bool)
         pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / _limits(engine).longest_awake)
@@ -352,12 +363,12 @@ class BodySteps(GrainSteps):
         starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
         return list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
 
-    def _sum_far_loads(self, state: State) -> bool:
-        """Set `_remainder` to the loads of all grains that the inner engine does not sum; returns whether it is set."""
+    def _set_far_loads(self, state: State) -> bool:
+        """Set `_far` to the loads of all grains that the inner engine does not sum; returns whether it is set."""
         full, near = state.long_range, self.part.state.long_range
         if full.force.size:
-            self._remainder[0] = full.force[:, self._grains] - near.force
-            self._remainder[1] = full.torque[:, self._grains] - near.torque
+            self._far[0] = full.force[:, self._grains] - near.force
+            self._far[1] = full.torque[:, self._grains] - near.torque
         return full.force.size > 0
 
     def _held_loads(self) -> tuple[np.ndarray, ...]:
@@ -367,9 +378,9 @@ class BodySteps(GrainSteps):
 
     def _begin_far_loads(self, state: State) -> None:
         """Hold the far loads for the step, or kick the awake clusters by half of them."""
-        if not self._sum_far_loads(state):
+        if not self._set_far_loads(state):
             return
-        for loads, far, name in zip(held := self._held_loads(), self._remainder, LOADS, strict=False):
+        for loads, far, name in zip(held := self._held_loads(), self._far, LOADS, strict=False):
             loads[...] = far
             getattr(self.part.state.grains.arrays, name)[...] += far
         if not held:
@@ -377,7 +388,7 @@ class BodySteps(GrainSteps):
 
     def _end_far_loads(self, state: State) -> None:
         """Kick the awake clusters by half of the far loads, or by half of the change of those that were held."""
-        if not self._sum_far_loads(state):
+        if not self._set_far_loads(state):
             return
         if self._held_loads():
             self._end_held_loads(state)
@@ -386,7 +397,7 @@ class BodySteps(GrainSteps):
 
     def _end_held_loads(self, state: State) -> None:
         """Half a kick of the awake grains by the change of the held loads in this step; logs the work of a drive."""
-        force, torque = (far - held for far, held in zip(self._remainder, self._held_loads(), strict=True))
+        force, torque = (far - held for far, held in zip(self._far, self._held_loads(), strict=True))
         grains, heavy = self.part.state.grains.arrays, self.part.engine.content.heavy
         half, power = 0.5 * float(state.clock[STEP]), 0.0
         for loads, motion, inertia in ((force, grains.velocity, grains.mass), (torque, grains.spin, grains.inertia)):
@@ -396,10 +407,10 @@ class BodySteps(GrainSteps):
         state.lost[OUTSIDE] += half * power
 
     def _kick(self, step: float) -> None:
-        """Half a kick of the awake clusters by the loads `_remainder`, for a step [s]."""
+        """Half a kick of the awake clusters by the loads `_far`, for a step [s]."""
         table = self.part.engine.table_of(self.part.state)
         table["scratch"][DT] = 0.5 * step
-        kick_clusters.run(table, (self._remainder,))
+        kick_clusters.run(table, (self._far,))
 
     def kick_awake(self, state: State, force: np.ndarray, torque: np.ndarray, step: float) -> None:
         """Half a kick of the awake clusters between steps.
@@ -417,7 +428,7 @@ class BodySteps(GrainSteps):
         if not self._grains.size:
             return
         self._take_awake(state)
-        self._remainder[0], self._remainder[1] = force[:, self._grains], torque[:, self._grains]
+        self._far[0], self._far[1] = force[:, self._grains], torque[:, self._grains]
         self._kick(step)
         self._store_velocities(state)
 
