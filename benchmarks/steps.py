@@ -32,6 +32,7 @@ def touched_bytes(sim: sand.Simulation) -> float:
         "formed",
         "lost",
         "damping",
+        "kept",
         "every_step",
         "start",
         "gather_order",

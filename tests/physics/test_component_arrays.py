@@ -83,7 +83,8 @@ def with_flux(monkeypatch):
     """Simulations have the component."""
     read = components.read_components
     monkeypatch.setattr(simulation, "read_components", lambda **given: read(**given, flux=[1]))
-    monkeypatch.setitem(components.GIVEN, "flux", (tuple, Flux))
+    monkeypatch.setitem(components.GIVEN, "flux", tuple)
+    monkeypatch.setattr(components, "COMPONENTS", (*components.COMPONENTS, Flux))
 
 
 def flying(count=40, order="as given", **options):

@@ -71,7 +71,7 @@ LEAST_CLOCK = LARGEST_OVERLAP
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
-STAGE = 1  # 1 in the middle of a step, after the drift; 0 between steps
+STAGE = 1  # 0 between steps; 1 after the drift; 2 and 3 after substeps of rigid clusters, see integrate.rigid.substeps
 CONTACTS = 2  # contacts in use
 PAIRS = 3  # candidate pairs in use
 MADE = 4  # contacts formed

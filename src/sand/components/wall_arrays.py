@@ -28,7 +28,7 @@ class WallArrays(NamedTuple):
 
 
 class WallContactArrays(NamedTuple):
-    """Contacts of grains with walls, one column each, as `ContactArrays`."""
+    """Contacts of grains with walls, one column each, as `ContactArrays`; the first used[0] columns are in use."""
 
     used: Annotated[np.ndarray, Array((1,), dtype="i8", saved=False)]
     pair: Annotated[np.ndarray, Array((2, USED), dtype="u4", rule="any", names=(GRAINS, "walls"))]  # grain and wall

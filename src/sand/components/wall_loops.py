@@ -122,7 +122,11 @@ def _start_walls(walls, numbers, dt):
 
 @loop
 def _finish_walls(walls, contacts, numbers, dt):
-    """Force on each wall, the second half kick of walls with a mass, impulse and work in this step."""
+    """Force on each wall, the second half kick of walls with a mass, impulse and work in this step.
+
+    The work is −V·J with the impulse J of the grains.  Along n, a wall with a mass does ∫ push V dt less its gain of
+    kinetic energy.
+    """
     for w in range(walls.work.size):
         n, start = load(walls.normal, w), load(walls.force, w)
         force = ZERO
@@ -133,14 +137,15 @@ def _finish_walls(walls, contacts, numbers, dt):
         accrue(walls.impulse, w, scale(0.5 * dt, add(start, force)))
         impulse = sub(load(walls.impulse, w), load(walls.impulse_before, w))
         middle = load(walls.velocity, w)  # with the impulses of contacts that formed or broke in this step
-        drift = dot(load(walls.velocity_before, w), n) + 0.5 * dt * (dot(start, n) + numbers.push[w]) / numbers.mass[w]
+        speed = dot(load(walls.velocity_before, w), n)
+        drift_speed = speed + 0.5 * dt * (dot(start, n) + numbers.push[w]) / numbers.mass[w]
         along = dot(force, n) + numbers.push[w]
         accrue(walls.velocity, w, scale(0.5 * dt * along / numbers.mass[w], n))
         if numbers.mass[w] < math.inf:
             # kinetic energy of the motion along n; the other components of the velocity are constant
             before, after = dot(load(walls.velocity_before, w), n), dot(load(walls.velocity, w), n)
             gained = 0.5 * numbers.mass[w] * (after * after - before * before)
-            walls.work[w] += numbers.push[w] * dt * drift - gained - dot(across(middle, n), impulse)
+            walls.work[w] += numbers.push[w] * dt * drift_speed - gained - dot(across(middle, n), impulse)
         else:
             walls.work[w] -= dot(middle, impulse)
 

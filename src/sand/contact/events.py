@@ -247,7 +247,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
             pairing = load_pairing(step.settings.pairings, grains.material[i], grains.material[j])
             reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
             pose, constants = pose_at(grains, contacts, step.span, c, 0.0), constants_at(contacts, c)
-            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], overlap * constants.derived.inverse_radius)
+            clock[LARGEST_OVERLAP] = max(clock[LARGEST_OVERLAP], overlap * constants.derived.inverse_smaller_radius)
             radius = contact_radius(overlap, radius_root(overlap, constants), constants)
             touched = Touch(n, Held(pose, radius, constants), overlap, closing, reduced, pairing.modulus)
             apply_pair_impulse(grains, i, j, n, touch(grains, contacts, lost, clock, c, touched, step))

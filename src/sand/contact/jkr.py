@@ -180,6 +180,7 @@ def _normal_mode(surface_energy, modulus, reduced):
 
 @formula
 def _radius_root(overlap, c):
+    # 1/δ_c; without adhesion 1/R, as `derived_constants` and `_normal_mode` have it
     return root(stretch(overlap, c.derived.inverse_break_overlap))
 
 

@@ -101,7 +101,7 @@ class Derived(NamedTuple):
     radius2: float  # r2 [m]; infinite at a wall
     inverse_radius1: float  # 1/r1 [1/m]
     inverse_radius2: float  # 1/r2 [1/m]
-    inverse_radius: float  # 1/r of the smaller grain [1/m]
+    inverse_smaller_radius: float  # 1/r of the smaller grain [1/m]
     inverse_sum: float  # 1/(r1 + r2) [1/m]
 
 

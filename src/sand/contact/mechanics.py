@@ -76,7 +76,7 @@ def scaled_stiffness(constants, y, follow):
             constants.derived.radius2,
             constants.derived.inverse_radius1,
             constants.derived.inverse_radius2,
-            constants.derived.inverse_radius,
+            constants.derived.inverse_smaller_radius,
             constants.derived.inverse_sum,
         ),
     )
@@ -90,7 +90,8 @@ def contact_load(pose, normal, r1, r2, constants):
         M1 = −r1 k_s n1×ζ − R² k_r n1×n2 − k_t φ n
         M2 = +r2 k_s n2×ζ − R² k_r n2×n1 + k_t φ n
 
-    The factor (d·n)/D makes M1 + M2 + (x1−x2)×F1 = 0 exact.
+    Here d = r1 n1 − r2 n2, and ζ is its part across n (`tangential.sliding`).  The factor (d·n)/D makes
+    M1 + M2 + (x1−x2)×F1 = 0 exact.
 
     Parameters
     ----------

@@ -141,7 +141,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             contacts.flag[c] = flag
             pending += 1 if (flag == PENDING_FLAG) & used else 0
             slipped += 1 if (flag >= SLIPPED_FLAG) & used else 0
-            deepest = max(deepest, float_bits(overlap * constants.derived.inverse_radius if used else 0.0))
+            deepest = max(deepest, float_bits(overlap * constants.derived.inverse_smaller_radius if used else 0.0))
             slid += lost[0] if used else 0.0
             rolled += lost[1] if used else 0.0
             twisted += lost[2] if used else 0.0
@@ -166,9 +166,9 @@ def padded_contact_count(contacts, number):
 @functools.cache
 def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
     """The pass over a range of contacts, block by block, for one contact law."""
-    flag_contacts, complete_kept = contact_loop(law, flag_contact, variant), kept_loop(law)
-    roll_contacts = flag_contacts if variant.follow else contact_loop(law, roll_contact, variant)
-    slip_contacts = flag_contacts if variant.follow else contact_loop(law, slip_contact, variant)
+    update_flagging, complete_kept = contact_loop(law, flag_contact, variant), kept_loop(law)
+    update_rolling = update_flagging if variant.follow else contact_loop(law, roll_contact, variant)
+    update_slipping = update_flagging if variant.follow else contact_loop(law, slip_contact, variant)
     fraction = math.inf if variant.follow else SLIP_FRACTION
 
     @loop
@@ -189,16 +189,16 @@ def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
                 beyond += 1.0 if contacts.flag[begin + k] > 0 else 0.0
             block = ContactRange(begin, padded_contact_count(contacts, end), end, column)
             if beyond <= fraction * (end - begin):
-                part = flag_contacts(grains, contacts, block, step)
+                part = update_flagging(grains, contacts, block, step)
             else:
                 complete_kept(grains, contacts, ContactRange(begin, end, end, column), step)
                 others = beyond
                 for k in range(end - begin):
                     others -= 1.0 if contacts.flag[begin + k] == SLIPPED_FLAG else 0.0
                 if others <= OTHER_FRACTION * (end - begin):
-                    part = roll_contacts(grains, contacts, block, step)
+                    part = update_rolling(grains, contacts, block, step)
                 else:
-                    part = slip_contacts(grains, contacts, block, step)
+                    part = update_slipping(grains, contacts, block, step)
             pending += part.pending
             slipped += part.slipped
             slid += part.slid

@@ -17,7 +17,7 @@ Build = Callable[[Sequence[Force], Neighbours], Engine]
 
 
 class Kind:
-    """An engine of grains.
+    """What the assembly of an engine does for an integrator; this one: for engines of grains.
 
     Attributes
     ----------

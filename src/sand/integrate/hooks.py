@@ -33,9 +33,11 @@ class Hook(IntEnum):
     END_STEP = 10  # the step is counted: TIME and STEPS are those of its end
     BETWEEN_CYCLES = 11  # after END_STEP, but not within a cycle of r-RESPA: change velocities
     AFTER_CHANGES = 12  # all stages of BETWEEN_CYCLES have changed velocities
-    NEAR_BODIES = 13  # of a step of bodies of clock[STEP]: mark those that may touch something but each other
+    NEAR_BODIES = 13  # of a step of bodies of clock[STEP]: mark those that may touch what is no body, such as a wall
     NONE_AWAKE = 14  # bodies have moved by clock[STEP], and no cluster takes contact steps in which other things move
-    END_OF_BODIES = 15  # called by the engine: awake clusters end a step of bodies; act for any time since the last
+    END_OF_BODIES = (
+        15  # called by the engine: awake clusters end a step of bodies; act for the time since they last did
+    )
     ENERGIES = 16  # not called by the driver: add energies to an array, for a row of the ledger
 
 

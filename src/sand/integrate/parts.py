@@ -52,7 +52,7 @@ class Stop(IntEnum):
     LIST_FULL = 9
     CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
     TABLES_FULL = 11  # a table of a component, such as contacts with walls
-    HAS_TO_WAKE = 12  # bodies may touch within the next step, or the loads of their contacts are near a limit
+    HAS_TO_WAKE = 12  # bodies may touch within the next step, or the loads of their contacts may be near a limit
     AWAKE_STEPS = 13  # awake clusters have to take their contact steps
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep
     SUBSTEPS = 15  # some bodies have to take substeps within the step of all bodies

@@ -138,7 +138,7 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     subtract_contact_pairs : Callable
         Subtracts them from the long-range loads just summed.
     reassign_contact_pairs : Callable
-        Between two cycles: new contacts (`every_step` 0) leave the long-range loads, broken ones (flag BROKE) return;
+        Between two cycles: new contacts (`every_step` 0) leave the long-range loads, broken ones (BROKEN_FLAG) return;
         `mark_every_step` follows when this is done for all pair forces.
     """
 

@@ -59,7 +59,7 @@ class StepCriteria(NamedTuple):
     """Parameters of the step-size criteria."""
 
     fixed: float  # step set by the user [s]; 0: automatic
-    pair_gap: float  # largest gap of the pairs in the pair list: the smallest radius [m]
+    pair_gap: float  # largest gap of the pairs in the pair list: the smallest radius, or more with rigid clusters [m]
     energy_scale: float  # largest energy of a long-range pair, |U_min| for dipoles [J]; 0: no such force
     accuracy: float  # allowed energy error of a step, in units of energy_scale
     outer_field: float  # magnitude of the external flux density [T]

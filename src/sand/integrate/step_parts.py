@@ -1,4 +1,4 @@
-"""Conditions of a step that the driver checks itself: whether one is possible, and whether lists are stale."""
+"""Conditions of a step that the driver checks itself: whether one is possible."""
 
 import math
 

@@ -37,5 +37,5 @@ def test_derived_constants_at_walls():
     saved = {"wall_contacts/constants": np.ones((len(names) - 10, 1)), "grains/radius": RADII}
     saved["wall_contacts/pair"] = np.array([[1], [0]], np.uint32)
     table = with_derived(own, saved)["wall_contacts/constants"]
-    found = [table[names.index(f"derived.{name}"), 0] for name in ("inverse_radius", "radius2", "inverse_sum")]
+    found = [table[names.index(f"derived.{name}"), 0] for name in ("inverse_smaller_radius", "radius2", "inverse_sum")]
     assert found == [1.0 / RADII[1], np.inf, 0.0]

@@ -37,7 +37,7 @@ from .quick_bodies import QuickBodies
 GRAINS = "use clusters = 'grains' (sand.Verlet)"
 LIST_GAP, SHARE_OF_SPACING = 3.0, 0.3
 """Largest gap of pairs that the driver of bodies looks at, in smallest radii, and, in thin gases, in mean distances of
-neighbours: steps of bodies are long, and no body flies farther in a step than a tenth of it."""
+neighbours: steps of bodies are long, and no body flies farther in a step than a fifth of it."""
 
 
 class BodiesKind(Kind):

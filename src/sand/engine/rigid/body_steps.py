@@ -280,7 +280,10 @@ class BodySteps(GrainSteps):
         return failed
 
     def _wake(self, engine: Engine) -> None:
-        """Wake all bodies that may touch, or the loads of whose contacts are near a limit."""
+        """Wake all bodies that may touch, or the loads of whose contacts are near a limit.
+
+        Their grains have the velocities of the rigid motion already, from the end of the last step.
+        """
         state, woken = engine.regular_state, False
         bodies = state.bodies
         for first in np.flatnonzero((bodies.near >= LOADED) & (bodies.asleep == 1)).tolist():

@@ -33,7 +33,7 @@ def reserve_of(shares: np.ndarray, changes: np.ndarray) -> float:
 
 
 def rest_with_loads(state: State, first: int, strain: float) -> None:
-    """What is known of a body that comes to rest now, with the largest displacement of its contacts."""
+    """Set the reserve of a body that comes to rest, from the largest displacement `strain` of its contacts."""
     bodies = state.bodies
     bodies.reserve[first] = reserve_of(np.array(strain), np.array(0.0))
     bodies.changed[first] = bodies.load[first] = 0.0
