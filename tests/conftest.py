@@ -165,7 +165,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     guard.allowed = _tier(item) is not None or bool(DISABLE_JIT) or item.get_closest_marker("compiled") is not None
     result = yield
     guard.allowed = True
-    if guard.has_compiled:  # what the compiler leaves stays to the end
+    if guard.has_compiled:  # what the compiler leaves stays to the end; garbage of the test does not
+        gc.collect()
         gc.freeze()
         guard.has_compiled = False
     return result

@@ -120,10 +120,11 @@ def wait_until(condition, seconds=120.0):
     assert met
 
 
-def begun(command, folder):
-    """Whether the first results of a job are in its folder."""
+def begun(command, folder, rows=0):
+    """Whether the first results of a job are in its folder, and so many rows of them."""
     name = {"grow": "seed-2/ledger.csv", "collide": "collisions.jsonl", "scatter": "flights.csv"}[command]
-    return (folder / name).exists()
+    path = folder / name
+    return path.exists() and len(path.read_text().splitlines()) >= rows
 
 
 def results(command, folder):
@@ -190,17 +191,27 @@ def stop_and_check(job, folder, way):
 
 @pytest.mark.parametrize(
     ("command", "way"),
-    [("grow", "worker killed"), ("collide", "parent killed"), ("scatter", "Ctrl-C")],
+    [("grow", "Ctrl-C"), ("grow", "worker killed"), ("collide", "parent killed"), ("scatter", "Ctrl-C")],
 )
 def test_stopped_once(tmp_path, command, way):
-    """After its first results; the resumed job has the results of an undisturbed one in a single process."""
+    """In its middle; the resumed job, of two processes where it grows, has the results of an undisturbed one in one."""
     case, folder, undisturbed = (tmp_path / name for name in ("case.toml", "job", "undisturbed"))
     case.write_text(CASES[command])
     assert main([command, str(case), "--out", str(undisturbed), "--workers", "1", "--quiet"]) == DONE
     job = start(command, case, folder)
-    wait_until(lambda: begun(command, folder))
+    wait_until(lambda: begun(command, folder, rows=7 if command == "grow" else 2))
+    assert job.poll() is None and workers(job)
     stop_and_check(job, folder, way)
-    assert main(["resume", str(folder), "--workers", "1", "--quiet"]) == DONE
+    assert job.returncode != DONE
+    if command == "grow":
+        saved = [newest_checkpoint(box) for box in folder.glob("seed-*") if list(box.glob("checkpoint-*"))]
+        assert way == "worker killed" or any(meta["steps"] > 0 for _, meta in saved)
+    if way == "Ctrl-C" and command == "grow":
+        again = start("resume", folder, folder)
+        said = again.communicate(timeout=300)[0]
+        assert again.returncode == DONE, said
+    else:
+        assert main(["resume", str(folder), "--workers", "1", "--quiet"]) == DONE
     assert results(command, folder) == results(command, undisturbed)
 
 

@@ -245,11 +245,14 @@ def test_threads_of_awake_clusters_change_no_bit(monkeypatch, held):
     """Loops over so few grains are not shared; here they are, also those over the grains of awake clusters."""
     monkeypatch.setattr(task_queue, "PARALLEL_FROM", 1)
     ends = []
-    for number in (1, 2):
-        sand.set_threads(number)
-        ends.append(magnetic_gas(held))
-        ends[-1].run(until="25 ns")
-    sand.set_threads(None)
+    try:
+        for number in (1, 2):
+            sand.set_threads(number)
+            ends.append(magnetic_gas(held))
+            ends[-1].run(until="25 ns")
+    finally:
+        sand.set_threads(None)
+    assert ends[-1]._engine.workers is not None
     assert ends[0].regular_state.count[CONTACT_STEPS] > 100
     assert different(*ends) == []
 

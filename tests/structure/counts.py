@@ -15,7 +15,7 @@ from .layers import SOURCE
 from .sources import SOURCES, UNIT_TESTS, identifiers, nodes_of, text_of
 
 CAPABILITIES = {
-    "rigid clusters with walls, driven grains and ramps, settling with driven grains": 220,
+    "rigid clusters with walls, driven grains and ramps, settling with driven grains": 233,
     "loops over contacts by what they did in the last step, with displacements that these keep": 198,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
@@ -129,7 +129,7 @@ COUNTS = (
     Count("functions with more than 8 positional parameters", lambda: len(parameters()), 0, 8),
     Count("most positional parameters", lambda: max(parameters().values(), default=0), 8, 10),
     Count("attributes that Simulation sets", attributes_of_simulation, 14, 15),
-    Count("pairs of folders of which one imports the other", pairs_of_folders, 200, 200),
+    Count("pairs of folders of which one imports the other", pairs_of_folders, 197, 200),
     Count("files that name rigid clusters outside their own", lambda: len(files_that_name(RIGID, "rigid")), 3, 3),
     Count("files that name walls outside their own", lambda: len(files_that_name(WALL, "components")), 3, 3),
     Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN, "components")), 3, 3),

@@ -165,6 +165,7 @@ def test_the_command(tmp_path, capsys):
         "scattering.json",
         "figure.png",
     }
+    assert (out / "figure.png").stat().st_size > 10_000
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     assert main(["scatter", str(case), "--out", str(out)]) == 2
     assert "sand resume" in capsys.readouterr().err

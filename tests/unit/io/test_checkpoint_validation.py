@@ -72,6 +72,15 @@ def test_every_array_of_a_checkpoint_is_declared():
     assert set(WITH_ORDER) == set(STORED)
 
 
+def test_arrays_of_walls_keep_their_names():
+    """Checkpoints of earlier versions have them."""
+    walls = {name for name in STORED if name.startswith(("walls/", "wall_contacts/"))}
+    own = ("position", "velocity", "normal", "force", "impulse", "work")
+    vectors, others = ("pointer1", "pointer2", "force", "torque1"), ("twist", "formed", "constants", "lost", "damping")
+    of_contacts = ("pair", *vectors, *others, "flag")
+    assert walls == {*(f"walls/{name}" for name in own), *(f"wall_contacts/{name}" for name in of_contacts)}
+
+
 def test_a_checkpoint_with_walls_of_an_earlier_version_is_valid():
     """Earlier versions counted the contacts with walls in `count`, too, and the entry has no meaning now."""
     count = ARRAYS["count"].copy()
