@@ -235,3 +235,15 @@ def test_driven_grains_keep_their_motion_when_others_are_removed():
     with sim.change() as change:
         change.remove([0])
     assert sim.driven == ()
+
+
+@pytest.mark.parametrize(
+    "driven",
+    [[sand.Driven([0]), sand.Driven([2], velocity=[0.1, 0, 0])], [sand.Driven([0, 1], spin=[0, 0, 1e5])]],
+)
+def test_driven_grains_with_several_motions_do_not_settle(driven):
+    """In one cluster, there would be no rigid motion to which it settles; one motion of several grains is allowed."""
+    contact = [sand.Contact(settling_time="20 ns")]
+    with pytest.raises(sand.BadInput, match="driven: contact settling_time needs one motion to which clusters settle"):
+        sand.Simulation(row_of_grains(4), contact, driven=driven)
+    sand.Simulation(row_of_grains(4), contact, driven=sand.Driven([0, 2], velocity=[0.1, 0, 0]))

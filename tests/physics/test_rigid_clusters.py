@@ -923,3 +923,20 @@ def test_contradictory_words_in_a_case_file_are_refused(tmp_path, capsys):
         case.write_text(f'run = {{ until = "1 ns" }}\ngrains = {{ number = 2 }}\nstepping = {{ {text} }}\n', "utf-8")
         assert main(["info", str(case)]) == 2
         assert words in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("ignore:without settling_time")
+@pytest.mark.compiled("contacts")
+def test_a_copy_follows_a_change_of_a_ramp_that_awake_clusters_have_not_seen():
+    """Gravity g sets in at 5 ns, while no cluster is awake; two grains touch after the copy, and fall with g t."""
+    grains = sand.Grains([[0, 0, 0], [5e-8, 0, 0]], 1e-8, "iron", velocity=[[1, 0, 0], [-1, 0, 0]])
+    gravity = sand.Gravity(sand.Ramp(values=[[0, 0, 0], [0, 0, 1e8]], times=["5 ns", "5 ns"], steps=1))
+    forces = [sand.Contact(damping="critical", damping_ratio=0.2), gravity]
+    sim = sand.Simulation(grains, forces, stepping=sand.RigidClusters(longest_step="1 ns"), frame_every=1.0)
+    sim.run(until="7 ns")
+    copied = sim.copy()
+    for each in (sim, copied):
+        each.run(until="18 ns")
+    assert len(sim.contacts["pair"]) == 1
+    assert different(sim, copied) == []
+    np.testing.assert_allclose(sim.grains.velocity[:, 2], 1e8 * 13e-9, rtol=1e-9, atol=0.0)

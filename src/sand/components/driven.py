@@ -27,7 +27,8 @@ class Driven(Settings):
     """Grains with prescribed velocity and spin, by default held at rest.
 
     Their contacts and all forces on other grains act as usual; loads on them do not change their motion, as if mass and
-    moment of inertia were infinite. The work of the drive is recorded in `lost_outside`. Settling
+    moment of inertia were infinite. The work of the drive is recorded in `lost_outside`. With a `settling_time` of
+    contacts all driven grains have the same velocity, and no spin if there are several. Settling
     (`Contact.settling_time`) of their clusters leads to their rigid motion.
 
     Parameters
@@ -88,6 +89,14 @@ class DrivenGrains(Component):
             problems.append(f"driven: stepping = '{setup.stepping.name}' cannot drive grains; use sand.Verlet()")
         if setup.neighbours.order == "curve":
             problems.append("driven: neighbours order = 'curve' cannot drive grains; use order = 'as given'")
+        motions = {(tuple(each.velocity), tuple(each.spin)) for each in self.items}
+        rotates = len(index) > 1 and any(any(each.spin) for each in self.items)
+        if (len(motions) > 1 or rotates) and getattr(setup.forces.contact, "settling_time", None) is not None:
+            # in one cluster, settling would remove the motion of driven grains relative to each other, with any energy
+            problems.append(
+                "driven: contact settling_time needs one motion to which clusters settle; give all driven grains the "
+                "same velocity, and no spin if there are several, or leave settling_time out"
+            )
         return problems
 
     def prepare(self, grains: Grains) -> None:

@@ -50,9 +50,12 @@ class Reached(NamedTuple):
 
 
 @formula
-def next_step(number):
-    """What row STEP_KEPT holds where displacements are those at the end of step `number`; 0 stands for none."""
-    return float(number + 2)
+def next_step(number, dt):
+    """What row STEP_KEPT holds for displacements at the end of step `number` of dt [s]; 0, for none, if dt is 0.
+
+    A step of no length, in which loads are summed anew, has the number of the one that follows.
+    """
+    return float(number + 2) if dt > 0.0 else 0.0
 
 
 @formula
@@ -88,7 +91,7 @@ def roll_contact(grains, contacts, c, reached, step):
     lost = roll_loss(load_rows(contacts.kept, ROLL, c), displacements.roll, roll, constants)
     lost = lost if slips else 0.0
     contacts.lost[ROLLING_ROW, c] += lost
-    _keep(contacts, c, displacements.slide, roll, 0.0 if others else next_step(step.number))
+    _keep(contacts, c, displacements.slide, roll, 0.0 if others else next_step(step.number, step.dt))
     return pose, (0.0, lost, 0.0), PENDING_FLAG if others else SLIPPED_FLAG if slips else 0
 
 
@@ -111,7 +114,7 @@ def slip_contact(grains, contacts, c, reached, step):
     left = displacements_of(pose, displacements.overlap, r1, r2, constants)
     lost = select(slips, slip_losses(start, displacements, left, constants), (0.0, 0.0, 0.0))
     add_slip_losses(contacts.lost, c, lost)
-    _keep(contacts, c, left.slide, left.roll, 0.0 if needs_event else next_step(step.number))
+    _keep(contacts, c, left.slide, left.roll, 0.0 if needs_event else next_step(step.number, step.dt))
     flag = SLID_FLAG if slides else SLIPPED_FLAG
     return pose, lost, PENDING_FLAG if needs_event else flag if slips else 0
 
@@ -144,7 +147,7 @@ def kept_loop(law: ContactLaw) -> Callable:
     @rare
     def complete(grains, contacts, part, step):
         """Compute displacements at the start of the step that led to the present poses where others are kept."""
-        present = next_step(step.number - 1)
+        present = next_step(step.number - 1, 1.0)
         for k in range(part.last - part.first):
             c = part.first + k
             if contacts.kept[STEP_KEPT, c] != present:
@@ -158,7 +161,7 @@ def kept_loop(law: ContactLaw) -> Callable:
     @loop
     def complete_if_needed(grains, contacts, part, step):
         """As `complete`, which is not called where all are kept."""
-        present, others = next_step(step.number - 1), 0.0
+        present, others = next_step(step.number - 1, 1.0), 0.0
         for k in range(part.last - part.first):
             others += 1.0 if contacts.kept[STEP_KEPT, part.first + k] != present else 0.0
         if others > 0.0:

@@ -187,6 +187,9 @@ def test_kept_displacements_are_those_at_the_start_of_the_next_step(rule):
     span, system = Box.open().span, random_contacts(SILICA, Box.open())
     grains, contacts, _, count, _ = system
     contacts.flag[:PAIRS] = rule
+    empty = copy.deepcopy(system)
+    pass_and_update(OPEN)(*empty, span, parameters_for(), 0.0)  # has the number of the step that follows
+    assert not empty[1].kept[STEP_KEPT, :PAIRS].any()
     pass_and_update(OPEN)(*system, span, parameters_for(), STEP)
     single = np.isin(contacts.flag[:PAIRS], (PENDING_FLAG, BROKEN_FLAG))
     assert (contacts.kept[STEP_KEPT, :PAIRS] > 0.0).tolist() == (~single).tolist() and np.any(single)

@@ -113,7 +113,9 @@ class BodySteps(GrainSteps):
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BodySteps:
         """A copy whose parts have tables of their own."""
-        return BodySteps(copy.deepcopy(self.part, memo), copy.deepcopy(self.quick, memo), self.made)
+        copied = BodySteps(copy.deepcopy(self.part, memo), copy.deepcopy(self.quick, memo), self.made)
+        copied._changed_forces = self._changed_forces
+        return copied
 
     def for_part(self) -> BodySteps:
         """As `GrainSteps.for_part`, without substeps."""
