@@ -308,7 +308,7 @@ def test_threads_change_no_bit_of_a_pair_force(name, cutoff):
     ends = []
     for threads in (1, 3):
         sand.set_threads(threads)
-        others = [sand.Charges(cutoff="0.15 um")] if name != "charges" else [sand.Dipoles(cutoff="0.15 um")]
+        others = [sand.Dipoles(cutoff="0.15 um") if "charges" in name else sand.Charges(cutoff="0.15 um")]
         sim = sand.Simulation(grains, [FORCES[name](**ARGUMENTS.get(name, {}), cutoff=cutoff), *others])
         sim.run(steps=20)
         ends.append(sim.grains.velocity.tobytes())
