@@ -224,6 +224,7 @@ def test_the_ledger_closes_and_output_and_restarts_change_no_bit(tmp_path, held)
     stopped.run(until="23.7 ns")
     del stopped
     again = sand.resume(tmp_path / "run")
+    again.loads()  # of awake clusters: computed in the part that takes their steps
     again.run(until=end)
     count = whole.regular_state.count
     assert min(count[WOKEN], count[RESTED]) > 2 and count[LATE] == 0

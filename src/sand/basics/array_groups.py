@@ -1,7 +1,7 @@
 """Groups of arrays: what each array of a state holds, and everything that follows from it.
 
 A group is a NamedTuple with fields annotated `Annotated[np.ndarray, Array(…)]`: the groups of `basics.arrays`, and
-those that components declare (`engine.component.Component.groups`).  From these annotations follow the memory of a
+the groups that components declare (`engine.component.Component.groups`).  From these annotations follow the memory of a
 new state, the content of a checkpoint and its check, the growth of tables, and what becomes of an array with a new
 order of the grains, or after grains were removed or added.
 """
@@ -44,7 +44,7 @@ class Array(NamedTuple):
         What they may be in a checkpoint: a name in `io.state_arrays.RULES`.
     names : tuple of str
         Sizes of which its rows are indices: ("grains", "walls") for pairs of a grain and a wall. Where it is `GRAINS`
-        they follow the grains, and a column of a table goes with its grain.
+        they follow the grains, and a column of a table goes with its grain. Only saved arrays of a table have any.
     initial : float
         Number with which it begins.
     saved : bool
@@ -73,6 +73,9 @@ class Array(NamedTuple):
 def _declared(group: Any) -> tuple[dict[str, Array], dict[str, Array]]:
     hints = get_type_hints(group, include_extras=True)
     declared: dict[str, Array] = {name: hint.__metadata__[0] for name, hint in hints.items()}
+    for name, each in declared.items():
+        if each.saved and each.names and each.shape[-1] != USED:  # what would stand for a grain that was removed?
+            raise TypeError(f"{group.__name__}.{name} names {each.names[0]}, but is no array of a table: use a table")
     return declared, {name: each for name, each in declared.items() if each.saved}
 
 

@@ -176,7 +176,6 @@ class BodyArrays(NamedTuple):
     excluded_torque: Annotated[np.ndarray, Array((3, GRAINS), "N m", saved=False)]
 
 
-LOADS_OF_BODIES = ("rest_force", "rest_torque", "known_force", "known_torque")
 SAVED_BODIES, SAVED_LONG_RANGE = tuple(saved_in(BodyArrays)), tuple(saved_in(LongRangeArrays))
 """Arrays of bodies and long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")

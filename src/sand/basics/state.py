@@ -335,11 +335,11 @@ class State:
         if "order" in saved:
             self.order = np.zeros(len(self.grains), np.uint32)
             _copy_into(self.order, saved, "order")
-        self._make_room(saved)
+        self._enlarge_tables(saved)
         for name, key, array, each in self._saved():
             self._load(array, saved, f"{name}/{key}", each)
 
-    def _make_room(self, saved: Mapping[str, np.ndarray]) -> None:
+    def _enlarge_tables(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over the columns in use of the tables of components, and enlarge tables that are too small."""
         for name, group in zip(self.group_names(), self.in_groups(), strict=True):
             table = table_in(group)

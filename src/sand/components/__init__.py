@@ -35,7 +35,7 @@ def read_components(**given: Any) -> dict[str, Component]:
 
 
 def components_of(given: Mapping[str, Component], forces: Sequence[Force], grains: Grains, box: Box) -> list[Component]:
-    """All components that a simulation has: those that the user gave, and those that follow from the forces."""
+    """All components of a simulation: the user's components, and the components that follow from the forces."""
     found = [given.get(each.name) or each.of(forces, grains, box) for each in COMPONENTS]
     return [each for each in found if each.items]
 

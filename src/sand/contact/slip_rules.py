@@ -105,9 +105,8 @@ def slip_contact(grains, contacts, c, reached, step):
     slides = exceeds_sliding_or_twisting(displacements, constants)
     needs_event = breaks(displacements, constants) | (not valid)
     slips = (slides | exceeds_rolling(displacements, pose.n, constants)) & (not needs_event)
-    start = Displacements(
-        0.0, load_rows(contacts.kept, SLIDE, c), load_rows(contacts.kept, ROLL, c), contacts.twist[c]
-    )  # fmt: skip
+    slide, roll = load_rows(contacts.kept, SLIDE, c), load_rows(contacts.kept, ROLL, c)
+    start = Displacements(0.0, slide, roll, contacts.twist[c])
     left = after_slip(displacements, pose.n, constants, step.settings.reset)
     pose = _slipped_where(slips, grains, contacts, c, slipped_pose(left, pose, constants), pose)
     r1, r2 = constants.derived.radius1, constants.derived.radius2
@@ -151,10 +150,8 @@ def kept_loop(law: ContactLaw) -> Callable:
         for k in range(part.last - part.first):
             c = part.first + k
             if contacts.kept[STEP_KEPT, c] != present:
-                constants, pose = (
-                    load_constants(contacts.constants, part.column + k),
-                    pose_at(grains, contacts, step.span, c, 0.0),
-                )
+                constants = load_constants(contacts.constants, part.column + k)
+                pose = pose_at(grains, contacts, step.span, c, 0.0)
                 start = displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, step.dt)
                 _keep(contacts, c, start.slide, start.roll, present)
 

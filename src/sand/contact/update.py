@@ -225,16 +225,8 @@ def log_contact_sums(count, lost, sums):
 @loop
 def store_contact_sums(rows, b, sums):
     """Store the sums of a pass in row b of a (B, ≥ 10) array."""
-    rows[b, 0] = sums.pending
-    rows[b, 1] = sums.slipped
-    rows[b, 2] = sums.slid
-    rows[b, 3] = sums.rolled
-    rows[b, 4] = sums.twisted
-    rows[b, 5] = sums.damped_normal
-    rows[b, 6] = sums.damped_sliding
-    rows[b, 7] = sums.damped_rolling
-    rows[b, 8] = sums.damped_twisting
-    rows[b, 9] = sums.deepest
+    for k in range(len(sums)):
+        rows[b, k] = sums[k]
 
 
 @loop

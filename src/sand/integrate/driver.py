@@ -264,7 +264,7 @@ def update_lists(s):
 
 @caller
 def update_contacts(s):
-    """Update all contacts, and slip or break those that the pass has flagged; returns whether any contact broke."""
+    """Update all contacts, then slip or break the flagged ones; returns whether any contact broke."""
     blocks = blocks_of(s.count[CONTACTS], CONTACTS_PER_BLOCK)
     for_each_block(s, StageNumber.CONTACT_PASS, blocks)
     pending = False

@@ -35,9 +35,7 @@ class Hook(IntEnum):
     AFTER_CHANGES = 12  # all stages of BETWEEN_CYCLES have changed velocities
     NEAR_BODIES = 13  # of a step of bodies of clock[STEP]: mark those that may touch what is no body, such as a wall
     NONE_AWAKE = 14  # bodies have moved by clock[STEP], and no cluster takes contact steps in which other things move
-    END_OF_BODIES = (
-        15  # called by the engine: awake clusters end a step of bodies; act for the time since they last did
-    )
+    END_OF_BODIES = 15  # called by the engine: awake clusters end a step of bodies; act for all time since the last
     ENERGIES = 16  # not called by the driver: add energies to an array, for a row of the ledger
 
 

@@ -38,10 +38,9 @@ from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
 from ...forces.base import Force
 from ...integrate.hooks import Hook
-from ...integrate.parts import DT, Stop
+from ...integrate.parts import Stop
 from ...integrate.rigid.awake_clusters import (
     ClusterMeasures,
-    add_held_loads,
     cluster_measures,
     kick_clusters,
     measure_clusters_stage,
@@ -64,6 +63,7 @@ from .cluster_bodies import (
     set_friction,
     sort_members,
 )
+from .far_loads import FarLoads
 from .quick_bodies import QuickBodies
 from .rigid_loads import may_stay_at_rest, rest_with_loads
 
@@ -76,7 +76,6 @@ SPANS = (
     "a cluster spans half of the box or more, and acts on itself through the images of the box: it is not moved as a "
     "rigid body, and takes contact steps all the time; use a larger box"
 )
-LOADS = ("force", "torque")
 MOVING_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
 """Arrays of bodies that change in a step."""
 
@@ -107,7 +106,7 @@ class BodySteps(GrainSteps):
     _vibrated: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _slipped: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, bool))  # awake grains, in this step
     _measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
-    _far: np.ndarray = field(init=False, default_factory=lambda: np.zeros((2, 3, 0)))
+    _far: FarLoads = field(init=False, default_factory=FarLoads)
     _had_substeps: bool = field(init=False, default=False)  # of the present step
     _changed_forces: Sequence[Force] | None = field(init=False, default=None)  # which the parts do not have yet
 
@@ -127,7 +126,7 @@ class BodySteps(GrainSteps):
         of_bodies = (advance_bodies, ()), (mark_near_bodies, ()), (store_rest, ()), *quick
         own: list[tuple[Stage, Any]] = [
             (measure_clusters_stage(inner.law), cluster_measures(1)),
-            (kick_clusters, (self._far,)),
+            (kick_clusters, (self._far.values,)),
             (resort_contacts_by_grain, ()),
         ]
         of_inner = inner.table_for_call()
@@ -302,10 +301,8 @@ class BodySteps(GrainSteps):
         """The state of the awake grains, with contacts as they are and everything else as at a start."""
         if self._measures.size.size != len(self._grains):
             self._measures = cluster_measures(len(self._grains))
-            self._far = np.zeros((2, 3, len(self._grains)))
         taken = self.part.take(state, self._grains, self._columns)
-        for loads in self._held_loads():
-            loads[...] = 0.0
+        self._far.prepare(self.part)
         return taken
 
     def _sum_near_loads(self, state: State) -> State:
@@ -328,7 +325,7 @@ class BodySteps(GrainSteps):
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
             for outer in engine.external:
                 state.lost[OUTSIDE] += external_energy(inner, outer, end) - external_energy(inner, outer, before)
-        self._begin_far_loads(state)
+        self._far.begin(state, self.part)
         self._vibrated = np.zeros(len(self._grains), bool)
         pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / _limits(engine).longest_awake)
         for k in range(1, pieces):
@@ -368,55 +365,6 @@ class BodySteps(GrainSteps):
         starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
         return list(zip(numbers[order][starts].tolist(), np.split(order, starts[1:]), strict=True))
 
-    def _set_far_loads(self, state: State) -> bool:
-        """Set `_far` to the loads of all grains that the inner engine does not sum; returns whether it is set."""
-        full, near = state.long_range, self.part.state.long_range
-        if full.force.size:
-            self._far[0] = full.force[:, self._grains] - near.force
-            self._far[1] = full.torque[:, self._grains] - near.torque
-        return full.force.size > 0
-
-    def _held_loads(self) -> tuple[np.ndarray, ...]:
-        """Forces and torques (3, n) that act on awake grains for the whole step; none where rigid kicks do."""
-        found = self.part.engine.content.of_components.get(Hook.LOADS, ())
-        return next((numbers for stage, numbers in found if stage is add_held_loads), ())
-
-    def _begin_far_loads(self, state: State) -> None:
-        """Hold the far loads for the step, or kick the awake clusters by half of them."""
-        if not self._set_far_loads(state):
-            return
-        for loads, far, name in zip(held := self._held_loads(), self._far, LOADS, strict=False):
-            loads[...] = far
-            getattr(self.part.state.grains.arrays, name)[...] += far
-        if not held:
-            self._kick(float(state.clock[STEP]))
-
-    def _end_far_loads(self, state: State) -> None:
-        """Kick the awake clusters by half of the far loads, or by half of the change of those that were held."""
-        if not self._set_far_loads(state):
-            return
-        if self._held_loads():
-            self._end_held_loads(state)
-        else:
-            self._kick(float(state.clock[STEP]))
-
-    def _end_held_loads(self, state: State) -> None:
-        """Half a kick of the awake grains by the change of the held loads in this step; logs the work of a drive."""
-        force, torque = (far - held for far, held in zip(self._far, self._held_loads(), strict=True))
-        grains, heavy = self.part.state.grains.arrays, self.part.engine.content.heavy
-        half, power = 0.5 * float(state.clock[STEP]), 0.0
-        for loads, motion, inertia in ((force, grains.velocity, grains.mass), (torque, grains.spin, grains.inertia)):
-            power += float((loads[:, heavy] * motion[:, heavy]).sum())
-            loads[:, heavy] = 0.0
-            motion += half * loads / inertia
-        state.lost[OUTSIDE] += half * power
-
-    def _kick(self, step: float) -> None:
-        """Half a kick of the awake clusters by the loads `_far`, for a step [s]."""
-        table = self.part.engine.table_of(self.part.state)
-        table["scratch"][DT] = 0.5 * step
-        kick_clusters.run(table, (self._far,))
-
     def kick_awake(self, state: State, force: np.ndarray, torque: np.ndarray, step: float) -> None:
         """Half a kick of the awake clusters between steps.
 
@@ -433,8 +381,7 @@ class BodySteps(GrainSteps):
         if not self._grains.size:
             return
         self._take_awake(state)
-        self._far[0], self._far[1] = force[:, self._grains], torque[:, self._grains]
-        self._kick(step)
+        self._far.kick(self.part, (force, torque), step)
         self._store_velocities(state)
 
     def _store_velocities(self, state: State) -> None:
@@ -464,7 +411,7 @@ class BodySteps(GrainSteps):
             self.kick_awake(state, *self.quick.slow_loads(state), float(state.clock[STEP]))
             return
         present, bodies = self.part.state, state.bodies
-        self._end_far_loads(state)
+        self._far.end(state, self.part)
         self._store_velocities(state)
         measures = self._measures
         self._measure_vibrations(engine)

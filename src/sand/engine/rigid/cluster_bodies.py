@@ -6,13 +6,15 @@ import math
 
 import numpy as np
 
-from ...basics.arrays import LOADS_OF_BODIES
 from ...basics.clusters import labels_of
 from ...basics.state import BODIES, CONTACTS, State
 from ...forces.gas_loops import GasParameters
 from ...integrate.rigid.body_friction import friction_modes
 from ...integrate.rigid.rigid_body import product
 from ...numerics.quaternion import matrix_of, quaternion_of
+
+OF_MEMBERS = ("offset", "rest_force", "rest_torque", "known_force", "known_torque", "inner_field")
+"""Arrays of vectors of the grains of a body, in the body."""
 
 
 def members(state: State, first: int) -> np.ndarray:
@@ -53,7 +55,7 @@ def form_bodies(state: State, held: np.ndarray) -> None:
     bodies.first[:], bodies.asleep[:] = first[labels], 0
     bodies.event[:] = bodies.vibration[:] = state.time
     sort_members(state)
-    for name in ("offset", *LOADS_OF_BODIES, "inner_field"):
+    for name in OF_MEMBERS:
         getattr(bodies, name)[...] = 0.0
     bodies.turn[...] = np.array([[0.0], [0.0], [0.0], [1.0]])
     bodies.changed[:] = bodies.load[:] = 0.0
@@ -71,7 +73,7 @@ def rest_grain(state: State, i: int) -> None:
     bodies.centre[:, i], bodies.orientation[:, i] = grains.position[:, i], grains.orientation[:, i]
     bodies.momentum[:, i] = grains.mass[i] * grains.velocity[:, i]
     bodies.angular_momentum[:, i] = grains.inertia[i] * (matrix_of(grains.orientation[:, i]).T @ grains.spin[:, i])
-    for name in ("offset", *LOADS_OF_BODIES, "inner_field"):
+    for name in OF_MEMBERS:
         getattr(bodies, name)[:, i] = 0.0
     bodies.turn[:, i] = 0.0, 0.0, 0.0, 1.0
     bodies.changed[i] = bodies.load[i] = 0.0

@@ -18,6 +18,7 @@ from ...forces.pair.dipole_formulas import pair_load
 from ...numerics.quaternion import turned_back
 from ...numerics.vec import accrue, across, add, cross, dot, load, load4, nearest_image, norm, put, scale, sub
 from ..parts import DT
+from ..respa import add_long_range_loads
 from .rigid_body import store_loads
 
 
@@ -92,9 +93,7 @@ class HeldLoads(NamedTuple):
 @stage("the held loads on awake clusters")
 def add_held_loads(grains, parameters):
     """Add `HeldLoads` to the loads of the grains."""
-    for i in range(grains.mass.size):
-        accrue(grains.force, i, load(parameters.force, i))
-        accrue(grains.torque, i, load(parameters.torque, i))
+    add_long_range_loads(grains, parameters)
     return 0
 
 
