@@ -1,0 +1,162 @@
+"""Figures of papers: means over impact parameters and seeds, thresholds, and what is compared, of synthetic rows."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from sand.experiments.paper_chain import compare_chain
+from sand.experiments.paper_compression import compare_compression
+from sand.experiments.paper_growth import averaged, break_up_speed, compare_mass_ratios, compare_parameter
+from sand.experiments.seed_table import Interval, falls_below, ring_average, seed_table
+from sand.experiments.sequential import collide_in_sequence
+from sand.setup import bpca, grain
+from sand.theory import contact
+
+OFFSETS = [math.sqrt((k + 0.5) / 6) for k in range(6)]
+
+
+def test_an_average_over_rings():
+    """∫ f 2b db/b_max²: exact for a constant; b² of evenly spaced b² in any order gives ½; the trapezoid otherwise."""
+    b = np.array(OFFSETS)
+    assert ring_average(b, np.full(6, 3.0)) == pytest.approx(3.0, abs=1e-12)
+    assert ring_average(b[::-1], b[::-1] ** 2) == pytest.approx(0.5, abs=1e-12)
+    # rings of 0 and 1 end at b² = ½: (0 + 1)/2
+    assert ring_average(np.array([0.0, 1.0]), np.array([0.0, 1.0])) == pytest.approx(0.5, abs=1e-12)
+
+
+def test_a_crossing():
+    """f = 1 − ln v/ln 50 is linear in ln v and zero at 50; only a fall counts, and a function without one has none."""
+    v = np.geomspace(10.0, 200.0, 7)
+    f = 1.0 - np.log(v) / math.log(50.0)
+    assert falls_below(v, f, 0.0) == pytest.approx(50.0, rel=1e-12, abs=0.0)
+    assert math.isnan(falls_below(v, -f, 0.0)) and math.isnan(falls_below(v, f, -9.0))
+    f[3] = math.nan  # a point that is missing is left out: the rest is on the same line
+    assert falls_below(v, f, 0.0) == pytest.approx(50.0, rel=1e-12, abs=0.0)
+
+
+def test_an_interval_over_seeds():
+    """Three seeds with zeros at 40, 50 and 62.5: the mean of f in ln v has its zero at the geometric mean 50.
+
+    Without one seed it is at √(50·62.5), √(40·62.5) = 50 and √(40·50); the jackknife of these, with t = 4.303 for two
+    degrees of freedom, is the interval.
+    """
+    v = np.geomspace(10.0, 200.0, 41)
+    zeros = {1: 40.0, 2: 50.0, 3: 62.5}
+    table = seed_table({(seed, x): math.log(zero / x) for seed, zero in zeros.items() for x in v})
+    found = table.falls_below(0.0)
+    without = np.array([math.sqrt(50.0 * 62.5), 50.0, math.sqrt(2000.0)])
+    half = 4.302653 * math.sqrt(2.0 / 3.0 * ((without - without.mean()) ** 2).sum())
+    assert found.value == pytest.approx(50.0, rel=1e-9, abs=0.0)
+    assert (found.low, found.high) == pytest.approx((50.0 - half, 50.0 + half), rel=1e-6, abs=0.0)
+    one = seed_table({(1, x): math.log(40.0 / x) for x in v}).falls_below(0.0)
+    assert one.text("m/s") == "40 (no interval) m/s"
+
+
+def test_a_verdict():
+    """A value within the interval agrees; one outside has the difference and the reason."""
+    assert Interval(48.0, 44.0, 52.0).verdict(50.0, "why") == "agrees"
+    assert Interval(48.0, 44.0, 52.0).verdict(80.0, "why") == "-32 (-40%): why"
+    assert Interval(48.0, 44.0, 52.0).verdict(53.0, "why", within=1.0) == "agrees"
+    assert Interval(math.nan).verdict(50.0, "why") == "why"
+
+
+NUMBERS = contact("ice", 1e-7)
+SAME = {"break_energy": NUMBERS.break_energy, "roll_energy": NUMBERS.roll_energy_clamped}
+MASS = 1000.0 * 4.0 / 3.0 * math.pi * 1e-21
+
+
+def growth_rows(zero, **extra):
+    """Rows whose growth efficiency (1 + b²)·ln(zero/v) averages to 3/2 ln(zero/v), for two seeds."""
+    runs = itertools.product((1, 2), np.geomspace(10.0, 200.0, 10), OFFSETS)
+    found = [
+        {"seed": s, "speed": v, "offset": b, "growth_efficiency": (1 + b * b) * math.log(zero / v)} for s, v, b in runs
+    ]
+    return [SAME | {"grain_mass": MASS} | row | extra for row in found]
+
+
+def test_the_break_up_speed_of_ice():
+    """20 √(E_break/m) = 76.5 m/s for grains of 0.1 µm with γ = 0.1 J/m², E = 7 GPa, ν = 0.25."""
+    assert break_up_speed(growth_rows(50.0)[0]) == pytest.approx(76.46, abs=0.01)
+
+
+def test_runs_that_are_missing_are_left_out():
+    """A speed of one seed without all its impact parameters is not averaged; the other seed is."""
+    rows = growth_rows(50.0)
+    table = averaged([row for row in rows if (row["seed"], row["speed"], row["offset"]) != (1, 10.0, OFFSETS[2])])
+    assert math.isnan(table.of_seeds[0, 0]) and table.mean[0] == pytest.approx(1.5 * math.log(5.0), rel=1e-12, abs=0.0)
+
+
+def test_mass_ratios_are_compared():
+    """Critical speeds of 50 and 60 m/s: the formula's 76.5 m/s is outside; their ratio is 1.2."""
+    rows = growth_rows(50.0, bodies="500 + 500") + growth_rows(60.0, bodies="500 + 4000")
+    other, one, ratio = compare_mass_ratios(rows)
+    assert one.ours.startswith("50 (50 … 50) m/s") and one.verdict.startswith("-26 (-35%)")
+    assert other.what == "critical speed of 500 + 4000" and ratio.ours.startswith("1.2") and ratio.verdict == "agrees"
+
+
+def test_the_exponent_of_a_parameter():
+    """v_crit = 50 ξ^0.3 has the exponent 0.3, beyond the 0.1 that counts as none."""
+    rows = [row for xi in (2.0, 8.0, 32.0) for row in growth_rows(50.0 * (xi / 8.0) ** 0.3, xi=xi)]
+    *_, slope = compare_parameter("xi", "ξ", "Å", rows)
+    assert slope.ours.startswith("0.3 (") and slope.verdict.startswith("+0.3:")
+    rows = [row for xi in (2.0, 8.0, 32.0) for row in growth_rows(50.0, xi=xi)]
+    assert compare_parameter("xi", "ξ", "Å", rows)[-1].verdict == "agrees"
+
+
+def test_compression_is_compared():
+    """r_g ∝ E^−0.1 gives the exponent; a largest remnant of ½ − 0.1 ln(E/(10 N_k E_break)) is half at 10."""
+    n = 1000
+    rows = [
+        SAME | {
+            "seed": seed, "grains": n, "contacts_before": 998.0, "contacts_per_grain": 1.0, "impact_energy": energy,
+            "gyration": 20.0 * (energy / SAME["roll_energy"]) ** -0.1,
+            "largest_remnant": 0.5 - 0.1 * math.log(energy / (10.0 * 998.0 * SAME["break_energy"])),
+        }
+        for seed in (1, 2, 3)
+        for energy in np.geomspace(0.45 * SAME["roll_energy"], 19.0 * 998.0 * SAME["break_energy"], 60)
+    ]  # fmt: skip
+    exponent, disruption = compare_compression(rows)
+    assert exponent.ours.startswith("-0.1 (") and exponent.verdict == "agrees"
+    assert disruption.ours.startswith("10 (") and disruption.verdict == "agrees"
+
+
+def test_a_chain_is_compared():
+    """N = r_g^1.9 before E_imp = E_roll and r_g^2.5 after it are found."""
+    rows = [
+        SAME | {
+            "seed": seed, "speed": v, "grains": 2**k, "gyration": (2.0**k) ** (1.0 / (1.9 if v < 1.0 else 2.5)),
+            "impact_energy": SAME["roll_energy"] * (0.5 if v < 1.0 else 2.0),
+        }
+        for seed in (1, 2)
+        for v in (0.1, 4.0)
+        for k in range(1, 11)
+    ]  # fmt: skip
+    slow, fast = compare_chain(rows)
+    assert slow.ours.startswith("1.9 (") and fast.ours.startswith("2.5 (")
+    assert (slow.verdict, fast.verdict) == ("agrees", "agrees")
+
+
+@pytest.mark.compiled("contacts")
+def test_a_sequence_of_collisions():
+    """Slow grains stick: N doubles, contacts are kept, E_imp is that of bodies of N grains; and it is reproducible."""
+    found = collide_in_sequence(grain(radius=1e-7, material="ice"), 4, speed=4.0, seed=3)
+    assert [one.fragments for one in found] == [(2,), (4,), (8,), (16,)]
+    assert [one.contacts_before for one in found[1:]] == [2 * one.contacts_after for one in found[:-1]]
+    energy = [0.25 * MASS * 2**k * 16.0 for k in range(4)]  # reduced mass N m/2 of two bodies of N grains
+    assert [one.impact_energy for one in found] == pytest.approx(energy, rel=1e-12, abs=0.0)
+    again = collide_in_sequence(grain(radius=1e-7, material="ice"), 4, speed=4.0, seed=3)
+    assert again == found
+
+
+@pytest.mark.compiled("contacts")
+def test_the_largest_fragment_goes_on():
+    """A collision that breaks the bodies: the next one begins with two copies of the largest fragment, at rest."""
+    first, second = collide_in_sequence(bpca(12, radius=1e-7, material="silica", seed=1), 2, speed=8.0, seed=1)
+    assert len(first.fragments) > 1
+    largest = first.fragments[0]
+    assert sum(second.fragments) == 2 * largest and second.impact_energy == pytest.approx(
+        first.impact_energy * largest / 12, rel=1e-12, abs=0.0
+    )
+    assert second.gyration_before[0] == pytest.approx(first.gyration_after, rel=1e-6, abs=0.0)
