@@ -85,7 +85,7 @@ class BodySection(Section):
 
 def _offset(value: Any, name: str) -> Any:
     """Check an impact parameter.  Raises BadInput."""
-    offset_of(value, 1.0)
+    offset_of(value, 1.0, 1.0)
     return value
 
 
@@ -95,7 +95,8 @@ class ImpactSection(Section):
     speed: Annotated[Any, Number("m/s", above=0.0)]
     """Relative speed of the centres of mass [m/s]."""
     impact_parameter: Annotated[Any, Reading(_offset)] = 0.0
-    """Impact parameter [m], or a fraction of the sum of the outer radii, "0.5 b"."""
+    """Impact parameter [m], or a fraction of the sum of the outer radii, "0.5 b", or of the characteristic radii
+    √(5/3) r_g, "0.5 c"."""
     along: Literal["x", "y", "z"] = "x"
     """Direction of flight of the projectile."""
     turn: bool = True

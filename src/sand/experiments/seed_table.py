@@ -26,7 +26,7 @@ class Interval(NamedTuple):
         return f"{self.value:.3g} ({limits}) {unit}".rstrip()
 
     def verdict(self, paper: float, reason: str, within: float = 0.0) -> str:
-        """Text "agrees" if the interval, widened by `within`, contains the value of a paper; or the difference and why."""
+        """Text "agrees" if the interval, widened by `within`, contains a value of a paper; or the difference and why."""
         low, high = (self.low, self.high) if math.isfinite(self.low) else (self.value, self.value)
         if low - within <= paper <= high + within:
             return "agrees"
