@@ -190,19 +190,21 @@ def _cost(
     """Expected cost of a run, or of several like it one after the other, which draw one figure or one each."""
     from ..compiler.jit import COMPILE_TIMES
     from ..compiler.progress import compile_times
-    from ..simulation.cost.cost import expected_cost
 
-    cost, missing = expected_cost(simulation, end, last_step, condition), simulation._engine.uncompiled()
+    cost, missing = simulation.expected_cost(end, last_step, condition), simulation._engine.uncompiled()
     if cost.seconds is not None:
         parts = {name: (figures if name == "start" else runs) * value for name, value in cost.parts.items()}
-        cost = cost._replace(parts=parts, seconds=sum(parts.values()))
+        # collisions of many seeds keep no files
+        disk = runs * cost.disk if figures == runs and cost.disk is not None else None
+        cost = cost._replace(parts=parts, seconds=sum(parts.values()), disk=disk)
     known = compile_times(COMPILE_TIMES)
     compilation = sum(known.get(name, COMPILATION) for name in missing)
     names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
     rows = [
         ("steps", _steps(cost)),
         ("wall time", _wall_time(cost)),
-        ("memory", f"about {cost.memory / 1e6:.0f} MB" if cost.memory < 1e9 else f"about {cost.memory / 1e9:.2g} GB"),
+        ("memory", f"about {report.format_bytes(cost.memory)}"),
+        *([] if cost.disk is None else [("disk", f"about {report.format_bytes(cost.disk)}")]),
         ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
     ]
     content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": missing}

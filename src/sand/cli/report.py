@@ -381,6 +381,11 @@ def format_wall_time(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
+def format_bytes(number: float) -> str:
+    """A size in memory or on a disk for people: '350 MB', '1.2 GB'."""
+    return f"{number / 1e6:.3g} MB" if number < 1e9 else f"{number / 1e9:.2g} GB"
+
+
 def named(grains: Iterable[int]) -> str:
     """The grains that an outcome concerns, in brackets; empty if there are none."""
     numbers = ", ".join(str(i) for i in grains)

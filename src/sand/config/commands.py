@@ -8,12 +8,14 @@ from typing import Any
 from ..basics.errors import BadInput
 
 OWN_TABLES = {
+    "sweep": {"sweep"},
     "grow": {"grow"},
     "scatter": {"flight", "measure"},
     "collide": {"impact"},
     "run": {"run", "grains", "box", "neighbours"},
 }
-"""Tables found only in case files of one command; a case of `sand grow` also has those of `sand run`."""
+"""Tables found only in case files of one command; a case of `sand grow` also has those of `sand run`, and one of `sand
+sweep` those of any other command."""
 BODIES = {"target", "projectile"}
 """Tables of the bodies of `sand collide` and `sand scatter`."""
 
