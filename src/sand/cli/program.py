@@ -25,6 +25,7 @@ from . import (
     parsing,
     plot,
     report,
+    reproduce,
     resume,
     run,
     scatter,
@@ -33,7 +34,24 @@ from . import (
 )
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
-COMMANDS = (new, run, resume, build, collide, scatter, grow, sweep, analyse, plot, view, export, info, cite, completion)
+COMMANDS = (
+    new,
+    run,
+    resume,
+    build,
+    collide,
+    scatter,
+    grow,
+    sweep,
+    reproduce,
+    analyse,
+    plot,
+    view,
+    export,
+    info,
+    cite,
+    completion,
+)
 """One module per command, with a click command named `command`."""
 
 

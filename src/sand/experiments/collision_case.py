@@ -117,9 +117,13 @@ class CollisionCase(Section):
     forces: ForcesSection = ForcesSection()
     stepping: Stepping = Verlet()
 
+    def materials_by_name(self) -> dict[str, Material]:
+        """Presets and the materials of the case, by name."""
+        return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+
     def approach(self, seed: int) -> Approach:
         """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""
-        materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        materials = self.materials_by_name()
         return approach(
             self.target.build(materials, 2 * seed),
             self.projectile.build(materials, 2 * seed + 1),

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..analysis.fits import power_law
 from ..plotting.papers import Curve, Guide, Panel
-from .paper_figure import MEMORY, Compared, Row, grouped
+from .paper_figure import MEMORY, Compared, PaperFigure, Row, grouped
 from .seed_table import Interval, seed_table
 
 SMALLEST = 8
@@ -47,3 +47,16 @@ def compare_chain(rows: Sequence[Row]) -> list[Compared]:
         verdict = found.verdict(paper, "the range of N is short, and D changes with N", within)
         compared.append(Compared(what, f"{stated} ({MEMORY})", found.text(), verdict))
     return compared
+
+
+FIGURES = (
+    PaperFigure(
+        "suyama2008",
+        "Growth of an aggregate of ice by head-on collisions with copies of itself",
+        ("Suyama, Wada & Tanaka 2008, ApJ 684, 1310",),
+        compare_chain,
+        chain_panels,
+        {"sequence.collisions": 4},
+        {"seeds": 2, "vary": {"impact.speed": ["4 m/s"]}},
+    ),
+)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..analysis.fits import power_law
 from ..plotting.papers import Curve, Guide, Panel
-from .paper_figure import MEMORY, Compared, Row
+from .paper_figure import MEMORY, Compared, PaperFigure, Row
 from .seed_table import Interval, SeedTable, seed_table
 
 ONSET = 10.0
@@ -64,3 +64,21 @@ def compare_compression(rows: Sequence[Row]) -> list[Compared]:
     )
     verdict = broken.verdict(10.0, "the paper's aggregates are two-dimensional", within=5.0)
     return [*compared, Compared(what, stated, broken.text(), verdict)]
+
+
+def _of_material(name: str, material: str, speeds: list[str]) -> PaperFigure:
+    return PaperFigure(
+        name,
+        f"Head-on collisions of equal aggregates of {material} (BCCA)",
+        ("Wada, Tanaka, Suyama, Kimura & Yamamoto 2007, ApJ 661, 320", "the same 2008, ApJ 677, 1296"),
+        compare_compression,
+        compression_panels,
+        {"target.grains": 8, "projectile.grains": 8},
+        {"seeds": 2, "vary": {"impact.speed": speeds}},
+    )
+
+
+FIGURES = (
+    _of_material("wada2008-ice", "ice", ["4 m/s", "20 m/s", "60 m/s"]),
+    _of_material("wada2008-quartz", "quartz", ["0.4 m/s", "2 m/s", "6 m/s"]),
+)

@@ -30,28 +30,26 @@ class PaperFigure:
     Attributes
     ----------
     name : str
-        Name for `sand reproduce`.
+        Name for `sand reproduce`, and of the case file of the campaign, examples/papers/NAME.toml.
     title : str
         What it shows.
     references : tuple of str
         The papers.
-    case : str
-        Case file of the campaign in examples/papers.
     compare : callable
         Comparison of the rows of the campaign with the papers.
     panels : callable
         Panels of the figure, of the same rows.
-    small : dict
-        Keys and values that make the campaign small.
+    small, small_sweep : dict
+        Keys of the case, and of [sweep], that make the campaign small.
     """
 
     name: str
     title: str
     references: tuple[str, ...]
-    case: str
     compare: Callable[[Sequence[Row]], list[Compared]]
     panels: Callable[[Sequence[Row]], list[Panel]]
     small: dict[str, Any] = field(default_factory=dict)
+    small_sweep: dict[str, Any] = field(default_factory=dict)
 
 
 def grouped(rows: Sequence[Row], *keys: str) -> dict[Any, list[Row]]:

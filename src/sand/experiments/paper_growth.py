@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..analysis.fits import power_law
 from ..plotting.papers import Curve, Guide, Panel
-from .paper_figure import MEMORY, Compared, Row, grouped
+from .paper_figure import MEMORY, Compared, PaperFigure, Row, grouped
 from .seed_table import Interval, SeedTable, ring_average, seed_table
 
-WADA_2013 = "Wada et al. 2013, A&A 559, A62"
-ARAKAWA_ROLLING = "Arakawa, Tanaka & Kokubo 2022, ApJ 939, 100, arXiv:2210.00913"
-ARAKAWA_VISCOUS = "Arakawa, Tanaka & Kokubo 2022, ApJ 933, 144, arXiv:2205.13768"
 EQUAL_MASSES = (
     "for equal masses about 50 m/s for ice is also what Wada et al. 2009 and Arakawa et al. 2022 find (from memory); "
     "the formula was fitted to many mass ratios"
@@ -36,19 +34,23 @@ def break_up_speed(row: Row) -> float:
     return 20.0 * math.sqrt(row["break_energy"] / row["grain_mass"])
 
 
-def growth_panels(key: str, label: str, rows: Sequence[Row], guides: Sequence[Guide] = ()) -> list[Panel]:
+def growth_panels(
+    key: str, label: str, rows: Sequence[Row], guides: Sequence[Guide] = (), unit: float = 1.0
+) -> list[Panel]:
     """Panels: f averaged over impact parameters for each value of a parameter; f of each impact parameter.
 
     Parameters
     ----------
     key, label : str
         The parameter, and how the legend shows its value.
+    unit : float, optional
+        Unit of a value that is a number [SI].
     """
     by_value = grouped(rows, key)
     curves = []
     for value, some in by_value.items():
         found = averaged(some)
-        curves.append(Curve(label.format(value), found.x, found.mean, *found.limits))
+        curves.append(Curve(label.format(_in_unit(value, unit)), found.x, found.mean, *found.limits))
     single = []
     for offset, some in grouped(next(iter(by_value.values())), "offset").items():
         found = seed_table({(row["seed"], row["speed"]): row["growth_efficiency"] for row in some})
@@ -56,6 +58,10 @@ def growth_panels(key: str, label: str, rows: Sequence[Row], guides: Sequence[Gu
     x, y = "speed [m/s]", r"growth efficiency $(N_\mathrm{largest} - N_\mathrm{target})/N_\mathrm{projectile}$"
     title = rf"{curves[0].label}, $b/b_\mathrm{{max}}$:"
     return [Panel(x, y, curves, guides, zero=True), Panel(x, y, single, legend=title, zero=True)]
+
+
+def _in_unit(value: Any, unit: float) -> str:
+    return f"{value / unit:.3g}" if isinstance(value, float) else str(value)
 
 
 def mass_ratio_panels(rows: Sequence[Row]) -> list[Panel]:
@@ -83,11 +89,17 @@ def compare_mass_ratios(rows: Sequence[Row]) -> list[Compared]:
     return compared
 
 
-def compare_parameter(key: str, symbol: str, unit: str, rows: Sequence[Row]) -> list[Compared]:
-    """Critical speeds for all values of a parameter of the contacts, on which they hardly depend in the paper."""
+def compare_parameter(key: str, symbol: str, unit: str, size: float, rows: Sequence[Row]) -> list[Compared]:
+    """Critical speeds for all values of a parameter of the contacts, on which they hardly depend in the paper.
+
+    Parameters
+    ----------
+    key, symbol, unit, size
+        The parameter, its symbol, the unit in which it is shown, and the size of this unit [SI].
+    """
     found = {value: averaged(some).falls_below(0.0) for value, some in grouped(rows, key).items()}
     compared = [
-        Compared(f"critical speed, {symbol} = {value:g} {unit}", "", one.text("m/s"), "")
+        Compared(f"critical speed, {symbol} = {value / size:.3g} {unit}", "", one.text("m/s"), "")
         for value, one in found.items()
     ]
     known = {value: one.value for value, one in found.items() if math.isfinite(one.value) and value > 0.0}
@@ -98,3 +110,64 @@ def compare_parameter(key: str, symbol: str, unit: str, rows: Sequence[Row]) -> 
         what, stated = f"d ln v/d ln {symbol} of the critical speed v", "0: it hardly depends on it (abstract)"
         compared.append(Compared(what, stated, slope.text(), verdict))
     return compared
+
+
+def _small(speeds: list[str], keys: dict[str, Any] | None = None) -> dict[str, Any]:
+    """[sweep] of a small version: two speeds, two impact parameters, two seeds."""
+    given = {"impact.speed": speeds, "impact.impact_parameter": ["0.289 c", "0.764 c"]} | (keys or {})
+    return {"seeds": 2, "vary": given}
+
+
+def _of_parameter(name: str, what: str, paper: str, key: str, symbol: str, unit: tuple[str, float]) -> PaperFigure:
+    """Figure of the growth efficiency for several values of a parameter of the contacts."""
+    label = f"{symbol} = {{}} {unit[0]}"
+    return PaperFigure(
+        name,
+        f"Growth efficiency of equal aggregates of ice (BPCA), {what}",
+        (paper,),
+        lambda rows: compare_parameter(key, symbol, *unit, rows),
+        lambda rows: growth_panels(key, label, rows, unit=unit[1]),
+        SMALL,
+        _small(["4 m/s", "80 m/s"]),
+    )
+
+
+WADA_2013 = ("Wada, Tanaka, Okuzumi, Kobayashi, Suyama, Kimura & Yamamoto 2013, A&A 559, A62",)
+SMALL = {"target.grains": 8, "projectile.grains": 8}
+"""Bodies of the small versions."""
+FIGURES = (
+    PaperFigure(
+        "wada2013-ice",
+        "Growth efficiency of aggregates of ice (BPCA) of two sizes and mass ratios 1 and 8",
+        WADA_2013,
+        compare_mass_ratios,
+        mass_ratio_panels,
+        SMALL,
+        _small(["4 m/s", "80 m/s"]) | {"together": [{"target.grains": [8, 16], "projectile.grains": [8, 8]}]},
+    ),
+    PaperFigure(
+        "wada2013-silica",
+        "Growth efficiency of equal aggregates of silica (BPCA)",
+        WADA_2013,
+        compare_mass_ratios,
+        mass_ratio_panels,
+        SMALL,
+        _small(["0.4 m/s", "8 m/s"]),
+    ),
+    _of_parameter(
+        "arakawa2022-rolling",
+        "five rolling limits",
+        "Arakawa, Tanaka & Kokubo 2022, ApJ 939, 100, arXiv:2210.00913",
+        "forces.contact.rolling_limit",
+        "ξ",
+        ("Å", 1e-10),
+    ),
+    _of_parameter(
+        "arakawa2022-viscosity",
+        "five viscous times",
+        "Arakawa, Tanaka & Kokubo 2022, ApJ 933, 144, arXiv:2205.13768",
+        "forces.contact.viscous_time",
+        "T",
+        ("ps", 1e-12),
+    ),
+)

@@ -26,10 +26,10 @@ class Interval(NamedTuple):
         return f"{self.value:.3g} ({limits}) {unit}".rstrip()
 
     def verdict(self, paper: float, reason: str, within: float = 0.0) -> str:
-        """Text "agrees" if the interval, widened by `within`, contains a value of a paper; or the difference and why."""
+        """Text "agrees" if the interval, widened by `within`, contains a paper's value; or the difference and why."""
         low, high = (self.low, self.high) if math.isfinite(self.low) else (self.value, self.value)
         if low - within <= paper <= high + within:
-            return "agrees"
+            return "agrees" if high - low <= abs(paper) + 2.0 * within else "not decided: the interval is too wide"
         if not math.isfinite(self.value):
             return reason
         return f"{self.value - paper:+.2g}{f' ({self.value / paper - 1.0:+.0%})' if paper else ''}: {reason}"

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
+from ..basics.settings import Whole
 from ..basics.units import seed_given, whole_number
+from ..config.sections import Section
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..setup.checks import largest_cluster
 from ..simulation.simulation import Simulation
 from .collision import approach, prepare, run_to_end
+from .collision_case import CollisionCase
 from .collision_outcome import Collision
 
 MOST_COLLISIONS = 20
@@ -86,3 +89,36 @@ def _largest_at_rest(simulation: Simulation) -> tuple[Grains, np.ndarray]:
     body.arrays.spin[...] = 0.0
     found = number[pair]
     return body, found[(found >= 0).all(axis=1)]
+
+
+class SequenceSection(Section):
+    """Section [sequence]: the target collides with a copy of itself, and so does what grows from it."""
+
+    collisions: Annotated[int, Whole(1, MOST_COLLISIONS)]
+    """Number of collisions; each doubles the number of grains, if the bodies stick."""
+
+
+class SequenceCase(CollisionCase):
+    """Case file of sequential collisions: that of a collision, with [sequence] in place of [projectile]."""
+
+    projectile: None = None  # type: ignore[assignment]
+    sequence: SequenceSection
+
+    def body(self, seed: int) -> Grains:
+        """The first aggregate.  Raises BadInput."""
+        return self.target.build(self.materials_by_name(), seed)
+
+    def collide(self, seed: int, observers: Sequence[Any] = ()) -> list[Collision]:
+        """Simulate the collisions.  Raises BadInput."""
+        forces, stepping = self.physics()
+        impact = self.impact
+        return collide_in_sequence(
+            self.body(seed),
+            self.sequence.collisions,
+            speed=impact.speed,
+            impact_parameter=impact.impact_parameter,
+            seed=seed,
+            forces=forces,
+            stepping=stepping,
+            observers=observers,
+        )
