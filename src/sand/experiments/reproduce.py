@@ -11,7 +11,7 @@ from typing import Any
 from ..basics.errors import BadInput, did_you_mean
 from ..contact.model import Contact
 from ..io.run_folder import COMPARISON, FIGURE, SWEEP_CSV, read_toml
-from ..io.sweep_files import DONE, LAST, STATE, read_sweep, write_sweep
+from ..io.sweep_files import DONE, FAILED, LAST, STATE, read_sweep, write_sweep
 from ..io.table import write_table
 from ..plotting.papers import panels_figure
 from ..plotting.run_figure import save
@@ -109,8 +109,11 @@ class Reproduction(SweepJob):
         self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
     ) -> dict[str, Any]:
         """Compute the runs that are left, and conclude, also if that is interrupted; see `SweepJob.run`."""
+        content: dict[str, Any] = {"folder": str(self.folder), **dict.fromkeys(("runs", DONE, FAILED, "left"), 0)}
+        content["failures"] = {}
         try:
-            content = super().run(executor, observers, progress)
+            if self.rows:
+                content = super().run(executor, observers, progress)
         finally:
             found = self.conclude()
         return content | found
@@ -124,7 +127,7 @@ class Reproduction(SweepJob):
             Numbers of rows and of all runs, their CPU time [s], and the comparison.
         """
         mine = {row.name for row in self.rows}
-        new = [cells for cells in _cells(self.folder) if cells["run"] in mine] if self.folder.is_dir() else []
+        new = [cells for cells in _cells(self.folder) if cells["run"] in mine] if mine else []
         cells = [one for one in (*self.known, *new) if one[STATE] == DONE]
         place, compared = self.folder / RESULTS, []
         if cells:

@@ -1,14 +1,21 @@
 """Figures of papers: means over impact parameters and seeds, thresholds, and what is compared, of synthetic rows."""
 
 import itertools
+import json
 import math
+import shutil
 
 import numpy as np
 import pytest
 
+import sand
+from sand.basics.material import material_named
+from sand.cli.main import main
+from sand.experiments import reproduce
 from sand.experiments.paper_chain import compare_chain
 from sand.experiments.paper_compression import compare_compression
 from sand.experiments.paper_growth import averaged, break_up_speed, compare_mass_ratios, compare_parameter
+from sand.experiments.reproduce import FIGURES, Reproduction, papers_folder
 from sand.experiments.seed_table import Interval, falls_below, ring_average, seed_table
 from sand.experiments.sequential import collide_in_sequence
 from sand.setup import bpca, grain
@@ -99,10 +106,10 @@ def test_mass_ratios_are_compared():
 def test_the_exponent_of_a_parameter():
     """v_crit = 50 ξ^0.3 has the exponent 0.3, beyond the 0.1 that counts as none."""
     rows = [row for xi in (2.0, 8.0, 32.0) for row in growth_rows(50.0 * (xi / 8.0) ** 0.3, xi=xi)]
-    *_, slope = compare_parameter("xi", "ξ", "Å", rows)
+    *_, slope = compare_parameter("xi", "ξ", "Å", 1.0, rows)
     assert slope.ours.startswith("0.3 (") and slope.verdict.startswith("+0.3:")
     rows = [row for xi in (2.0, 8.0, 32.0) for row in growth_rows(50.0, xi=xi)]
-    assert compare_parameter("xi", "ξ", "Å", rows)[-1].verdict == "agrees"
+    assert compare_parameter("xi", "ξ", "Å", 1.0, rows)[-1].verdict == "agrees"
 
 
 def test_compression_is_compared():
@@ -160,3 +167,76 @@ def test_the_largest_fragment_goes_on():
         first.impact_energy * largest / 12, rel=1e-12, abs=0.0
     )
     assert second.gyration_before[0] == pytest.approx(first.gyration_after, rel=1e-6, abs=0.0)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_case_of_each_figure(name):
+    """The case of the full version is read; its first comment names the command; seeds come after sizes of bodies."""
+    job = Reproduction(name)
+    assert f"sand reproduce {name}" in (papers_folder() / f"{name}.toml").read_text("utf-8").split("[", 1)[0]
+    assert len(job.rows) == job.design > 1
+    sizes = [sum(n for key, n in row.values.items() if key.endswith(".grains")) for row in job.rows]
+    assert [(size, row.seed) for size, row in zip(sizes, job.rows, strict=True)] == sorted(
+        (size, row.seed) for size, row in zip(sizes, job.rows, strict=True)
+    )
+
+
+def test_the_speeds_of_wada_2008():
+    """From 0.45 E_roll to 30 N_k E_break with N_k = 998; the reduced mass is that of 250 grains (2 %)."""
+    for name in ("wada2008-ice", "wada2008-quartz"):
+        job = Reproduction(name)
+        speeds, material = sorted({row.values["impact.speed"] for row in job.rows}), job.content["target"]["material"]
+        numbers, mass = contact(material, 1e-7), 4.0 / 3.0 * math.pi * 1e-21 * material_named(material).density
+        energies = 0.45 * numbers.roll_energy_clamped, 30.0 * 998.0 * numbers.break_energy
+        ends = [math.sqrt(8.0 * energy / (1000.0 * mass)) for energy in energies]
+        assert [speeds[0], speeds[-1]] == pytest.approx(ends, rel=0.02, abs=0.0)
+        assert np.diff(np.log(speeds)) == pytest.approx(math.log(speeds[-1] / speeds[0]) / 11, rel=1e-6, abs=0.0)
+
+
+@pytest.mark.draws
+@pytest.mark.compiled("contacts", "small")
+@pytest.mark.filterwarnings("ignore:in .* run.*overlap too deeply")
+@pytest.mark.parametrize("name", ["wada2013-ice", "wada2008-quartz", "suyama2008"])
+def test_the_small_version(tmp_path, monkeypatch, capsys, name):
+    """The command: table, comparison and figure; called again, nothing is computed, and the results are the same."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["reproduce", name, "--small", "--json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    place = tmp_path / f"{name}-small" / "results"
+    assert first["rows"] == first["design"] == first["done"] and first["cpu_seconds"] > 0.0
+    assert {path.name for path in place.iterdir()} == {"sweep.csv", "comparison.csv", "figure.png"}
+    assert len(sand.open(place).table["seed"]) == first["rows"]
+    if name.startswith("wada"):
+        assert first["comparison"][-1].keys() == {"what", "paper", "ours", "verdict"}
+    table = (place / "sweep.csv").read_bytes()
+    assert main(["reproduce", name, "--small", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == first and (place / "sweep.csv").read_bytes() == table
+
+
+@pytest.mark.compiled("contacts", "small")
+def test_known_rows_are_not_computed_again(tmp_path, monkeypatch):
+    """Rows of the table that comes with SAND are taken; the others are computed, and the table has all of them."""
+    monkeypatch.setattr(reproduce, "papers_folder", lambda: tmp_path / "papers")
+    shutil.copytree(papers_folder(), tmp_path / "papers")
+    whole = Reproduction("suyama2008", tmp_path / "whole", small=True).run()
+    place = tmp_path / "papers" / "suyama2008"
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(tmp_path / "whole" / "results", place)
+    lines = (place / "sweep.csv").read_text().splitlines(keepends=True)
+    (place / "sweep.csv").write_text("".join(lines[:-1]))
+    job = Reproduction("suyama2008", tmp_path / "rest", small=True, known=True)
+    assert (len(job.known), len(job.rows), job.design) == (1, 1, 2)
+    found = job.run()
+    assert found["comparison"] == whole["comparison"] and found["rows"] == 2
+    (place / "sweep.csv").write_text("".join(lines))
+    job = Reproduction("suyama2008", tmp_path / "none", small=True, known=True)
+    assert not job.rows and job.run()["rows"] == 2
+
+
+def test_the_list(capsys):
+    """Without a name: all figures with their numbers of runs.  An unknown one: the nearest name."""
+    assert main(["reproduce", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == list(FIGURES) and found["wada2013-ice"]["runs"] == 540
+    assert main(["reproduce", "wada2013"]) == 2
+    assert capsys.readouterr().err == "sand: there is no figure 'wada2013'; did you mean 'wada2013-ice'?\n"
