@@ -23,7 +23,7 @@ from .io import run_folder as files
 from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
-from .io.sweep_files import RUNS, read_sweep
+from .io.sweep_files import DONE, LAST, RUNS, STATE, read_sweep
 from .io.trajectory import Frame, Frames
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -296,6 +296,10 @@ class Runs(Sequence[Run]):
         return "\n".join([f"<{len(self)} runs>", *(line.rstrip() for line in lines)])
 
 
+SHOWN = ("growth_efficiency", "largest_remnant", "sigma", "mean_cluster_size")
+"""Columns of results, the first of which in the table of a sweep is drawn if none is asked for."""
+
+
 @checked
 class Sweep:
     """The results of a sweep, as returned by `sand.open(DIR)`: one table with a row for each run that has ended.
@@ -328,6 +332,24 @@ class Sweep:
     def keys(self) -> list[str]:
         """The keys that change: the columns before `seed`."""
         return list(self.table)[: list(self.table).index("seed")]
+
+    @property
+    def results(self) -> list[str]:
+        """The columns of results: those after `state`, but for message, cost, version and name."""
+        names = list(self.table)
+        return [name for name in names[names.index(STATE) + 1 :] if name not in LAST]
+
+    @property
+    def shown(self) -> list[str]:
+        """The columns that `sand plot` draws: the outcome, and the most telling result."""
+        telling = [name for name in SHOWN if name in self.table]
+        return [name for name in ("outcome", *telling[:1]) if name in self.table]
+
+    @property
+    def done(self) -> Columns:
+        """The rows of runs that are done."""
+        chosen = self.table[STATE] == DONE
+        return Columns({name: column[chosen] for name, column in self.table.items()})
 
     @checked
     def run(self, row: int) -> Run:

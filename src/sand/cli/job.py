@@ -151,7 +151,7 @@ def run_job(
     observers = [Progress(math.inf, math.inf)] if single and not hidden else []
     no_bar = hidden or single or (lines and not sys.stderr.isatty())
     with (
-        report.progress_bar(1.0, no_bar, bar_format=report.LAYOUT) as bar,
+        report.progress_bar(1.0, no_bar, bar_format=report.LAYOUT, every=report.JOB_LINE_EVERY) as bar,
         running_job(job.folder, 1 if single else workers, quiet=quiet, **execution) as (executor, interrupts),
     ):
 
@@ -159,6 +159,8 @@ def run_job(
             interrupts.see(None, {})
             if line and not hidden:
                 report.write_line(line)
+            if bar.n == 0.0:  # what was done before says nothing about the time left
+                bar.initial = bar.n = part
             bar.set_description_str(text, refresh=False)
             bar.update(part - bar.n)
 

@@ -57,12 +57,9 @@ class SweptCase:
         Its seeds.
     GIVEN : tuple of str
         Keys of seeds and of the folder, which the sweep gives itself.
-    SHOWN : tuple of str
-        Columns of results; `sand plot` draws the first of these that a table has.
     """
 
     GIVEN: ClassVar[tuple[str, ...]]
-    SHOWN: ClassVar[tuple[str, ...]]
     case: Any
     seeds: list[int]
 
@@ -110,7 +107,6 @@ class SweptRun(SweptCase):
     """A case of `sand run`, or of `sand grow`, each box of which is such a run; see `SweptCase`."""
 
     GIVEN = ("run.seed", "run.out", "grow")
-    SHOWN = ("mean_cluster_size",)
 
     def __init__(self, content: dict[str, Any], name: str):
         own = {key: table for key, table in content.items() if key != "grow"}
@@ -160,7 +156,6 @@ class SweptCollision(SweptCase):
     """A case of `sand collide`; see `SweptCase`."""
 
     GIVEN = ("impact.seeds", "impact.out")
-    SHOWN = ("growth_efficiency", "largest_remnant")
 
     def __init__(self, content: dict[str, Any], name: str):
         problems = material_errors(content, ("target", "projectile"), "silica")
@@ -227,7 +222,6 @@ class SweptScattering(SweptCase):
     """A case of `sand scatter` with one cross-section; see `SweptCase`."""
 
     GIVEN = ("measure.seed", "measure.out")
-    SHOWN = ("sigma",)
     NO_RESULTS = ("profile", "interval", "seconds", "seed", "speed")
 
     def __init__(self, content: dict[str, Any], name: str):

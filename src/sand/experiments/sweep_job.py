@@ -240,7 +240,7 @@ class SweepJob(Job):
         if not self._is_set_up:
             self.expected(self.left())
         self.begin()
-        table = _Table(self, progress)
+        table = _Table(self, progress, 1 if executor is None else getattr(executor, "_max_workers", None))
         try:
             self._compute(executor, observers, table)
         finally:
@@ -339,8 +339,8 @@ class SweepJob(Job):
 class _Table:
     """The rows of a sweep: known ones, those that arrive, and the table that is written of them."""
 
-    def __init__(self, job: SweepJob, progress: Progress):
-        self.job, self._progress = job, progress
+    def __init__(self, job: SweepJob, progress: Progress, workers: int | None):
+        self.job, self._progress, self._workers = job, progress, workers
         self.known: dict[str, dict[str, Any]] = {}
         self.busy: set[str] = set()  # runs that other processes compute
         self.notes: Counter[str] = Counter()
@@ -379,7 +379,8 @@ class _Table:
 
     def _show(self, line: str = "") -> None:
         count = self.counts()
-        text = f"{count[DONE]} of {count['runs']} runs done, {count[FAILED]} failed, {count['left']} left"
+        running = "" if self._workers is None else f"{min(self._workers, count['left'])} running, "
+        text = f"{count[DONE]} of {count['runs']} runs done, {running}{count[FAILED]} failed, {count['left']} left"
         self._progress(text, 1.0 - count["left"] / max(count["runs"], 1), line)
 
     def write(self) -> None:
