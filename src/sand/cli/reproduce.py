@@ -58,12 +58,12 @@ def _listed(job: Any) -> tuple[str, dict[str, Any]]:
     about = {
         "title": job.figure.title,
         "papers": list(job.figure.references),
-        "runs": job.design,
+        "runs": len(job.names),
         "known": len(job.known),
         "core_hours": hours,
     }
     known = f"; {len(job.known)} are known, which took {hours:.2g} core-hours" if job.known else ""
-    return f"{job.figure.title} ({'; '.join(job.figure.references)}): {job.design} runs{known}", about
+    return f"{job.figure.title} ({'; '.join(job.figure.references)}): {len(job.names)} runs{known}", about
 
 
 def comparison_rows(content: dict[str, Any]) -> report.Rows:

@@ -21,10 +21,9 @@ EQUAL_MASSES = (
 
 def averaged(rows: Sequence[Row]) -> SeedTable:
     """Growth efficiency averaged over impact parameters, for each seed and speed that has all of them."""
-    offsets = {row["offset"] for row in rows}
     values = {}
     for key, some in grouped(rows, "seed", "speed").items():
-        if {row["offset"] for row in some} == offsets:
+        if len(some) == some[0]["offsets"]:
             values[key] = ring_average(*np.array([(row["offset"], row["growth_efficiency"]) for row in some]).T)
     return seed_table(values)
 

@@ -18,7 +18,7 @@ from ..plotting.run_figure import save
 from ..theory import contact
 from . import paper_chain, paper_compression, paper_growth
 from .job import Progress, ignored
-from .paper_figure import PaperFigure, Row
+from .paper_figure import Compared, PaperFigure, Row
 from .sweep_design import changed_content
 from .sweep_job import SweepJob
 
@@ -70,8 +70,8 @@ class Reproduction(SweepJob):
     ----------
     figure : PaperFigure
         What is reproduced.
-    design : int
-        Number of all runs.
+    names : list of str
+        Names of all runs.
     known : list of dict
         Rows of the table that comes with SAND.
     """
@@ -93,12 +93,13 @@ class Reproduction(SweepJob):
         content = changed_content(read_toml(path), figure.small if small else {})
         settings = figure.small_sweep if small else {}
         super().__init__(path, folder or f"{name}{'-small' * small}", settings, content=content, retry=retry)
-        self.design = self.rows
-        mine = {row.name for row in self.rows}
+        self.names = self.rows
+        self.names = [row.name for row in self.rows]
+        self._offsets = len({row.values.get("impact.impact_parameter") for row in self.rows})
         place = papers_folder() / name
         rows = _cells(place) if known and (place / SWEEP_CSV).exists() else []
-        self.known = [cells for cells in rows if cells["run"] in mine]
-        self.design, have = len(self.rows), {cells["run"] for cells in self.known}
+        self.known = [cells for cells in rows if cells["run"] in self.names]
+        have = {cells["run"] for cells in self.known}
         # cheap runs first, and all of one seed before those of the next
         self.rows = sorted(
             (row for row in self.rows if row.name not in have),
@@ -126,22 +127,23 @@ class Reproduction(SweepJob):
         dict
             Numbers of rows and of all runs, their CPU time [s], and the comparison.
         """
-        mine = {row.name for row in self.rows}
-        new = [cells for cells in _cells(self.folder) if cells["run"] in mine] if mine else []
-        cells = [one for one in (*self.known, *new) if one[STATE] == DONE]
-        place, compared = self.folder / RESULTS, []
+        found = {one["run"]: one for one in (*self.known, *(_cells(self.folder) if self.rows else ()))}
+        cells = [found[name] for name in self.names if name in found and found[name][STATE] == DONE]
+        place, compared = self.folder / RESULTS, list[Compared]()
+        total = len(self.names)
+        seconds = math.fsum(float(one["cpu_seconds"]) for one in cells)
         if cells:
             place.mkdir(parents=True, exist_ok=True)
             write_sweep(place, cells)
             rows = [row for one in cells for row in self._rows_of(one)]
             compared = self.figure.compare(rows)
-            write_table(place / COMPARISON, [one._asdict() for one in compared])
-            part = "" if len(cells) == self.design else f"; {len(cells)} of {self.design} runs"
+            done = Compared("runs that are done", "", f"{len(cells)} of {total}, {seconds / 3600.0:.2g} core-hours", "")
+            write_table(place / COMPARISON, [one._asdict() for one in (done, *compared)])
+            part = "" if len(cells) == total else f"; {len(cells)} of {total} runs"
             small = "; small version, which shows no physics" if self.small else ""
             save(panels_figure(self.figure.panels(rows), f"{self.figure.title}{small}{part}"), place / FIGURE)
-        seconds = math.fsum(float(one["cpu_seconds"]) for one in cells)
         results = [one._asdict() for one in compared]
-        return {"rows": len(cells), "design": self.design, "cpu_seconds": seconds, "comparison": results}
+        return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results}
 
     def _rows_of(self, cells: dict[str, Any]) -> list[Row]:
         """Rows as figures take them of one row of the table, of a sequence one for each collision."""
@@ -153,6 +155,7 @@ class Reproduction(SweepJob):
         shared = cells | {
             "speed": case.impact.speed,
             "offset": float(str(case.impact.impact_parameter).rstrip(" bc")),
+            "offsets": self._offsets,
             "grain_mass": material.density * 4.0 / 3.0 * math.pi * radius**3,
             "roll_energy": numbers.roll_energy_clamped,
             "break_energy": numbers.break_energy,

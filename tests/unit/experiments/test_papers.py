@@ -70,7 +70,7 @@ def test_a_verdict():
 
 
 NUMBERS = contact("ice", 1e-7)
-SAME = {"break_energy": NUMBERS.break_energy, "roll_energy": NUMBERS.roll_energy_clamped}
+SAME = {"offsets": 6, "break_energy": NUMBERS.break_energy, "roll_energy": NUMBERS.roll_energy_clamped}
 MASS = 1000.0 * 4.0 / 3.0 * math.pi * 1e-21
 
 
@@ -174,7 +174,7 @@ def test_the_case_of_each_figure(name):
     """The case of the full version is read; its first comment names the command; seeds come after sizes of bodies."""
     job = Reproduction(name)
     assert f"sand reproduce {name}" in (papers_folder() / f"{name}.toml").read_text("utf-8").split("[", 1)[0]
-    assert len(job.rows) == job.design > 1
+    assert len(job.rows) == len(job.names) > 1
     sizes = [sum(n for key, n in row.values.items() if key.endswith(".grains")) for row in job.rows]
     assert [(size, row.seed) for size, row in zip(sizes, job.rows, strict=True)] == sorted(
         (size, row.seed) for size, row in zip(sizes, job.rows, strict=True)
@@ -225,7 +225,7 @@ def test_known_rows_are_not_computed_again(tmp_path, monkeypatch):
     lines = (place / "sweep.csv").read_text().splitlines(keepends=True)
     (place / "sweep.csv").write_text("".join(lines[:-1]))
     job = Reproduction("suyama2008", tmp_path / "rest", small=True, known=True)
-    assert (len(job.known), len(job.rows), job.design) == (1, 1, 2)
+    assert (len(job.known), len(job.rows), len(job.names)) == (1, 1, 2)
     found = job.run()
     assert found["comparison"] == whole["comparison"] and found["rows"] == 2
     (place / "sweep.csv").write_text("".join(lines))
