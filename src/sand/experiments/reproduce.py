@@ -93,7 +93,6 @@ class Reproduction(SweepJob):
         content = changed_content(read_toml(path), figure.small if small else {})
         settings = figure.small_sweep if small else {}
         super().__init__(path, folder or f"{name}{'-small' * small}", settings, content=content, retry=retry)
-        self.names = self.rows
         self.names = [row.name for row in self.rows]
         self._offsets = len({row.values.get("impact.impact_parameter") for row in self.rows})
         place = papers_folder() / name
