@@ -241,7 +241,7 @@ def _limits(simulation: Any) -> dict[str, str]:
 
 def _collision_case(path: Path, start: tuple[str, str]) -> Description:
     from ..basics.units import format_quantity
-    from ..experiments.collision import INTERVAL, MOST_CHECKS, expected_end
+    from ..experiments.collision import expected_end, latest_end
     from ..experiments.collision_case import read_collision
 
     case = read_collision(path)
@@ -249,9 +249,10 @@ def _collision_case(path: Path, start: tuple[str, str]) -> Description:
     with report.naming(path):
         simulation, start_of_first = case.check(), case.approach(seeds[0])
     bodies = f"{case.projectile.kind} on {case.target.kind}, {len(simulation.grains)} grains"
-    cost, costs = _cost(simulation, expected_end(start_of_first), math.inf, None, len(seeds))
-    longest = start_of_first.flight + MOST_CHECKS * INTERVAL * start_of_first.check_every
-    note = f"the contacts decide when a collision ends, at {format_quantity(longest, 's')} at the latest"
+    expected, longest = (each(start_of_first, case.ending()) for each in (expected_end, latest_end))
+    cost, costs = _cost(simulation, expected, math.inf, None, len(seeds))
+    note = f"the outcome decides when a collision ends, at {format_quantity(longest, 's')} at the latest"
+    note = note if longest > expected else f"at {format_quantity(longest, 's')}"
     rows = [
         ("bodies", bodies),
         ("seeds", str(len(seeds))),
