@@ -32,6 +32,6 @@ def refuse_other_command(content: dict[str, Any], path: str | Path, command: str
     """Raise BadInput if a case file is meant for another command than the one given."""
     intended = command_for(content)
     own = OWN_TABLES[command] | (OWN_TABLES["run"] if command == "grow" else set())
-    if intended in (None, command) or (own & content.keys() and intended != "grow"):
+    if intended in (None, command) or (own & content.keys() and intended not in ("grow", "sweep")):
         return
     raise BadInput(f"{path}: this is a case for `sand {intended}`; use: sand {intended} {path}")
