@@ -20,6 +20,7 @@ from . import (
     export,
     grow,
     info,
+    methods,
     new,
     options,
     parsing,
@@ -35,22 +36,8 @@ from . import (
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 COMMANDS = (
-    new,
-    run,
-    resume,
-    build,
-    collide,
-    scatter,
-    grow,
-    sweep,
-    reproduce,
-    analyse,
-    plot,
-    view,
-    export,
-    info,
-    cite,
-    completion,
+    *(new, run, resume, build, collide, scatter, grow, sweep, reproduce),
+    *(analyse, plot, view, export, info, methods, cite, completion),
 )
 """One module per command, with a click command named `command`."""
 

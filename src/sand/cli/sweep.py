@@ -25,6 +25,9 @@ def _varied(_context: click.Context, _option: click.Parameter, texts: tuple[str,
     from ..experiments.sweep_design import read_varied
 
     tables = [read_varied(text) for text in texts]
+    keys = [key for table in tables for key in table]
+    if twice := [key for key in dict.fromkeys(keys) if keys.count(key) > 1]:
+        raise BadInput(f"--vary {twice[0]} is given twice; give all its values at once, --vary {twice[0]}=1,2")
     alone = {key: value for table in tables if len(table) == 1 for key, value in table.items()}
     return {"vary": alone, "together": [table for table in tables if len(table) > 1]}
 
@@ -130,7 +133,7 @@ def sweep(
     job.refuse_others()
     left = job.left()
     expected = job.expected(left)
-    opening = [("runs", f"{len(job.rows)}, {len(left)} left"), *_costs(expected, len(left), execution["workers"])]
+    opening = [("runs", f"{len(job.rows)}, {len(left)} left"), *costs_of(expected, len(left), execution["workers"])]
     if dry_run:
         names = {row.name for row in left}
         runs = [{"run": r.name, "left": r.name in names, **r.values, "seed": r.seed} for r in job.rows]
@@ -152,7 +155,7 @@ def sweep(
     return PHYSICS if content["failed"] else None
 
 
-def _costs(expected: Any, number: int, workers: int) -> report.Rows:
+def costs_of(expected: Any, number: int, workers: int) -> report.Rows:
     """Expected cost of all runs that are left."""
     if not number:
         return []
@@ -163,7 +166,7 @@ def _costs(expected: Any, number: int, workers: int) -> report.Rows:
         time += f" by {at_once} worker{'s' * (at_once > 1)}, without compilation"
     memory = f"about {report.format_bytes(at_once * expected.memory)}"
     disk = "not known" if expected.disk is None else f"about {report.format_bytes(expected.disk)}"
-    return [("wall time", time), ("memory", memory), ("disk", disk)]
+    return [("wall time", time), *([("memory", memory)] if expected.memory else []), ("disk", disk)]
 
 
 def _refuse_small_disk(job: Any, expected: Any) -> None:

@@ -33,7 +33,7 @@ def refuse_other_command(content: dict[str, Any], path: str | Path, command: str
     """Raise BadInput if a case file is meant for another command than the one given."""
     intended = command_for(content)
     own = OWN_TABLES[command] | (OWN_TABLES["run"] if command == "grow" else set())
-    if intended in (None, command) or (own & content.keys() and intended != "grow"):
+    if intended in (None, command) or (own & content.keys() and intended not in ("grow", "sweep")):
         return
     reader = "sweep" if intended == "sequence" else intended
     raise BadInput(f"{path}: this is a case for `sand {reader}`; use: sand {reader} {path}")

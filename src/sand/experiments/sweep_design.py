@@ -300,8 +300,10 @@ def without_keys(content: Mapping[str, Any], keys: list[str]) -> dict[str, Any]:
     """The content of a case file without these dotted keys."""
     whole = dict(content)
     for key in keys:
-        table, _, rest = key.partition(".")
-        if isinstance(inside := whole.get(table), dict):
+        table, dot, rest = key.partition(".")
+        if not dot:
+            whole.pop(table, None)
+        elif isinstance(inside := whole.get(table), dict):
             whole[table] = (
                 without_keys(inside, [rest]) if "." in rest else {k: v for k, v in inside.items() if k != rest}
             )

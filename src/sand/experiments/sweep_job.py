@@ -102,6 +102,10 @@ class SweepJob(Job):
 
     Attributes
     ----------
+    keys : list of str
+        The keys that change.
+    seeds : list of int
+        The seeds of each combination.
     rows : list of Row
         All runs, in their order.
     """
@@ -131,6 +135,7 @@ class SweepJob(Job):
         if self.command not in CASES:
             raise BadInput(f"{path} is no case that a sweep can vary; write one with sand new NAME --for sweep")
         self.kind, self._is_set_up = CASES[self.command], False
+        self.notes: list[str] = []  # warnings of the runs that were set up
         self.keys, self.rows = self._rows()
 
     def _rows(self) -> tuple[list[str], list[Row]]:
@@ -149,17 +154,27 @@ class SweepJob(Job):
             design = Design(self.section, partial(takes_whole_numbers, model))
         except BadInput as error:
             raise error.at(f"{name}: sweep") from None
-        own = errors.take(self._seeds, next(design.combinations()), instead=[0])
+        self.seeds = self.section.seeds or errors.take(self._seeds, next(design.combinations()), instead=[0])
         self.content = without_keys(self.content, list(given))
+        self.defaults = self._defaults(keys)
         found: dict[str, Row] = {}
         for values in design.combinations():
             read = errors.take(self._checked, values, instead={})
-            for seed in self.section.seeds or own:
+            for seed in self.seeds:
                 row = Row(self._name_of(read, seed), read, seed)
                 found.setdefault(row.name, row)
         errors.problems = list(dict.fromkeys(errors.problems))
         errors.done()
         return keys, list(found.values())
+
+    def _defaults(self, keys: Sequence[str]) -> dict[str, Any]:
+        """Values of keys that the case file does not give; none if it is no case without them."""
+        missing = [key for key in keys if value_read(self.content, key, None) is None]
+        try:
+            case = self.kind(self.content, "").case if missing else None
+        except BadInput:
+            return {}
+        return {key: value for key in missing if (value := value_read(case, key, None)) is not None}
 
     def _seeds(self, values: dict[str, Any]) -> list[int]:
         return self.kind(changed_content(self.content, values), str(self.path)).seeds
@@ -172,7 +187,8 @@ class SweepJob(Job):
         return {key: value_read(content, key, value) if key.endswith("file") else value for key, value in read.items()}
 
     def _name_of(self, values: dict[str, Any], seed: int) -> str:
-        case = changed_content(self.content, values)
+        """A digest of case and seed; keys that have the default of a case without them change nothing."""
+        case = changed_content(self.content, {k: v for k, v in values.items() if v != self.defaults.get(k)})
         return digest_of({"command": self.command, "case": case, "seed": seed})[:12]
 
     def expected(self, left: Sequence[Row]) -> Expected:
@@ -191,14 +207,18 @@ class SweepJob(Job):
         BadInput
             All errors of the runs in the sample.
         """
-        errors, found = ErrorCollector(), []
-        for row in self._sample(left):
-            self._is_set_up = True
-            case = self.kind(changed_content(self.content, row.values), f"{self.path}: {_named(row)}")
-            try:
-                found.append(case.expected(row.seed))
-            except BadInput as error:
-                errors.problems += error.at(f"{self.path}: {_named(row)}").problems
+        errors, found, self._is_set_up = ErrorCollector(), list[Expected](), True
+        with warnings.catch_warnings(record=True) as noted:
+            warnings.simplefilter("always")
+            for row in self._sample(left):
+                place = f"{self.path}: {_named(row)}"
+                try:
+                    found.append(self.kind(changed_content(self.content, row.values), place).expected(row.seed))
+                except BadInput as error:
+                    errors.problems += error.at(place).problems
+        self.notes = _texts(noted)
+        for text in self.notes[:NOTES]:
+            warn(text)
         errors.done()
         share, keeps = len(left) / max(len(found), 1), self.section.files == "all"
         seconds = [one.seconds for one in found if one.seconds is not None]
@@ -259,7 +279,7 @@ class SweepJob(Job):
         with writing(self.folder, patience=PATIENCE):
             (self.folder / RUNS).mkdir(exist_ok=True)
             (self.folder / self.RESULTS).unlink(missing_ok=True)
-            design = self.section.model_dump(exclude_none=True, exclude={"out"}, exclude_defaults=True)
+            design = self.section.model_dump(exclude={"out"}, exclude_defaults=True) | {"seeds": self.seeds}
             if not (self.resume and (self.folder / files.CASE).exists()):
                 text = "case and settings of sand sweep, read by sand resume"
                 files.write_toml(self.folder / files.CASE, {**self.content, "sweep": design}, text)
@@ -345,7 +365,8 @@ class _Table:
         self.busy: set[str] = set()  # runs that other processes compute
         self.notes: Counter[str] = Counter()
         self._written, self._took = time.monotonic(), 0.0
-        self._names = {row.name for row in job.rows}
+        self._place = {row.name: k for k, row in enumerate(job.rows)}
+        self._states: Counter[str] = Counter()  # of the runs of the design
         self._take_all()
         versions = Counter(cells["version"] for cells in self.known.values())
         if others := [f"{number} by {name}" for name, number in versions.items() if name != version()]:
@@ -354,17 +375,21 @@ class _Table:
 
     def _take_all(self) -> None:
         """Take the rows of all runs that have ended, also those of other processes."""
-        for name, row in read_rows(self.job.folder):
-            if name not in self.known:
-                self.known[name] = _cells(name, row, self.job.keys)
+        for name, row in read_rows(self.job.folder, without=self.known):
+            self._take(name, row)
+
+    def _take(self, name: str, row: dict[str, Any]) -> None:
+        if name in self._place and name not in self.known:
+            self._states[row[STATE]] += 1
+        self.known[name] = _cells(name, row, self.job.keys, self.job.defaults)
 
     def add(self, row: Row, found: dict[str, Any] | None) -> None:
         """Take the row of a run that has ended; None if another process computes it."""
         if found is None:
             self.busy.add(row.name)
             return
-        self.known[row.name] = _cells(row.name, found, self.job.keys)
-        self.notes.update(found.get("notes", []))
+        self._take(row.name, found)
+        self.notes.update(text for text in found.get("notes", []) if text not in self.job.notes)
         line = f"  run {row.name} failed ({_named(row)}): {found['message']}" if found[STATE] == FAILED else ""
         self._show(line)
         now = time.monotonic()
@@ -373,8 +398,7 @@ class _Table:
 
     def counts(self) -> dict[str, int]:
         """Numbers of runs of the design that are done, that failed, and that are left."""
-        states = Counter(self.known[name][STATE] for name in self._names & self.known.keys())
-        total = len(self.job.rows)
+        states, total = self._states, len(self._place)
         return {"runs": total, DONE: states[DONE], FAILED: states[FAILED], "left": total - states.total()}
 
     def _show(self, line: str = "") -> None:
@@ -386,14 +410,12 @@ class _Table:
     def write(self) -> None:
         """Write the table of all runs that have ended: those of the design in its order, then earlier ones."""
         began = time.monotonic()
-        place = {row.name: k for k, row in enumerate(self.job.rows)}
-        keys = dict.fromkeys(key for cells in self.known.values() for key in cells["keys"])
-        order = sorted(
-            self.known, key=lambda name: (place.get(name, len(place)), str(self.known[name]["values"]), name)
-        )
+        place, known = self._place, self.known
+        keys = dict.fromkeys(key for cells in known.values() for key in cells["keys"])
+        order = sorted(known, key=lambda name: (place.get(name, len(place)), str(known[name]["values"]), name))
         rows = []
         for name in order:
-            cells = dict(self.known[name])
+            cells = dict(known[name])
             values = cells.pop("values")
             del cells["keys"]
             rows.append({key: values.get(key) for key in [*self.job.keys, *keys]} | cells)
@@ -433,10 +455,9 @@ def _named(row: Row) -> str:
     return ", ".join([*(f"{key} = {value}" for key, value in row.values.items()), f"seed {row.seed}"])
 
 
-def _cells(name: str, row: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+def _cells(name: str, row: dict[str, Any], keys: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, Any]:
     """Cells of the table of one row, with its keys and their values."""
-    case = row["case"]
-    values = {key: value_read(case, key, None) for key in dict.fromkeys([*keys, *row["keys"]])}
+    values = {key: value_read(row["case"], key, defaults.get(key)) for key in dict.fromkeys([*keys, *row["keys"]])}
     values |= {key: _listed(row["keys"][key]) for key in row["keys"]}
     shared = {"seed": row["seed"], STATE: row[STATE], **flat(row["results"])}
     costs = {key: row[key] for key in ("message", "seconds", "cpu_seconds", "version")}
@@ -456,6 +477,11 @@ def _row(command: str, case: dict[str, Any], row: Row, state: str, message: str 
     content = {"command": command, "case": case, "keys": row.values, "seed": row.seed, STATE: state}
     known = {"message": message, "results": {}, "seconds": 0.0, "cpu_seconds": 0.0, "notes": [], "version": version()}
     return {**content, **known, "run": row.name, **more}
+
+
+def _texts(noted: Sequence[warnings.WarningMessage]) -> list[str]:
+    """Texts of warnings for users, each once."""
+    return list(dict.fromkeys(str(one.message) for one in noted if issubclass(one.category, UserWarning)))
 
 
 @contextmanager
@@ -517,8 +543,7 @@ def run_row(
             except Exception as error:
                 state, message = FAILED, " ".join(f"{type(error).__name__}: {error}".split())
             costs = {"seconds": time.monotonic() - began[0], "cpu_seconds": time.process_time() - began[1]}
-            texts = [str(one.message) for one in noted if issubclass(one.category, UserWarning)]
-            found = _row(command, case, row, state, message, results=results, notes=list(dict.fromkeys(texts)), **costs)
+            found = _row(command, case, row, state, message, results=results, notes=_texts(noted), **costs)
             write_row(place, found)
             return files.plain(found)
         finally:

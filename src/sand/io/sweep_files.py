@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,10 +46,10 @@ def read_row(place: Path) -> dict[str, Any] | None:
     return None
 
 
-def read_rows(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Names and rows of all runs of a sweep that have ended."""
+def read_rows(folder: Path, without: Container[str] = ()) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Names and rows of all runs of a sweep that have ended, without those of some names."""
     for place in sorted((folder / RUNS).glob("*")):
-        if (row := read_row(place)) is not None:
+        if place.name not in without and (row := read_row(place)) is not None:
             yield place.name, row
 
 

@@ -54,6 +54,8 @@ def sweep_figure(table: Mapping[str, np.ndarray], keys: Sequence[str], what: str
         if len(positive) == len(x) and positive.max(initial=0.0) > LOG_FROM * positive.min(initial=np.inf):
             axes.set_xscale("log")
         axes.set(xlabel=f"{x_key} [{unit}]" if unit else x_key, ylabel=what if words == [""] else f"share of {what}")
+        if words != [""]:
+            axes.set_ylim(-0.03, 1.03)
         if len(lines) > 1 or lines[0] != ("", ""):
             legend_above(axes)
     return figure
