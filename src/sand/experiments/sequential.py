@@ -17,7 +17,7 @@ from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..setup.checks import largest_cluster
 from ..simulation.simulation import Simulation
-from .collision import approach, prepare, run_to_end
+from .collision import Ending, approach, prepare, run_to_end
 from .collision_case import CollisionCase
 from .collision_outcome import Collision
 
@@ -35,6 +35,7 @@ def collide_in_sequence(
     seed: int = 1,
     forces: Sequence[Force] | None = None,
     stepping: Integrator | None = None,
+    ending: Ending = Ending(),
     observers: Sequence[Any] = (),
 ) -> list[Collision]:
     """Simulate collisions of an aggregate with a copy of itself, each in random orientations.
@@ -54,6 +55,8 @@ def collide_in_sequence(
         Seed of the orientations.
     forces, stepping, observers : optional
         As for `collision.collide`.
+    ending : Ending, optional
+        When each collision ends.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def collide_in_sequence(
         none = np.zeros((len(both), 3))
         bonds = StrainedContacts(both, none, none, none[:, 0])
         simulation = prepare(start, forces, stepping, contacts=bonds, observers=observers)
-        outcomes.append(run_to_end(start, simulation))
+        outcomes.append(run_to_end(start, simulation, ending))
         body, pair = _largest_at_rest(simulation)
     return outcomes
 
@@ -120,5 +123,6 @@ class SequenceCase(CollisionCase):
             seed=seed,
             forces=forces,
             stepping=stepping,
+            ending=self.ending(),
             observers=observers,
         )

@@ -170,7 +170,7 @@ class SweptCollision(SweptCase):
     def expected(self, seed: int) -> Expected:
         """Set up the collision, and estimate its cost."""
         start = self.case.approach(seed)
-        cost = prepare(start, *self.case.physics()).expected_cost(expected_end(start))
+        cost = prepare(start, *self.case.physics()).expected_cost(expected_end(start, self.case.ending()))
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
@@ -180,7 +180,7 @@ class SweptCollision(SweptCase):
             simulation = resume_collision(start, folder, *physics, observers=own)
         else:
             simulation = prepare(start, *physics, out=folder, overwrite=True, observers=own)
-        found = run_to_end(start, simulation).to_dict()
+        found = run_to_end(start, simulation, self.case.ending()).to_dict()
         return {key: value for key, value in found.items() if key not in ("seed", "speed")}
 
 
@@ -205,7 +205,7 @@ class SweptSequence(SweptCollision):
         count = len(body) * 2 ** (case.sequence.collisions - 1)
         long = chain(count, radius=float(body.radius.mean()), material=body.materials[0])
         start = approach(long, long, speed=case.impact.speed, impact_parameter=0.0, along="x", seed=seed)
-        cost = prepare(start, *case.physics()).expected_cost(expected_end(start))
+        cost = prepare(start, *case.physics()).expected_cost(expected_end(start, case.ending()))
         seconds = _without_figure(cost)
         return Expected(None if seconds is None else 2.0 * seconds, cost.memory, cost.disk)
 
