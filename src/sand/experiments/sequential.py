@@ -35,7 +35,7 @@ def collide_in_sequence(
     seed: int = 1,
     forces: Sequence[Force] | None = None,
     stepping: Integrator | None = None,
-    ending: Ending = Ending(),
+    ending: Ending | None = None,
     observers: Sequence[Any] = (),
 ) -> list[Collision]:
     """Simulate collisions of an aggregate with a copy of itself, each in random orientations.
@@ -55,8 +55,8 @@ def collide_in_sequence(
         Seed of the orientations.
     forces, stepping, observers : optional
         As for `collision.collide`.
-    ending : Ending, optional
-        When each collision ends.
+    ending : Ending or None, optional
+        When each collision ends; `Ending()` by default.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def collide_in_sequence(
         none = np.zeros((len(both), 3))
         bonds = StrainedContacts(both, none, none, none[:, 0])
         simulation = prepare(start, forces, stepping, contacts=bonds, observers=observers)
-        outcomes.append(run_to_end(start, simulation, ending))
+        outcomes.append(run_to_end(start, simulation, ending or Ending()))
         body, pair = _largest_at_rest(simulation)
     return outcomes
 
