@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..analysis.fits import power_law
+from ..analysis.impact_average import impact_weights
 from ..plotting.papers import Curve, Guide, Panel
 from .paper_figure import MEMORY, Compared, PaperFigure, Row, grouped
-from .seed_table import Interval, SeedTable, ring_average, seed_table
+from .seed_table import Interval, SeedTable, seed_table
 
 EQUAL_MASSES = (
     "for equal masses about 50 m/s for ice is also what Wada et al. 2009 and Arakawa et al. 2022 find (from memory); "
@@ -24,7 +25,8 @@ def averaged(rows: Sequence[Row]) -> SeedTable:
     values = {}
     for key, some in grouped(rows, "seed", "speed").items():
         if len(some) == some[0]["offsets"]:
-            values[key] = ring_average(*np.array([(row["offset"], row["growth_efficiency"]) for row in some]).T)
+            offset, efficiency = np.array([(row["offset"], row["growth_efficiency"]) for row in some]).T
+            values[key] = float(impact_weights(offset, 1.0) @ efficiency)
     return seed_table(values)
 
 

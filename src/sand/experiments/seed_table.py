@@ -85,19 +85,3 @@ def falls_below(x: np.ndarray, y: np.ndarray, level: float) -> float:
         return math.nan
     k = int(below[0])
     return float(np.exp(u[k] + (u[k + 1] - u[k]) * f[k] / (f[k] - f[k + 1])))
-
-
-def ring_average(offset: np.ndarray, values: np.ndarray) -> float:
-    """Average ∫ f 2b db/b_max² of values at impact parameters, each on the ring of the b² nearest to its own.
-
-    Parameters
-    ----------
-    offset : ndarray
-        b/b_max (B,), 0 … 1, all different.
-    values : ndarray
-        f (B,).
-    """
-    order = np.argsort(offset)
-    area = offset[order] ** 2
-    edges = np.concatenate([[0.0], 0.5 * (area[1:] + area[:-1]), [1.0]])
-    return float(np.diff(edges) @ values[order])

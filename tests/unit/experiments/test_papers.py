@@ -16,21 +16,12 @@ from sand.experiments.paper_chain import compare_chain
 from sand.experiments.paper_compression import compare_compression
 from sand.experiments.paper_growth import averaged, break_up_speed, compare_mass_ratios, compare_parameter
 from sand.experiments.reproduce import FIGURES, Reproduction, papers_folder
-from sand.experiments.seed_table import Interval, falls_below, ring_average, seed_table
+from sand.experiments.seed_table import Interval, falls_below, seed_table
 from sand.experiments.sequential import collide_in_sequence
 from sand.setup import bpca, grain
 from sand.theory import contact
 
 OFFSETS = [math.sqrt((k + 0.5) / 6) for k in range(6)]
-
-
-def test_an_average_over_rings():
-    """∫ f 2b db/b_max²: exact for a constant; b² of evenly spaced b² in any order gives ½; the trapezoid otherwise."""
-    b = np.array(OFFSETS)
-    assert ring_average(b, np.full(6, 3.0)) == pytest.approx(3.0, abs=1e-12)
-    assert ring_average(b[::-1], b[::-1] ** 2) == pytest.approx(0.5, abs=1e-12)
-    # rings of 0 and 1 end at b² = ½: (0 + 1)/2
-    assert ring_average(np.array([0.0, 1.0]), np.array([0.0, 1.0])) == pytest.approx(0.5, abs=1e-12)
 
 
 def test_a_crossing():
