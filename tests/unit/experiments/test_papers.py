@@ -71,7 +71,7 @@ def growth_rows(zero, **extra):
     found = [
         {"seed": s, "speed": v, "offset": b, "growth_efficiency": (1 + b * b) * math.log(zero / v)} for s, v, b in runs
     ]
-    return [SAME | {"grain_mass": MASS} | row | extra for row in found]
+    return [SAME | {"grain_mass": MASS, "mass_ratio": 1.0} | row | extra for row in found]
 
 
 def test_the_break_up_speed_of_ice():
