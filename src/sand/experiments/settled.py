@@ -189,7 +189,7 @@ def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
     if expected_breaks(energy, weakest, modes, attempts).sum() > MOST_BREAKS:
         return False
     found = swings(grains, pairs, simulation.box)
-    turns = np.sqrt((rigid_motion(grains, pairs, simulation.box).spin**2).sum(axis=0))
+    turns = np.sqrt((rigid_motion(grains, pairs, simulation.box).spin ** 2).sum(axis=0))
     fast = (motion.rotation > np.minimum(weakest, softest)) & (turns > 0.0)
     times = [*(1.0 / turns[fast]), *swing_time(found.inertia, found.energy, strength.turning[found.contact])]
     return simulation.time - float(state.clock[CHANGED]) >= max(times, default=0.0)

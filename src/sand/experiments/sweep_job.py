@@ -63,7 +63,7 @@ MOST_LOSSES = 3
 """Times that the process of a run may die before the run counts as failed."""
 SET_UP, MOST_SET_UP = 8, 64
 """Runs that are set up before the first one is computed: at least, and at most."""
-ROW_BYTES = 8e3
+ROW_BYTES = 12e3
 """Disk space of a run of which only the row is kept [bytes]."""
 NOTES = 5
 """Warnings of runs that are shown, the most frequent ones."""
