@@ -118,7 +118,7 @@ def flat_keys(table: Any, name: str = "vary") -> dict[str, Any]:
     return found
 
 
-def _several(value: Any, name: str) -> list[dict[str, Any]]:
+def several(value: Any, name: str) -> list[dict[str, Any]]:
     """A list of tables of keys.  Raises BadInput."""
     if not isinstance(value, list):
         raise BadInput(f"{name} must be a list of tables, [[sweep.{name}]]")
@@ -131,7 +131,7 @@ class SweepSection(Section):
     vary: Annotated[dict[str, Any], Reading(flat_keys)] = Field(default_factory=dict)
     """Keys with their values: a list, one value, or a range with so many values: `lin(1 um, 3 um, 5)`, evenly spaced,
     `log(10 m/s, 200 m/s, 10)`, by their logarithm, `square(0 b, 1 b, 6)`, by their square."""
-    together: Annotated[list[Any], Reading(_several)] = Field(default_factory=list)
+    together: Annotated[list[Any], Reading(several)] = Field(default_factory=list)
     """Tables of keys that change together, each with equally many values: [[sweep.together]]."""
     seeds: Annotated[Any, Reading(_seeds)] = None
     """Seeds of each combination: how many, from 1, or a list; none: those of the case."""
