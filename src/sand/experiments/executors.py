@@ -129,9 +129,7 @@ def _without_package(error: BaseException) -> str:
     while each is not None:
         is_missing = isinstance(each, ModuleNotFoundError) and str(each.name).partition(".")[0] == "sand"
         if is_missing or "deserialization of the task graph" in str(each):
-            return (
-                f"a worker or the scheduler has no package sand, or another one; install sand-dust {__version__} there"
-            )
+            return f"a worker or the scheduler lacks the package sand; install sand-dust {__version__} there"
         each = each.__cause__ or each.__context__
     return ""
 
