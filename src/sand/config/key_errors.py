@@ -120,5 +120,7 @@ def _fields(annotation: Any) -> dict[str, Any]:
         if dataclasses.is_dataclass(candidate):
             hints = typing.get_type_hints(candidate)
             own = {f.name: hints[f.name] for f in dataclasses.fields(candidate)}
+            if hasattr(candidate, "with_paper"):
+                return {"like": str} | own
             return {"method": str, "clusters": str} | own if candidate in INTEGRATORS.values() else own
     return {}
