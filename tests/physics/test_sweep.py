@@ -80,6 +80,8 @@ def test_collisions(place):
             assert (table["impact.speed"][k], table["seed"][k]) == (speed, seed)
             for name in ("outcome", "made", "lost_rolling", "time", "steps", "gyration_after"):
                 assert table[name][k] == expected[name]
+    short = {**read_toml("collision.toml"), "impact": {"speed": "4 m/s", "end": "3 ns"}}
+    assert CASES["collide"](short, "short").run(1, None)["time"] == pytest.approx(3e-9, rel=1e-12, abs=0.0)
     assert sand.open("all").run(1).frames[-1].time == sand.open("all").table["time"][1]
 
 

@@ -26,19 +26,7 @@ from ..config.key_errors import validate
 from ..io import run_folder as files
 from ..io.damage import digest_of
 from ..io.lock import FolderLock, holder, writing
-from ..io.sweep_files import (
-    CLAIM,
-    DONE,
-    FAILED,
-    ROW,
-    RUNS,
-    STATE,
-    flat,
-    read_row,
-    read_rows,
-    write_row,
-    write_sweep,
-)
+from ..io.sweep_files import CLAIM, DONE, FAILED, ROW, RUNS, STATE, flat, read_row, read_rows, write_row, write_sweep
 from ..results import Sweep
 from ..simulation.displays import DISPLAYS
 from .executors import results_of

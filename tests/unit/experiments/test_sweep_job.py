@@ -355,7 +355,7 @@ def test_parquet(case):
             ["--vary", "impact.speed=-1,fast"],
             ("impact.speed = -1 must be above 0 m/s", "impact.speed = 'fast' is not a"),
         ),
-        (["--vary", "impact.speeed=1"], ("there is no such key; did you mean 'impact.speed'? [impact] has: speed, ",)),
+        (["--vary", "impact.speeed=1"], ("there is no such key; [impact] has: speed, ",)),
         (["--vary", "impact.seeds=1"], ("impact.seeds: give seeds as --seeds, the folder as --out, or in [sweep]",)),
         (["--vary", "impact.speed=1", "--vary", "impact.speed=2"], ("--vary impact.speed is given twice; give all",)),
         (["--vary", "impact.speed"], ("--vary 'impact.speed' must be KEY=VALUES",)),
