@@ -18,6 +18,8 @@ CAPABILITIES = {
     "rigid clusters with walls, driven grains and ramps, settling with driven grains": 242,
     "loops over contacts by what they did in the last step, with displacements that these keep": 198,
     "end of a collision when its outcome is decided, kinds of outcomes, averages over impact parameters": 445,
+    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 0,
+    "end of a collision when its outcome is decided": 220,
     "presets of papers": 160,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""

@@ -165,7 +165,9 @@ class SweptCollision(SweptCase):
     def expected(self, seed: int) -> Expected:
         """Set up the collision, and estimate its cost."""
         start = self.case.approach(seed)
-        cost = prepare(start, *self.case.physics()).expected_cost(expected_end(start))
+        end = expected_end(start, self.case.ending())
+        simulation = prepare(start, *self.case.physics(), frame_every=end / self.case.impact.frames)
+        cost = simulation.expected_cost(end)
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
@@ -175,7 +177,7 @@ class SweptCollision(SweptCase):
             simulation = resume_collision(start, folder, *physics, observers=own)
         else:
             simulation = prepare(start, *physics, out=folder, overwrite=True, observers=own)
-        found = run_to_end(start, simulation).to_dict()
+        found = run_to_end(start, simulation, self.case.ending()).to_dict()
         return {key: value for key, value in found.items() if key not in ("seed", "speed")}
 
 

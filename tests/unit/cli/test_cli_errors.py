@@ -102,5 +102,5 @@ def test_options_with_one_name_have_one_meaning():
         for param in sand.commands[name].params:
             if isinstance(param, click.Option):
                 kinds.setdefault(param.opts[0], set()).add((param.is_flag, param.multiple, param.nargs, param.metavar))
-    allowed = {"--out"}  # a folder, or the file of one body
+    allowed = {"--out", "--seeds"}  # a folder, or the file of one body; a list, or for a sweep their number
     assert not {name: kind for name, kind in kinds.items() if len(kind) > 1 and name not in allowed}
