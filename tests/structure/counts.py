@@ -18,6 +18,7 @@ CAPABILITIES = {
     "rigid clusters with walls, driven grains and ramps, settling with driven grains": 242,
     "loops over contacts by what they did in the last step, with displacements that these keep": 198,
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 860,
+    "end of a collision when its outcome is decided": 220,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8
