@@ -8,7 +8,7 @@ bounce, negative if the target loses mass. `io.growth_codes` writes the results 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,8 +69,8 @@ def collisions(
     table: Mapping[str, Any],
     *,
     speed: str = "speed",
-    target: str = "target.grains",
-    projectile: str = "projectile.grains",
+    target: str | int = "target.grains",
+    projectile: str | int = "projectile.grains",
     fragments: str = "fragments",
     filling: str | None = None,
     weight: str | None = None,
@@ -82,8 +82,8 @@ def collisions(
     table : mapping
         Columns by name.
     speed, target, projectile, fragments : str, optional
-        Names of the columns: relative speed [m/s], or text with a unit; numbers of grains of the bodies; numbers of
-        grains of all fragments of a collision, a list or text such as "493 5 2".
+        Names of the columns: relative speed [m/s], or text with a unit; numbers of grains of the bodies, which may be
+        one number for all rows instead; numbers of grains of all fragments, a list or text such as "493 5 2".
     filling, weight : str, optional
         Names of the columns of filling factors and weights, if there are such columns.
 
@@ -92,8 +92,14 @@ def collisions(
     BadInput
         If a column is missing, has another length, or a value that is impossible; one line for each column.
     """
-    names = {"speed": speed, "target": target, "projectile": projectile, "fragments": fragments}
-    names |= {key: name for key, name in (("filling", filling), ("weight", weight)) if name is not None}
+    chosen: dict[str, str | int | None] = {
+        "speed": speed,
+        "target": target,
+        "projectile": projectile,
+        "fragments": fragments,
+    }
+    chosen |= {"filling": filling, "weight": weight}
+    names = {key: name for key, name in chosen.items() if isinstance(name, str)}
     problems = [
         f"the table has no column '{name}' for {key}; {did_you_mean(name, list(table))}"
         for key, name in names.items()
@@ -108,17 +114,21 @@ def collisions(
         raise BadInput(f"column '{wrong[0]}' has {len(table[wrong[0]])} rows, but '{speed}' has {count}")
     lists = [_grains_of(one, f"{fragments}, row {k}") for k, one in enumerate(table[fragments])]
     speeds = np.array([si(_plain(one), "m/s", f"{speed}, row {k}", above=0.0) for k, one in enumerate(table[speed])])
-    sizes = np.array([[float(one) for one in table[name]] for name in (target, projectile)])
+    sizes = np.array([_numbers(table[one] if isinstance(one, str) else [one] * count) for one in (target, projectile)])
     for k, one in enumerate(lists):
         if sizes[:, k].sum() != one.sum():
             problems.append(f"row {k}: the fragments have {one.sum():g} grains, the bodies {sizes[:, k].sum():g}")
     if problems:
         raise BadInput(problems[:10])
     phi, w = (
-        np.full(count, default) if name is None else np.array([float(one) for one in table[name]])
+        np.full(count, default) if name is None else _numbers(table[name])
         for name, default in ((filling, math.nan), (weight, 1.0))
     )
     return Collisions(speeds, sizes.max(axis=0), sizes.min(axis=0), phi, w, lists)
+
+
+def _numbers(values: Iterable[Any]) -> np.ndarray:
+    return np.array([float(one) for one in values])
 
 
 def _plain(value: Any) -> Any:

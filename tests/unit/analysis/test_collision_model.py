@@ -33,6 +33,8 @@ def test_growth_efficiency():
     assert found.speed.tolist() == [1, 2, 3, 4]
     assert found.growth == pytest.approx([1.0, 0.0, 0.5, -2.0], abs=1e-12)
     assert found.mass_ratio == pytest.approx([5, 5, 1, 2.5], abs=1e-12)
+    of_sweep = {"impact.speed": ["1 m/s"], "target.grains": [6], "fragments": ["7"]}  # a key that does not change
+    assert collisions(of_sweep, speed="impact.speed", projectile=1).growth.tolist() == [1.0]
 
 
 def test_averages():
