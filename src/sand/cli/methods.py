@@ -12,7 +12,6 @@ from ..basics.errors import BadInput
 from ..basics.material import PRESETS
 from ..config.commands import command_for
 from ..io import run_folder as files
-from ..io.sweep_files import DONE, STATE, read_sweep
 from . import options, parsing, report
 from .references import ARTICLES, bibtex, software
 
@@ -77,6 +76,8 @@ def described(folder: Path) -> tuple[dict[str, Any], list[str]]:
     places = [*(folder / name for name in names), *sorted(folder.glob(f"seed-*/{files.SUMMARY}"))]
     results = next((found for place in places if "sand" in (found := _content(place))), {})
     if (folder / files.SWEEP_CSV).exists():
+        from ..io.sweep_files import read_sweep
+
         results = {"sand": " and ".join(sorted(set(read_sweep(folder)["version"].tolist())))}
     return results, [_software(results), *KINDS[kind](folder, case)]
 
@@ -231,6 +232,7 @@ MOST_VALUES = 12
 
 def _of_sweep(folder: Path, path: Path) -> Sentences:
     from ..experiments.sweep_cases import CASES
+    from ..io.sweep_files import DONE, STATE, read_sweep
     from .method_text import value_text
 
     content = files.read_toml(path)
