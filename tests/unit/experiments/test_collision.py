@@ -6,6 +6,7 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import sand
 from sand.cli.main import main
@@ -92,6 +93,7 @@ seeds = [1, 2]
 """
 
 
+@pytest.mark.validate
 @pytest.mark.compiled("contacts", "small")
 def test_a_case_in_processes(tmp_path):
     """Worker processes read the case themselves and give the results of the parent."""
@@ -116,6 +118,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert json.loads((tmp_path / "hit" / "collision.json").read_text()) == message
     assert main(["collide", "hit.toml"]) == 2
     assert "not empty" in capsys.readouterr().err
+    monkeypatch.setattr("sand.plotting.collisions.collision_figure", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
     assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one"]) == 0
     assert "seed 2" in capsys.readouterr().out
     monkeypatch.setattr("sand.cli.report.LINE_AT_LEAST", 0.0)

@@ -11,7 +11,6 @@ import sand
 from sand.analysis.body_motion import BodyMotion
 from sand.basics.constants import BOLTZMANN
 from sand.cli.main import main
-from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 from sand.experiments.growth_boxes import shared_settings
 from sand.experiments.growth_report import temperatures_over_time
@@ -53,10 +52,9 @@ def ensembles(tmp_path_factory):
 
 @pytest.mark.compiled("dipoles", "contacts")
 def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
-    """The bits of a simulation with that seed, also from a process of its own."""
+    """The bits of a simulation with that seed, whatever the seed of the case and the other boxes are."""
     alone = tmp_path / "alone"
-    with executor_for(2) as executor:
-        grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2], alone, executor)
+    grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2], alone)
     ours, theirs = (sand.open(top / "seed-2") for top in (alone, ensembles / "magnetic"))
     assert (ours.frames[-1].position == theirs.frames[-1].position).all()
     assert ours.case["run"]["seed"] == 2
