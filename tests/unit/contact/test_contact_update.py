@@ -11,7 +11,6 @@ from sand.basics.grains import GrainArrays, Grains
 from sand.basics.material import SILICA
 from sand.basics.state import BROKEN, CLOCK, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, STEPS, TWISTING
 from sand.basics.state import STEP as STEP_LENGTH
-from sand.compiler.table import Table
 from sand.contact.constants_table import column_loops, constant_names
 from sand.contact.damping import NONE
 from sand.contact.events import slip_and_break_loop
@@ -25,11 +24,13 @@ from sand.contact.tangential import pointers_for
 from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLID_FLAG, SLIPPED_FLAG
 from sand.contact.update import ContactStep, ContactSums, PassVariant, log_contact_sums, single_contact_loop
 from sand.integrate.motion import drift_for
-from sand.integrate.parts import PARTS, ContactParameters
+from sand.integrate.parts import ContactParameters
 from sand.integrate.stages import StageNumber, contact_event_stages, contact_pass_stage
 from sand.integrate.task_queue import new_task_queue
 from sand.numerics.quaternion import turned_back
 from sand.numerics.vec import axpy, load4, put, scale
+
+from ...tables import table_of
 
 PAIRS = 403
 """Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""
@@ -47,12 +48,10 @@ def pass_and_update(variant):
     update = contact_event_stages(JKR, NONE)[StageNumber.SLIP_AND_BREAK]
 
     def run(grains, contacts, near, count, lost, span, law, dt):
-        table, clock, queue = Table(PARTS), np.zeros(len(CLOCK)), new_task_queue(2 * PAIRS, PAIRS)
+        clock, queue, pending = np.zeros(len(CLOCK)), new_task_queue(2 * PAIRS, PAIRS), 0
         clock[STEP_LENGTH] = dt
-        given = {"grains": grains, "contacts": contacts, "pair_list": near, "clock": clock, "count": count}
-        for name, value in (given | {"lost": lost, "span": span, "settings": law, "queue": queue}).items():
-            table.set(name, value)
-        pending = 0
+        given = {"clock": clock, "count": count, "lost": lost, "span": span, "settings": law, "queue": queue}
+        table = table_of(grains=grains, contacts=contacts, pair_list=near, **given)
         for block in range(len(queue.passed)):
             contact_pass.run(table, (), block)
             passed = ContactSums(*queue.passed[block, : len(ContactSums._fields)])

@@ -10,12 +10,13 @@ import sand
 from sand.basics.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
 from sand.basics.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 from sand.compiler.jit import kernel
-from sand.compiler.table import Table
 from sand.contact.gather import DENSE_FROM, GRAINS_AT_ONCE, LARGEST_CLASS, resort_contacts_by_grain
 from sand.integrate.motion import kick
-from sand.integrate.parts import DT, PARTS, SCRATCH, ExternalWork
+from sand.integrate.parts import DT, SCRATCH, ExternalWork
 from sand.integrate.stages import drift_stage, gather_and_kick_stage, gather_stage
 from sand.integrate.task_queue import GRAINS_PER_BLOCK, new_task_queue
+
+from ...tables import table_of
 
 GRAINS = GATHER_ORDER_FROM + 37
 """Enough for the block-wise order, with an incomplete last block."""
@@ -23,10 +24,9 @@ GRAINS = GATHER_ORDER_FROM + 37
 
 def over_all_grains(stage, grains, dt=0.0, **parts):
     """Call a stage for each block of grains; returns its largest squares of speed and spin."""
-    table, queue, scratch = Table(PARTS), new_task_queue(grains.mass.size, 0), np.zeros(SCRATCH)
+    queue, scratch = new_task_queue(grains.mass.size, 0), np.zeros(SCRATCH)
     scratch[DT] = dt
-    for name, value in ({"grains": grains, "queue": queue, "scratch": scratch} | parts).items():
-        table.set(name, value)
+    table = table_of(grains=grains, queue=queue, scratch=scratch, **parts)
     for block in range(len(queue.speeds)):
         stage.run(table, (), block)
     return queue.speeds.max(axis=0)
