@@ -382,10 +382,8 @@ def test_a_strained_pair_rests_and_a_twisting_one_does_not(share):
 @pytest.mark.parametrize(
     ("mode", "start", "wakes"),
     [
-        ("twist", 0.2, 0.7),
-        ("roll", 0.9, 0.92),
-        pytest.param("roll", 0.2, 0.7, marks=pytest.mark.validate),
-        pytest.param("twist", 0.9, 0.92, marks=pytest.mark.validate),
+        *[("twist", 0.2, 0.7), ("roll", 0.9, 0.92)],
+        *[pytest.param(*each, marks=pytest.mark.validate) for each in (("roll", 0.2, 0.7), ("twist", 0.9, 0.92))],
     ],
 )
 def test_a_pair_in_a_growing_field_wakes_before_its_contact_yields_at_the_limit(mode, start, wakes):

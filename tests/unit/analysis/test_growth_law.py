@@ -11,6 +11,7 @@ from sand.theory import kinetics
 from sand.theory.kernel_growth import EXPONENTS, kernel_curves, power_curves
 from sand.theory.smoluchowski import all_sizes, coagulate, log_sizes
 from tests.reference.fit_coverage import coagulated
+from tests.tiers import combinations
 
 
 def grown(kernel, largest, times):
@@ -76,12 +77,7 @@ def test_constant_kernel(grains):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("z", "largest"),
-    [
-        pytest.param(z, largest, marks=() if (z, largest) in ((0.8, 60.0), (3.33, 12.0)) else pytest.mark.validate)
-        for z in (0.8, 2.0, 3.33)
-        for largest in (12.0, 60.0)
-    ],
+    ("z", "largest"), combinations((0.8, 2.0, 3.33), (12.0, 60.0), default=((0.8, 60.0), (3.33, 12.0)))
 )
 def test_each_kernel_recovers_its_own_degree(z, largest):
     """S of a separate solution with a finer grid, S from 2 to 12 or from 2 to 60: the degree within 0.01.
