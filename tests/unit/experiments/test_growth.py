@@ -193,33 +193,6 @@ def test_odd_forces_of_a_case_are_refused(forces):
         shared_settings({"run": {}, "forces": forces})
 
 
-@pytest.mark.compiled("dipoles")
-@pytest.mark.parametrize(
-    ("words", "part"),
-    [
-        (["analyse", "nowhere"], "no run"),
-        (["analyse", "."], "no run"),
-        (["analyse"], "Missing argument"),
-        (["analyse", "RUN", "--window", "3", "2"], "--window"),
-        (["analyse", "RUN", "--out", "no/where"], "--out no/where"),
-        (["grow", "nowhere.toml"], "there is no file"),
-        (["grow", "box.toml", "--seeds", "x"], "--seeds"),
-        (["grow", "box.toml", "--out", "box.toml"], "is a file"),
-        (["grow", "wrong.toml"], "wrong.toml: grains.radius"),
-    ],
-)
-def test_wrong_arguments_are_refused(ensembles, tmp_path, monkeypatch, capsys, words, part):
-    """One line, exit code 2, nothing written."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "box.toml").write_text(tomli_w.dumps(CASE))
-    (tmp_path / "wrong.toml").write_text(tomli_w.dumps(CASE | {"grains": CASE["grains"] | {"radius": "1 s"}}))
-    before = sorted(tmp_path.iterdir())
-    assert main([str(ensembles / "magnetic") if word == "RUN" else word for word in words]) == 2
-    err = capsys.readouterr().err
-    assert part in err and err.count("\n") == 1
-    assert sorted(tmp_path.iterdir()) == before
-
-
 def test_temperatures_are_pooled_at_equal_times():
     """T = 2 E/(3 k_B) of the bodies of all boxes at one time; a box that ended early has frames at times of its own."""
 

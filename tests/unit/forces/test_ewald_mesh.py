@@ -9,7 +9,6 @@ from scipy.interpolate import BSpline
 
 import sand
 from sand.basics.constants import COULOMB, MAGNETIC
-from sand.basics.errors import BadInput
 from sand.compiler.program import Program
 from sand.compiler.stage import PythonStage, stage
 from sand.forces.pair import ewald
@@ -328,35 +327,6 @@ def test_numbers_of_nodes():
     """Even, products of 2, 3 and 5, at most the spacing, at least 2p."""
     assert nodes_for((1.0, 1.0, 0.1), 1 / 31, 5) == (32, 32, 10)
     assert nodes_for((1.0, 1.05, 2.0), 0.05, 6) == (20, 24, 40)
-
-
-GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
-
-
-@pytest.mark.parametrize(
-    ("make", "line"),
-    [
-        (lambda: sand.Dipoles(periodic="ewald", reciprocal="pme"), "dipoles: reciprocal = 'pme'; allowed: auto, dir"),
-        (lambda: sand.Dipoles(reciprocal="mesh"), "dipoles: reciprocal is used only with periodic = 'ewald'"),
-        (
-            lambda: sand.Charges(periodic="nearest image", reciprocal="mesh"),
-            "charges: reciprocal is used only with periodic = 'ewald'",
-        ),
-        (
-            lambda: sand.Simulation(
-                GRAINS,
-                [sand.Dipoles(periodic="ewald", reciprocal="mesh", accuracy=1e-6)],
-                box=(1e-4, 1e-4, 1e-7),
-            ),
-            "dipoles: periodic = 'ewald' with accuracy = 1e-06 needs a mesh of more than 33554432 nodes in a box of",
-        ),
-    ],
-)
-def test_mistakes_with_the_mesh(make, line):
-    """One clear line each."""
-    with pytest.raises(BadInput) as error:
-        make()
-    assert str(error.value).startswith(line) and len(error.value.problems) == 1
 
 
 def test_the_mesh_is_made_finer_until_the_accuracy_is_reached(monkeypatch):
