@@ -12,7 +12,7 @@ import sand
 from sand.basics.quantity_array import QuantityArray
 from sand.config.case import check_case
 from sand.io.bodies import write_body
-from sand.io.run_folder import TRAJECTORY
+from sand.io.run_folder import LEDGER, TRAJECTORY
 from sand.simulation.contact_table import ContactTable
 
 
@@ -23,6 +23,7 @@ def namespace(tmp_path_factory):
     run = tmp_path_factory.mktemp("run")
     write_body(run / "body.gsd", grains)
     (run / "body.gsd").rename(run / TRAJECTORY)
+    (run / LEDGER).write_text("step,total\n0,1.0\n")
     table = ContactTable.__new__(ContactTable)
     table.update({"pair": np.zeros((0, 2), int), "overlap": np.zeros(0)})
     sim = sand.Simulation(grains, [sand.Contact()])
