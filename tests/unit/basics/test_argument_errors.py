@@ -5,7 +5,6 @@ import pickle
 import sys
 
 import numpy as np
-import pint
 import pytest
 
 import sand
@@ -14,6 +13,7 @@ from sand.config.case import check_case
 from sand.io.bodies import write_body
 from sand.io.run_folder import LEDGER, TRAJECTORY
 from sand.simulation.contact_table import ContactTable
+from tests.unit.pint_units import UNIT
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def namespace(tmp_path_factory):
     return {"sand": sand, "grains": grains, "sim": sim, "table": table, "run": str(run)}
 
 
-LONG, REGISTRY = "x" * 5000, pint.UnitRegistry()
+LONG = "x" * 5000
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_many_wrong_entries_are_counted():
     assert len(caught.value.problems) == 101 and caught.value.problems[-1] == "… and 4900 more errors"
 
 
-@pytest.mark.parametrize("value", [np.full((2, 3), 1.0) * REGISTRY.Unit("cm/s"), "1 cm/s"])
+@pytest.mark.parametrize("value", [np.full((2, 3), 1.0) * UNIT.Unit("cm/s"), "1 cm/s"])
 def test_what_numpy_writes_into_a_change_keeps_its_unit(value):
     """Functions of NumPy that write into an array of a change convert text and quantities, or refuse them."""
     everywhere = np.ones((2, 3), bool)
@@ -78,7 +78,7 @@ def test_what_numpy_writes_into_a_change_keeps_its_unit(value):
         write(array, value)
         assert np.asarray(array) == pytest.approx(np.full((2, 3), 0.01), rel=1e-15, abs=0.0)
         with pytest.raises(sand.BadInput, match=r"velocity = .* is not a quantity in m/s"):
-            write(array, "1 m" if isinstance(value, str) else value * REGISTRY.s)
+            write(array, "1 m" if isinstance(value, str) else value * UNIT.s)
     array.fill("2 mm/s")
     np.copyto(plain := np.zeros((2, 3)), array)
     assert (plain == 2e-3).all()

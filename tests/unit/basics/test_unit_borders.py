@@ -16,8 +16,8 @@ from sand.basics.units import in_unit, si
 from sand.config.case import check_case
 from sand.experiments import kernel_table
 from sand.io.run_folder import read_text
+from tests.unit.pint_units import UNIT
 
-UNIT = pint.UnitRegistry()
 PAIR = [[0, 0, 0], [1e-6, 0, 0]]
 MASKED = np.ma.masked_array([1.0, 2.0], [False, True])
 
