@@ -362,7 +362,10 @@ def test_dimensions_of_large_aggregates(make, few, many, count, expected, bound)
 
 
 @pytest.mark.compiled("small")
-def test_an_unknown_arrangement_of_moments_is_refused():
+@pytest.mark.parametrize(
+    ("given", "message"), [({"moments": "relax"}, "did you mean 'relaxed'"), ({"magnetic": 1.5}, "must not exceed 1")]
+)
+def test_impossible_moments_are_refused(given, message):
     """Once the grains are placed."""
-    with pytest.raises(sand.BadInput, match="did you mean 'relaxed'"):
-        bpca(9, radius=R, material=M, moments="relax")
+    with pytest.raises(sand.BadInput, match=message):
+        bpca(9, radius=R, material=M, **given)
