@@ -25,7 +25,7 @@ from .lock import LOCK, refuse_locked, writing
 
 OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS_CSV, FLIGHTS,
-    GROWTH, VIEW, SWEEP, SWEEP_CSV,
+    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON,
 ) = (
     "case.toml",
     "trajectory.gsd",
@@ -42,6 +42,7 @@ OWN_FILES = (
     "view.html",
     "sweep.json",
     "sweep.csv",
+    "comparison.csv",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
 CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
