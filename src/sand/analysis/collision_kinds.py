@@ -16,13 +16,15 @@ KINDS = {
     "bouncing": "two bodies with the masses of before",
     "sticking": "one body, with the contacts of before",
     "restructuring": "one body, whose contacts changed",
-    "mass transfer": "the heavier body grew, the lighter one left fragments",
+    "mass transfer": "the heavier body lost no mass, the lighter one left fragments",
     "erosion": "the heavier body lost mass, and kept more than half of all",
     "fragmentation": "no body has more than half of all mass",
 }
 """Kinds, from the gentlest to the most violent."""
 NEGLIGIBLE = 0.05
 """Mass that does not count, in units of the lighter body."""
+ROUNDING = 1e-9
+"""Growth efficiency that is one of rounding."""
 CHANGED = 0.1
 """Share of contacts that formed or broke beyond which a body that sticks is restructured."""
 
@@ -59,7 +61,7 @@ def collision_kind(
         restructuring  M_1 ≥ M − ε, and more changed
         bouncing       |M_1 − M_t| ≤ ε and |M_2 − M_p| ≤ ε
         fragmentation  M_1 ≤ M/2
-        mass transfer  f > 0, that is M_1 > M_t
+        mass transfer  f ≥ 0, that is M_1 ≥ M_t
         erosion        otherwise
 
     Parameters
@@ -84,7 +86,7 @@ def collision_kind(
         return "bouncing"
     if largest <= 0.5 * total:
         return "fragmentation"
-    return "mass transfer" if growth_efficiency(first, second, largest) > 0.0 else "erosion"
+    return "mass transfer" if growth_efficiency(first, second, largest) >= -ROUNDING else "erosion"
 
 
 @checked

@@ -170,7 +170,9 @@ class SweptCollision(SweptCase):
     def expected(self, seed: int) -> Expected:
         """Set up the collision, and estimate its cost."""
         start = self.case.approach(seed)
-        cost = prepare(start, *self.case.physics()).expected_cost(expected_end(start, self.case.ending()))
+        end = expected_end(start, self.case.ending())
+        simulation = prepare(start, *self.case.physics(), frame_every=end / self.case.impact.frames)
+        cost = simulation.expected_cost(end)
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:

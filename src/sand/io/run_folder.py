@@ -49,7 +49,22 @@ CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
 """Names of checkpoints, with the number of steps; other names are those of copies that the user keeps."""
 PLOTS = "plots"
 """Subfolder of figures."""
-DERIVED = (".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json")
+DERIVED = (
+    ".xyz",
+    ".dump",
+    ".data",
+    ".vtp",
+    ".pvd",
+    ".png",
+    ".pdf",
+    ".svg",
+    ".html",
+    ".csv",
+    ".json",
+    ".geom",
+    ".dat",
+    ".pos",
+)
 """Ends of the names of exports, figures and tables that are made from a run."""
 NAMED = 5
 """Files that are named one by one in a message."""

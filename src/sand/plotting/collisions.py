@@ -24,6 +24,8 @@ LOOKS = dict(
     )
 )
 """Colour and marker of each kind."""
+ASIDE = 0.03
+"""Shift of the marks of one seed beside those of the one before, in units of the speed."""
 NEGLIGIBLE = 1e-3
 """Mean share of the impact energy below which a loss is only named."""
 
@@ -94,18 +96,18 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
         np.array([row["growth_efficiency"] for row in collisions], float),
         np.array([row["impact_parameter"] / row["reach"] for row in collisions], float),
     )
-    kinds, seeds = np.array([row["kind"] for row in collisions]), [row["seed"] or 0 for row in collisions]
+    kinds, seeds = np.array([row["kind"] for row in collisions]), np.array([row["seed"] or 0 for row in collisions])
+    number = np.unique(seeds, return_inverse=True)[1]
+    beside = speed * (1.0 + ASIDE * (number - 0.5 * number.max()))
     with plot_style():
         figure = RunFigure(figsize=(9.0, 3.8), dpi=DPI, layout="constrained")
         left, right = figure.subplots(1, 2)
         left.axhline(0.0, color=MUTED, linewidth=0.7)
         for name, (colour, marker) in LOOKS.items():
             of = kinds == name
-            for axes, y in ((left, growth), (right, share)) if of.any() else ():
-                axes.plot(speed[of], y[of], marker, color=colour, markersize=4, alpha=0.7, label=name)
-        averages = [
-            _average(growth[speed == v], share[speed == v], np.array(seeds)[speed == v]) for v in np.unique(speed)
-        ]
+            for axes, x, y in ((left, speed, growth), (right, beside, share)) if of.any() else ():
+                axes.plot(x[of], y[of], marker, color=colour, markersize=4, alpha=0.8, label=name)
+        averages = [_average(growth[speed == v], share[speed == v], seeds[speed == v]) for v in np.unique(speed)]
         mean, low, high = (np.array([getattr(one, name) for one in averages]) for name in ("mean", "low", "high"))
         left.plot(np.unique(speed), mean, color=TEXT_COLOUR, linewidth=1.2)
         left.errorbar(
