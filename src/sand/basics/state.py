@@ -18,11 +18,9 @@ from .array_groups import (
     USED,
     Array,
     arrays_of,
-    copy_group,
     grown,
     new_group,
     reorder_group,
-    resized,
     saved_in,
     table_in,
 )
@@ -45,7 +43,7 @@ from .own_quantities import OwnQuantities
 TIME = 0  # simulated time [s]
 STEP = 1  # present time step [s]
 LEVEL = 2  # longest step allowed by free grains and closing pairs, quantised to a power of two [s]
-CONTACT_STEP = 3  # longest step allowed by contacts [s]
+CONTACT_LIMIT = 3  # longest step allowed by contacts [s]
 CYCLE = 4  # length of the present r-RESPA cycle [s]
 LEFT = 5  # part of the cycle that remains [s]; 0 between cycles
 LONG_RANGE_LEVEL = 6  # longest cycle allowed by long-range forces, quantised [s]
@@ -62,7 +60,7 @@ LARGEST_OVERLAP = 16  # largest overlap at the end of a step, in radii of the sm
 LARGEST_IMPACT = 17  # largest speed of an impact in units of `contact.impact.impact_share`
 IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
 CLOCK = (
-    *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
+    *("time", "step", "level", "contact_limit", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
     *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
     *("largest_overlap", "largest_impact", "impact_speed"),
 )
@@ -71,7 +69,7 @@ LEAST_CLOCK = LARGEST_OVERLAP
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
-STAGE = 1  # 0 between steps; 1 after the drift; 2 and 3 after substeps of rigid clusters, see integrate.rigid.substeps
+PHASE = 1  # 0 between steps; 1 after the drift; 2 and 3 after substeps of rigid clusters, see integrate.rigid.substeps
 CONTACTS = 2  # contacts in use
 PAIRS = 3  # candidate pairs in use
 MADE = 4  # contacts formed
@@ -96,7 +94,7 @@ RESTED = 22  # clusters that came to rest, and move as rigid bodies
 LATE = 23  # pairs that overlapped before their bodies were woken
 SUBSTEPS = 24  # steps of bodies that take several within a step of all bodies
 COUNT = (
-    *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
+    *("steps", "phase", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
     *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "unused"),
     *("bodies", "contact_steps", "woken", "rested", "late", "substeps"),
 )
@@ -199,7 +197,7 @@ class State:
 
     def begin_empty_step(self) -> None:
         """Be in the middle of a step of 0 s, whose second half sums the loads."""
-        self.count[STAGE] = 1
+        self.count[PHASE] = 1
         self.clock[STEP] = self.clock[CYCLE] = self.clock[LEFT] = 0.0
 
     def held_grains(self) -> np.ndarray:
@@ -212,19 +210,6 @@ class State:
             if of == GRAINS
         ]
         return np.concatenate([*found, np.zeros(0, np.uint32)])
-
-    def give_component_arrays(self, other: State, own: np.ndarray, theirs: np.ndarray) -> None:
-        """Copy the groups of components to a state whose grains `theirs` are the grains `own` of this one."""
-        for name, group in self.of_components.items():
-            present = other.of_components.get(name) or resized(group, len(other.grains))
-            other.of_components[name] = copy_group(group, present, own, theirs)
-
-    def take_extremes(self, part: State) -> None:
-        """Take over the largest overlap and the largest impact of a part of the grains that took steps of its own."""
-        own, other = self.clock, part.clock
-        own[LARGEST_OVERLAP] = max(own[LARGEST_OVERLAP], other[LARGEST_OVERLAP])
-        if other[LARGEST_IMPACT] > own[LARGEST_IMPACT]:
-            own[LARGEST_IMPACT], own[IMPACT_SPEED] = other[LARGEST_IMPACT], other[IMPACT_SPEED]
 
     def copy(self) -> State:
         """Independent copy (snapshot); empty arrays, which nothing changes, are the same."""

@@ -4,7 +4,7 @@ One step:  choose dt → kick dt/2, drift, rotate dt → check the pair lists �
 (contacts, long-range, external) → kick dt/2.  Long-range forces are summed once per cycle of one or more steps; a
 contact that forms or breaks ends the cycle.  The driver returns between two cycles: at the requested end, because no
 step is possible, or after a contact formed or broke, if a cut-off follows the clusters.  It returns in the middle of a
-step (STAGE = 1) if an array is too small; the call after it resumes there, so enlarging arrays does not change the
+step (PHASE = 1) if an array is too small; the call after it resumes there, so enlarging arrays does not change the
 result.
 
 The driver is compiled once, for all forces and contact laws: it calls their stages by address (`stages`,
@@ -30,7 +30,7 @@ from ..basics.state import (
     PAIR_LIST_SKIN,
     SQUARED_SPEED,
     SQUARED_SPIN,
-    STAGE,
+    PHASE,
     STEP,
     STEPS,
     TIME,
@@ -53,7 +53,7 @@ from .force_calls import (
 from .force_stages import ENERGY, WRAPPING
 from .hooks import Hook, call_hook
 from .motion import kick, wrap_all
-from .parts import DRIVER_PARTS, DT, LIMIT, SINCE, Stop
+from .parts import DRIVER_PARTS, DT, LAST, LIMIT, SHORTEN, SINCE, UNTIL, Stop
 from .respa import (
     add_constant_loads,
     add_long_range_loads,
@@ -224,10 +224,10 @@ def first_half(s):
         return stop
     if s.clock[LEFT] == 0.0:
         cycle = dt * cycle_steps(s.clock, s.count, s.respa, dt)
-        if is_past(s.clock[TIME] + cycle, s.until):
-            if not s.shorten:
+        if is_past(s.clock[TIME] + cycle, s.scratch[UNTIL]):
+            if s.scratch[SHORTEN] == 0.0:
                 return Stop.TIME_REACHED.value
-            cycle = s.until - s.clock[TIME]
+            cycle = s.scratch[UNTIL] - s.clock[TIME]
             dt = cycle / max(1, math.ceil(cycle / dt - 1e-6))
         begin_cycle(s, dt, cycle)
     elif s.respa.impulse:  # between two steps of clock[STEP] and dt seconds
@@ -236,7 +236,7 @@ def first_half(s):
     consume_skins(s.pair_list, displacement)
     s.clock[LEFT] = s.clock[LEFT] - dt if s.clock[LEFT] > 1.5 * dt else 0.0
     s.clock[STEP] = dt
-    s.count[STAGE] = 1
+    s.count[PHASE] = 1
     return Stop.NONE.value
 
 
@@ -298,7 +298,7 @@ def second_half(s):
     if stop != Stop.NONE.value:
         return stop
     if formed > 0 or list_rebuilt:
-        call_stage(s, StageNumber.CONTACT_STEP)
+        call_stage(s, StageNumber.CONTACT_LIMIT)
     dt, elapsed = s.clock[STEP], s.clock[CYCLE] - s.clock[LEFT]
     due = s.clock[LEFT] == 0.0 or broken or formed > 0
     if s.respa.impulse and s.count[CONTACTS] > 0:
@@ -314,10 +314,10 @@ def second_half(s):
     if broken:
         call_stage(s, StageNumber.REMOVE_BROKEN)
         call_stage(s, StageNumber.SORT)
-        call_stage(s, StageNumber.CONTACT_STEP)
+        call_stage(s, StageNumber.CONTACT_LIMIT)
     s.clock[TIME] += dt
     s.count[STEPS] += 1
-    s.count[STAGE] = 0
+    s.count[PHASE] = 0
     call_hook(s, Hook.END_STEP)
     if due:
         call_hook(s, Hook.BETWEEN_CYCLES)
@@ -336,14 +336,14 @@ def steps_until(s):
     reset_skins(s.pair_list, s.count)
     while True:
         stop = Stop.NONE.value
-        if s.count[STAGE] == 0:
+        if s.count[PHASE] == 0:
             if s.clock[LEFT] == 0.0:
                 # before all other returns, so that no output lies between the step and the new cut-off
                 if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                     return Stop.CLUSTERS_CHANGED.value
-                if s.clock[TIME] >= s.until or (s.shorten and is_close(s.clock[TIME], s.until)):
+                if s.clock[TIME] >= s.scratch[UNTIL] or (s.scratch[SHORTEN] == 1.0 and is_close(s.clock[TIME], s.scratch[UNTIL])):
                     return Stop.TIME_REACHED.value
-                if s.count[STEPS] >= s.last:
+                if s.count[STEPS] >= s.scratch[LAST]:
                     return Stop.NONE.value
             if s.count[CONTACTS] == 0 and s.clock[LEFT] == 0.0 and has_stage(s, StageNumber.FLIGHT):
                 stop = call_stage(s, StageNumber.FLIGHT)
@@ -351,7 +351,7 @@ def steps_until(s):
                     call_stage(s, StageNumber.EXPLAIN, stop)
             else:
                 stop = first_half(s)
-        if stop == Stop.NONE.value and s.count[STAGE] == 1:
+        if stop == Stop.NONE.value and s.count[PHASE] == 1:
             stop = second_half(s)
         if stop != Stop.NONE.value:
             return stop
@@ -365,7 +365,7 @@ def steps_until(s):
 def advance(s):
     """Take steps, then end the work of the other threads; returns the value of a `Stop`.
 
-    A run starts in the middle of a step of length 0 (STAGE 1): its second half builds the lists, finds grains that
+    A run starts in the middle of a step of length 0 (PHASE 1): its second half builds the lists, finds grains that
     overlap already and sums the loads; its counters and energies are discarded.
     """
     stop = steps_until(s)

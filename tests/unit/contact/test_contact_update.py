@@ -24,7 +24,7 @@ from sand.contact.slip_rules import ROLL, STEP_KEPT
 from sand.contact.tangential import pointers_for
 from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLID_FLAG, SLIPPED_FLAG
 from sand.contact.update import (
-    ContactStep,
+    PresentStep,
     PassVariant,
     contact_pass_loop,
     log_contact_sums,
@@ -51,7 +51,7 @@ def pass_and_update(variant):
     contact_pass = contact_pass_loop(JKR, variant)
 
     def run(grains, contacts, near, count, lost, span, law, dt):
-        step = ContactStep(span, law, count[STEPS], dt)
+        step = PresentStep(span, law, count[STEPS], dt)
         passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), step)
         log_contact_sums(count, lost, passed)
         update_flagged_contacts(grains, contacts, near, count, lost, step)
@@ -75,7 +75,7 @@ def update_each(grains, contacts, near, count, lost, span, law, dt):
         beyond = exceeds_limits(found, pose.n, constants) or not JKR.fast_radius_root(found.overlap, constants)[1]
         contacts.flag[c] = PENDING_FLAG if beyond else 0
         write_loads(grains, contacts, span, law, c)
-    update_flagged_contacts(grains, contacts, near, count, lost, ContactStep(span, law, 0, dt))
+    update_flagged_contacts(grains, contacts, near, count, lost, PresentStep(span, law, 0, dt))
 
 
 def random_contacts(material, box, seed=1):

@@ -25,7 +25,7 @@ from ...basics.state import (
     RESTED,
     SLIPPED,
     SOME_AWAKE,
-    STAGE,
+    PHASE,
     STEP,
     STEPS,
     SUBSTEPS,
@@ -227,7 +227,7 @@ class BodySteps(GrainSteps):
         """Sum the loads of all bodies on each other."""
         state = engine.regular_state
         sums = int(state.count[LONG_RANGE_SUMS])
-        state.count[STAGE], state.clock[STEP] = 1, 0.0
+        state.count[PHASE], state.clock[STEP] = 1, 0.0
         before = state.time
         engine.run_driver(advance_bodies, -math.inf, state.steps + 1)
         state.clock[TIME], state.count[LONG_RANGE_SUMS] = before, sums
@@ -246,12 +246,12 @@ class BodySteps(GrainSteps):
         docs/physics/rigid-clusters.md, "The life of a cluster", tells the same in words.
         """
         state = engine.regular_state
-        if state.count[BODIES] == 0 or (state.count[STAGE] == 1 and state.clock[STEP] == 0.0):
+        if state.count[BODIES] == 0 or (state.count[PHASE] == 1 and state.clock[STEP] == 0.0):
             return super().call(engine, until, last, shorten)
         self._list_awake(state)  # of a copy of the state, or a loaded one
         before: dict[str, np.ndarray] = {}
         while True:
-            if self._grains.size and state.count[STAGE] == 0:
+            if self._grains.size and state.count[PHASE] == 0:
                 before = {name: array.copy() for name, array in _moving_arrays(state).items()}
             stop = engine.run_driver(advance_bodies, until, last, shorten)
             began, failed = time.thread_time(), Stop.NONE
@@ -340,7 +340,7 @@ class BodySteps(GrainSteps):
         for stage, numbers in inner.content.of_components.get(Hook.END_OF_BODIES, ()):
             stage.run(inner.table_of(present), numbers, Hook.END_OF_BODIES)
         self._slipped = self._slips(state, present)  # before `give_back`, which overwrites the losses compared
-        self.part.give_back(state)
+        self.part.give_back(engine)
         self._columns = self.part.columns
         return Stop.NONE
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.state import BROKEN, MADE, OUTSIDE, RESTED, STAGE, STEP, STEPS, SUBSTEPS, WOKEN, State
+from ...basics.state import BROKEN, MADE, OUTSIDE, RESTED, PHASE, STEP, STEPS, SUBSTEPS, WOKEN, State
 from ...compiler.stage import Stage
 from ...integrate.parts import Stop
 from ...integrate.rigid.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
@@ -117,10 +117,10 @@ class QuickBodies:
             part, end = self.part.engine, state.time + float(state.clock[STEP])
             for outer in engine.external:
                 state.lost[OUTSIDE] += external_energy(part, outer, end) - external_energy(part, outer, state.time)
-        self.part.give_back(state)
+        self.part.give_back(engine)
         bodies.quick[index] = 1
         bodies.excluded_force[:, index] = own.grains.arrays.force - own.bodies.excluded_force
         bodies.excluded_torque[:, index] = own.grains.arrays.torque - own.bodies.excluded_torque
         if changed:
             sort_members(state)
-        state.count[STAGE] = AFTER_SUBSTEPS
+        state.count[PHASE] = AFTER_SUBSTEPS

@@ -23,7 +23,7 @@ from ...basics.state import (
     PAIR_LIST_SKIN,
     PAIRS,
     SOME_AWAKE,
-    STAGE,
+    PHASE,
     STEP,
     STEPS,
     TIME,
@@ -38,7 +38,7 @@ from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
 from ..hooks import Hook, call_hook
 from ..motion import wrap_all
-from ..parts import DRIVER_PARTS, Stop
+from ..parts import DRIVER_PARTS, LAST, SHORTEN, UNTIL, Stop
 from ..respa import add_long_range_loads
 from ..stages import StageNumber
 from ..step_control import is_close, is_past
@@ -231,11 +231,11 @@ def first_half(s, some_awake):
     if s.flight_limits.substeps:
         shared = choose_shared_step(s, h, longest)
         h, takes_substeps = shared, shared > h
-    if is_past(s.clock[TIME] + h, s.until):
-        if not s.shorten:
+    if is_past(s.clock[TIME] + h, s.scratch[UNTIL]):
+        if s.scratch[SHORTEN] == 0.0:
             s.bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
-        h = s.until - s.clock[TIME]
+        h = s.scratch[UNTIL] - s.clock[TIME]
     s.clock[STEP] = h
     if not takes_substeps:
         find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
@@ -250,7 +250,7 @@ def first_half(s, some_awake):
     drift_with_work(s, h)
     if not some_awake:
         call_hook(s, Hook.NONE_AWAKE)
-    s.count[STAGE] = 1
+    s.count[PHASE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
 
@@ -272,7 +272,7 @@ def second_half(s, awake, had_substeps):
         s.clock[SOME_AWAKE] += s.clock[STEP] if awake > 0 else 0.0
         s.clock[GRAINS_AWAKE] += awake * s.clock[STEP] / s.grains.mass.size
     s.count[STEPS] += 1 if s.clock[STEP] > 0.0 else 0
-    s.count[STAGE] = 0
+    s.count[PHASE] = 0
     return Stop.AWAKE_LOADS.value if awake > 0 else Stop.NONE.value
 
 
@@ -283,19 +283,19 @@ def body_steps_until(s):
     invalidate_speeds(s.pair_list)
     while True:
         stop = Stop.NONE.value
-        if s.count[STAGE] == 0:
+        if s.count[PHASE] == 0:
             if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
-            if s.clock[TIME] >= s.until or (s.shorten and is_close(s.clock[TIME], s.until)):
+            if s.clock[TIME] >= s.scratch[UNTIL] or (s.scratch[SHORTEN] == 1.0 and is_close(s.clock[TIME], s.scratch[UNTIL])):
                 return Stop.TIME_REACHED.value
-            if s.count[STEPS] >= s.last:
+            if s.count[STEPS] >= s.scratch[LAST]:
                 return Stop.NONE.value
             stop = first_half(s, awake > 0)
-        elif s.count[STAGE] == AFTER_SUBSTEPS:
+        elif s.count[PHASE] == AFTER_SUBSTEPS:
             drift_with_work(s, s.clock[STEP])
-            s.count[STAGE] = AFTER_ALL
+            s.count[PHASE] = AFTER_ALL
         if stop == Stop.NONE.value:
-            stop = second_half(s, awake, s.count[STAGE] == AFTER_ALL)
+            stop = second_half(s, awake, s.count[PHASE] == AFTER_ALL)
         if stop != Stop.NONE.value:
             return stop
 

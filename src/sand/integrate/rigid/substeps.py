@@ -25,7 +25,7 @@ from .body_touches import reach_of_pair
 from .rigid_body import kick_bodies, move_velocities, sum_body_loads
 
 AFTER_SUBSTEPS, AFTER_ALL = 2, 3
-"""Values of `STAGE` when the quick bodies have arrived at the end of the step, and when all others have, too."""
+"""Values of `PHASE` when the quick bodies have arrived at the end of the step, and when all others have, too."""
 GRAIN_COST, CALL_COST = 0.35, 250.0
 """Estimated cost [µs] of a step for each grain, and of substeps besides that of each substep."""
 SUBSTEP_COST, SUBSTEP_GRAIN_COST, SUBSTEP_PAIR_COST = 1.0, 0.2, 0.0075

@@ -1,0 +1,92 @@
+"""Copies of columns of many arrays in one compiled call, such as those of some grains and their contacts.
+
+Arrays are given by their addresses, so that one loop serves all groups of arrays (`basics.array_groups`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..basics.alignment import address
+from ..basics.array_groups import GRAINS, arrays_of
+from ..compiler.addresses import bytes_at, half_words_at, words_at
+from ..compiler.jit import formula
+from ..compiler.stage import stage
+from ..compiler.table import Table
+
+SOURCE, TARGET, SOURCE_COLUMNS, TARGET_COLUMNS, ROWS, NUMBER_SIZE, OF_GRAINS, NAMES_GRAINS = range(8)
+"""Columns of `ColumnCopies.arrays`: addresses, lengths of rows, number of rows, bytes of a number, whether the columns
+are those of grains, and whether the numbers are indices of grains."""
+
+
+class ColumnCopies(NamedTuple):
+    """Which columns of which arrays are copied, and to which."""
+
+    arrays: np.ndarray  # (A, 8) int64, a row for each pair of arrays
+    grain: np.ndarray  # (2, n) int64: columns of grains in the source, and in the target
+    contact: np.ndarray  # (2, c) int64: columns of contacts in the source, and in the target
+    number: np.ndarray  # int64: index in the target of each grain of the source that is copied
+
+
+def array_pairs(source: Any, target: Any, names: Iterable[str], indices: Collection[str] = ()) -> Iterator[list[int]]:
+    """Rows of `ColumnCopies.arrays` for the arrays of two groups with these names, without empty ones.
+
+    `indices` are the names of arrays of indices of grains.
+    """
+    declared = arrays_of(source)
+    for name in names:
+        one, other = getattr(source, name), getattr(target, name)
+        if one.size and other.size:
+            sizes = one.shape[-1], other.shape[-1], one.size // one.shape[-1], one.itemsize
+            yield [address(one), address(other), *sizes, declared[name].shape[-1] == GRAINS, name in indices]
+
+
+@formula
+def _copy_array(source, target, sizes, columns):
+    """Copy columns of the rows of two arrays; sizes = (rows, lengths of a row in the source, and in the target)."""
+    for r in range(sizes[0]):
+        one, other = r * sizes[1], r * sizes[2]
+        for k in range(columns.shape[1]):
+            target[other + columns[1, k]] = source[one + columns[0, k]]
+
+
+@formula
+def _copy_columns(arrays, a, columns, number):
+    """Copy the columns of the pair of arrays in row a."""
+    source, target, rows, width = arrays[a, SOURCE], arrays[a, TARGET], arrays[a, ROWS], arrays[a, TARGET_COLUMNS]
+    sizes = rows, arrays[a, SOURCE_COLUMNS], width
+    one, other = rows * arrays[a, SOURCE_COLUMNS], rows * width
+    if arrays[a, NUMBER_SIZE] == 8:
+        _copy_array(words_at(source, one), words_at(target, other), sizes, columns)
+    elif arrays[a, NUMBER_SIZE] == 1:
+        _copy_array(bytes_at(source, one), bytes_at(target, other), sizes, columns)
+    else:
+        copied = half_words_at(target, other)
+        _copy_array(half_words_at(source, one), copied, sizes, columns)
+        if arrays[a, NAMES_GRAINS] == 1:
+            for r in range(rows):
+                for k in range(columns.shape[1]):
+                    at = r * width + columns[1, k]
+                    copied[at] = number[copied[at]]
+
+
+@stage("the copies of some grains and their contacts")
+def copy_columns(parameters):
+    """Copy what `ColumnCopies` says, one pair of arrays after the other, and their columns in order."""
+    for a in range(parameters.arrays.shape[0]):
+        if parameters.arrays[a, OF_GRAINS] == 1:
+            _copy_columns(parameters.arrays, a, parameters.grain, parameters.number)
+        else:
+            _copy_columns(parameters.arrays, a, parameters.contact, parameters.number)
+    return 0
+
+
+def column_copies(
+    arrays: np.ndarray, grain: tuple[Any, Any], contact: tuple[Any, Any], number: np.ndarray
+) -> Callable[[], int]:
+    """A function that copies the columns of pairs of arrays; see `ColumnCopies`."""
+    copies = ColumnCopies(arrays, np.array(grain, np.int64), np.array(contact, np.int64), number.astype(np.int64))
+    return copy_columns.prepare(Table(()), copies)
