@@ -34,7 +34,8 @@ from ..limits.solid_limits import grain_warnings
 from ..limits.truncation import truncation_warnings
 from ..neighbours.search import Neighbours
 from .cadence import Chosen, chosen_cadence
-from .change import Change, as_chosen, changed_engine
+from .change import Change
+from .changed_engine import as_chosen, changed_engine
 from .condition import GIVEN, Condition
 from .contact_table import ContactTable
 from .cost.cost import StepTimer
