@@ -191,8 +191,8 @@ GATHER_CLASSES = 64
 GATHER_ORDER_FROM = 4000
 """Fewest grains for which contact.gather sorts grains by contact count; branch predictors learn the counts of fewer."""
 CONTACTS_AT_ONCE = 128
-"""Contacts whose loops follow each other while they are in the cache, a multiple of the SIMD width; the blocks that threads
-share (`integrate.task_queue`) consist of several."""
+"""Contacts whose loops follow each other while they are in the cache, a multiple of the SIMD width; blocks of contacts
+that threads share (`integrate.task_queue`) consist of several."""
 OVER_ALLOCATION = 1.1
 """Initial over-allocation of tables."""
 PAIRS_PER_INNER_ENTRY = 8

@@ -211,11 +211,11 @@ class CompiledState:
             if self.compiles_ahead:
                 self.compiles_ahead = False
                 compile_ahead(self.stages(table), min(cores(), threads()))
-            alone = table["scratch"][SHORTEN] and len(state.grains) < ALONE  # threads start later than one step ends
-            loops = len(self.content.pair_forces), int(state.count[CONTACTS])
             program = self.program_for(table)  # which the threads take from the table
-            if workers is not None and not alone and benefits_from_workers(*loops):
-                workers.start(table)
+            alone = table["scratch"][SHORTEN] and len(state.grains) < ALONE  # threads start later than one step ends
+            if workers is not None and not alone:
+                if benefits_from_workers(len(self.content.pair_forces), int(state.count[CONTACTS])):
+                    workers.start(table)
             return Stop(program.run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(table["queue"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import is_
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from ..basics.state import BROKEN, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE
 from ..contact.gather import resort_contacts_by_grain
 from ..integrate.part_stages import add_sums_of_part, begin_part
 from ..integrate.task_queue import uses_task_queue
-from ..numerics.column_copies import array_pairs, column_copies
+from ..numerics.column_copies import ColumnCopies, array_pairs, copy_columns
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
@@ -39,8 +39,8 @@ class Copies(NamedTuple):
     """Copies of grains and their contacts to a part, and back."""
 
     of: tuple[Any, ...]  # the groups of arrays, the grains, and the columns of contacts
-    take: Callable[[], int]
-    give: Callable[[], int]
+    take: ColumnCopies
+    give: ColumnCopies
 
 
 @dataclass
@@ -110,12 +110,13 @@ class Part:
         self.columns, own = columns, self.state
         if own.contacts.pair.shape[1] < len(columns):
             own.grow("contacts", len(columns))
-        self._copies_of(state, own).take()
+        table = self.engine.table_of(own)
+        copy_columns.run(table, self._copies_of(state, own).take)
         if state.uniform_contacts:
             own.contacts.constants[...] = state.contacts.constants
         self._give_component_arrays(state, own, index, np.arange(len(index)))
         self._start[:] = state.time, state.clock[SETTLED], state.count[CONTACT_STEPS], len(columns)
-        begin_part.run(self.engine.table_of(own), (self._start,))
+        begin_part.run(table, (self._start,))
         return own
 
     def give_back(self, engine: Engine) -> bool:
@@ -132,9 +133,9 @@ class Part:
             self.columns = self._make_room(state, int(own.count[CONTACTS]))
             if state.uniform_contacts:
                 state.contacts.constants[...] = own.contacts.constants
-        self._copies_of(state, own).give()
-        self._give_component_arrays(own, state, np.arange(len(self.index)), self.index)
         table = engine.table_of(state)
+        copy_columns.run(table, self._copies_of(state, own).give)
+        self._give_component_arrays(own, state, np.arange(len(self.index)), self.index)
         if changed:
             resort_contacts_by_grain.run(table)
         add_sums_of_part.run(table, (own.clock, own.count, own.lost, self._numbers))
@@ -183,11 +184,9 @@ class Part:
             _, taken, given = self._pairs[key]
             number, contacts = np.zeros(len(state.grains), np.int64), np.arange(len(self.columns))
             number[self.index] = here
-            self._copies = Copies(
-                of,
-                column_copies(taken, (self.index, here), (self.columns, contacts), number),
-                column_copies(given, (here, self.index), (contacts, self.columns), self.index),
-            )
+            there, of_contacts = np.array([self.index, here]), np.array([self.columns, contacts])
+            give = ColumnCopies(given, there[::-1].copy(), of_contacts[::-1].copy(), self.index)
+            self._copies = Copies(of, ColumnCopies(taken, there, of_contacts, number), give)
         return self._copies
 
     def _array_pairs(self, state: State, own: State) -> tuple[list[list[int]], list[list[int]]]:

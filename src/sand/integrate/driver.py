@@ -28,9 +28,9 @@ from ..basics.state import (
     MADE,
     OUTSIDE,
     PAIR_LIST_SKIN,
+    PHASE,
     SQUARED_SPEED,
     SQUARED_SPIN,
-    PHASE,
     STEP,
     STEPS,
     TIME,
@@ -63,7 +63,7 @@ from .respa import (
     update_constant_loads,
 )
 from .stages import StageNumber
-from .step_control import cycle_steps, hold_step, is_close, is_past
+from .step_control import cycle_steps, has_arrived, hold_step, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 from .taylor import sum_rates
@@ -341,7 +341,7 @@ def steps_until(s):
                 # before all other returns, so that no output lies between the step and the new cut-off
                 if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                     return Stop.CLUSTERS_CHANGED.value
-                if s.clock[TIME] >= s.scratch[UNTIL] or (s.scratch[SHORTEN] == 1.0 and is_close(s.clock[TIME], s.scratch[UNTIL])):
+                if has_arrived(s.clock, s.scratch):
                     return Stop.TIME_REACHED.value
                 if s.count[STEPS] >= s.scratch[LAST]:
                     return Stop.NONE.value

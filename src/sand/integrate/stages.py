@@ -16,7 +16,7 @@ from ..contact.events import compact_contacts, forming_loops, slip_and_break_loo
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.stiffness_work import stiffness_work_loop
-from ..contact.update import PresentStep, PassVariant, contact_pass_loop, contact_limit, store_contact_sums
+from ..contact.update import PassVariant, PresentStep, contact_limit, contact_pass_loop, store_contact_sums
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed

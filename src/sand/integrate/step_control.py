@@ -22,12 +22,14 @@ from ..basics.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
+    TIME,
 )
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
 from ..forces.external_formulas import stiffness_of_field
 from ..numerics.simd import float_bits, float_from_bits
 from ..numerics.vec import dot, load, nearest_image, sub
+from .parts import SHORTEN, UNTIL
 
 CHECK_INTERVAL = 16
 """Steps between two evaluations of the criteria while contacts determine the step."""
@@ -40,7 +42,7 @@ A step that follows the phase of contact oscillations heats them: Verlet conserv
 change of dt changes the energy by up to one per cent, with a sign that depends on the phase.
 """
 EQUAL_STEPS = 1.0 - 1e-6
-"""The limit of contacts is rounded to single precision (`contact_limit`): steps equal to within this factor are the same."""
+"""The limit of contacts has single precision (`contact_limit`): steps equal to within this factor are the same."""
 MAX_SPIN_ANGLE = 0.05
 """Largest rotation of a grain in one step [rad]."""
 MAX_FIELD_PHASE = 0.03
@@ -86,8 +88,8 @@ def load_step(force, torque, mass, inertia, criteria):
 def grain_step(grains, long_range, start, criteria, i):
     """Largest step [s] allowed by the motion of grain i, and largest cycle of the long-range loads.
 
-    Grains in contact oscillate at contact frequencies, which the limit of contacts resolves: only their flight, spin and
-    moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The
+    Grains in contact oscillate at contact frequencies, which the limit of contacts resolves: only their flight, spin
+    and moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The
     load criterion uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no
     energy error.
     """
@@ -203,8 +205,8 @@ def quantise_step(level, wanted, may_grow):
 def choose_step(grains, long_range, start, pair_list, clock, count, span, criteria):
     """The next step [s]: the limit of contacts, or less if another criterion requires it; 0 if the state is not finite.
 
-    Steps below the limit of contacts are powers of two of a second and change seldom, because each change costs velocity
-    Verlet a little energy.  Within a cycle the long-range loads are not available, and only pairs are checked.
+    Steps below the limit of contacts are powers of two of a second and change seldom, because each change costs
+    velocity Verlet a little energy.  Within a cycle the long-range loads are not available, and only pairs are checked.
     """
     between_cycles = clock[LEFT] == 0.0
     no_contacts = count[CONTACTS] == 0
@@ -226,7 +228,7 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
         if may_grow:
             count[STEP_INCREASES] = count[STEPS]
         if not no_contacts:
-            if wanted >= EQUAL_STEPS * clock[CONTACT_LIMIT]:  # the limit of contacts itself, not the power of two below it
+            if wanted >= EQUAL_STEPS * clock[CONTACT_LIMIT]:  # that limit itself, not the power of two below it
                 wanted = max(wanted, 2.0 * clock[CONTACT_LIMIT])
             elif wanted < 2.0 * clock[LEVEL]:
                 count[NEEDED] = count[STEPS]
@@ -261,10 +263,16 @@ def is_close(time, until):
 
 
 @loop
+def has_arrived(clock, scratch):
+    """Whether steps have arrived at scratch[UNTIL], to rounding if a last step is shortened to end there."""
+    return clock[TIME] >= scratch[UNTIL] or (scratch[SHORTEN] == 1.0 and is_close(clock[TIME], scratch[UNTIL]))
+
+
+@loop
 def cycle_steps(clock, count, respa, dt):
     """Number of steps of dt [s] in the next cycle of the long-range loads; 1 without contacts.
 
-    Impulses must be more frequent than contact oscillations for any dt, so k_max counts steps as long as contacts allow.
+    Impulses must be more frequent than contact oscillations for any dt: k_max counts steps as long as contacts allow.
     """
     if count[CONTACTS] == 0:
         return 1

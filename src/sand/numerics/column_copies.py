@@ -5,7 +5,7 @@ Arrays are given by their addresses, so that one loop serves all groups of array
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from ..basics.array_groups import GRAINS, arrays_of
 from ..compiler.addresses import bytes_at, half_words_at, words_at
 from ..compiler.jit import formula
 from ..compiler.stage import stage
-from ..compiler.table import Table
 
 SOURCE, TARGET, SOURCE_COLUMNS, TARGET_COLUMNS, ROWS, NUMBER_SIZE, OF_GRAINS, NAMES_GRAINS = range(8)
 """Columns of `ColumnCopies.arrays`: addresses, lengths of rows, number of rows, bytes of a number, whether the columns
@@ -29,6 +28,10 @@ class ColumnCopies(NamedTuple):
     grain: np.ndarray  # (2, n) int64: columns of grains in the source, and in the target
     contact: np.ndarray  # (2, c) int64: columns of contacts in the source, and in the target
     number: np.ndarray  # int64: index in the target of each grain of the source that is copied
+
+
+NO_COPIES = ColumnCopies(*(np.zeros((1,) * each, np.int64) for each in (2, 2, 2, 1)))
+"""Copies of the types of all others."""
 
 
 def array_pairs(source: Any, target: Any, names: Iterable[str], indices: Collection[str] = ()) -> Iterator[list[int]]:
@@ -82,11 +85,3 @@ def copy_columns(parameters):
         else:
             _copy_columns(parameters.arrays, a, parameters.contact, parameters.number)
     return 0
-
-
-def column_copies(
-    arrays: np.ndarray, grain: tuple[Any, Any], contact: tuple[Any, Any], number: np.ndarray
-) -> Callable[[], int]:
-    """A function that copies the columns of pairs of arrays; see `ColumnCopies`."""
-    copies = ColumnCopies(arrays, np.array(grain, np.int64), np.array(contact, np.int64), number.astype(np.int64))
-    return copy_columns.prepare(Table(()), copies)

@@ -24,8 +24,8 @@ from sand.contact.slip_rules import ROLL, STEP_KEPT
 from sand.contact.tangential import pointers_for
 from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLID_FLAG, SLIPPED_FLAG
 from sand.contact.update import (
-    PresentStep,
     PassVariant,
+    PresentStep,
     contact_pass_loop,
     log_contact_sums,
     single_contact_loop,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.state import BROKEN, MADE, OUTSIDE, RESTED, PHASE, STEP, STEPS, SUBSTEPS, WOKEN, State
+from ...basics.state import BROKEN, MADE, OUTSIDE, PHASE, RESTED, STEP, STEPS, SUBSTEPS, WOKEN, State
 from ...compiler.stage import Stage
 from ...integrate.parts import Stop
 from ...integrate.rigid.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
@@ -63,7 +63,7 @@ class QuickBodies:
                 getattr(bodies, name).take(self.part.index, axis=1, out=getattr(own.bodies, name))
             # a body may wake before its first substep: then the velocities of its grains are all that remains
             place_all_velocities.run(part.table_of(own))
-            steps.kick_awake(own, own.bodies.excluded_force, own.bodies.excluded_torque, step)
+            steps.awake.kick(part, own, (own.bodies.excluded_force, own.bodies.excluded_torque), step)
             stop = part.drive(state.time + step, math.inf, shorten=True)
         finally:
             if stop is not Stop.TIME_REACHED:
@@ -88,7 +88,7 @@ class QuickBodies:
         # the random numbers of a gas are counted with steps and substeps
         own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]
         steps: Any = self.part.engine.stepper  # `body_steps.BodySteps`
-        steps.sort_members(own)
+        steps.awake.sort_members(own)
         steps.sum_outer_loads(self.part.engine)
         return steps
 

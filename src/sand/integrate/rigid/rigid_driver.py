@@ -22,8 +22,8 @@ from ...basics.state import (
     OUTSIDE,
     PAIR_LIST_SKIN,
     PAIRS,
-    SOME_AWAKE,
     PHASE,
+    SOME_AWAKE,
     STEP,
     STEPS,
     TIME,
@@ -41,7 +41,7 @@ from ..motion import wrap_all
 from ..parts import DRIVER_PARTS, LAST, SHORTEN, UNTIL, Stop
 from ..respa import add_long_range_loads
 from ..stages import StageNumber
-from ..step_control import is_close, is_past
+from ..step_control import has_arrived, is_past
 from ..task_queue import join_workers
 from .body_friction import drift_bodies_in_gas
 from .body_touches import CLEAR, LOADED, find_near_bodies
@@ -286,7 +286,7 @@ def body_steps_until(s):
         if s.count[PHASE] == 0:
             if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
-            if s.clock[TIME] >= s.scratch[UNTIL] or (s.scratch[SHORTEN] == 1.0 and is_close(s.clock[TIME], s.scratch[UNTIL])):
+            if has_arrived(s.clock, s.scratch):
                 return Stop.TIME_REACHED.value
             if s.count[STEPS] >= s.scratch[LAST]:
                 return Stop.NONE.value
