@@ -166,8 +166,9 @@ class CompiledState:
         """
         alone = self.workers is None or not self.workers.have_started
         if self._queue is not None and self._queue_size == (grains, contacts) and alone:
-            self._queue.words[:] = 0
-            self._queue.words[SHARED] = uses_task_queue(grains)
+            if uses_task_queue(grains):
+                self._queue.words[:] = 0
+                self._queue.words[SHARED] = 1
         else:
             self._queue, self._queue_size = new_task_queue(grains, contacts), (grains, contacts)
         return self._queue
@@ -213,9 +214,9 @@ class CompiledState:
                 compile_ahead(self.stages(table), min(cores(), threads()))
             program = self.program_for(table)  # which the threads take from the table
             alone = table["scratch"][SHORTEN] and len(state.grains) < ALONE  # threads start later than one step ends
-            if workers is not None and not alone:
-                if benefits_from_workers(len(self.content.pair_forces), int(state.count[CONTACTS])):
-                    workers.start(table)
+            loops = len(self.content.pair_forces), int(state.count[CONTACTS])
+            if workers is not None and not alone and benefits_from_workers(*loops):
+                workers.start(table)
             return Stop(program.run(driver, table))
         except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
             release_workers(table["queue"])

@@ -209,10 +209,10 @@ class Part:
         first, end = len(kept), len(kept) + used
         if state.contacts.pair.shape[1] < end:
             state.grow("contacts", end)
-        for name in contact_columns(state):
-            array = getattr(state.contacts, name)
-            if array.size:
-                array[..., :first] = array[..., kept]
+        if first > 0:
+            moved = np.array([*array_pairs(state.contacts, state.contacts, contact_columns(state))])
+            columns = np.array([kept, np.arange(first)])
+            copy_columns(ColumnCopies(moved, columns, columns, kept))
         state.count[CONTACTS] = end
         state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
         return np.arange(first, end)

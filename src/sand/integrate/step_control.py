@@ -89,8 +89,8 @@ def grain_step(grains, long_range, start, criteria, i):
     """Largest step [s] allowed by the motion of grain i, and largest cycle of the long-range loads.
 
     Grains in contact oscillate at contact frequencies, which the limit of contacts resolves: only their flight, spin
-    and moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The
-    load criterion uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no
+    and moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.
+    The load criterion uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no
     energy error.
     """
     v, w = load(grains.velocity, i), load(grains.spin, i)

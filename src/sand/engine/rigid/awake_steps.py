@@ -11,11 +11,13 @@ The part begins anew in each step of the bodies, so that the state of all grains
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...basics.state import CONTACTS, OUTSIDE, SLIPPED, STEP, STEPS, State
+from ...compiler.table import Table
 from ...integrate.hooks import Hook
 from ...integrate.parts import Stop
 from ...integrate.rigid.awake_clusters import (
@@ -66,6 +68,7 @@ class AwakeSteps:
     columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))
     measures: ClusterMeasures = field(init=False, default_factory=lambda: cluster_measures(0))
     far: FarLoads = field(init=False, default_factory=FarLoads)
+    _have_changed: bool = field(init=False, default=False)  # contacts, in the last contact steps
 
     def list(self, state: State) -> None:
         """List the grains of awake clusters, and their contacts."""
@@ -82,11 +85,14 @@ class AwakeSteps:
 
     def take(self, engine: Engine, state: State) -> State:
         """The state of the awake grains, with contacts as they are and everything else as at a start."""
+        are_others = self.part.index is not self.grains
         taken = self.part.take(state, self.grains, self.columns)
+        if are_others:
+            self.measures = self.part.engine.memory_for("awake clusters", cluster_measures)
+            self.measures.grain[:] = self.grains
+            self.measures.limits[:] = limits_of(engine).vibration, engine.parameters.gas.gas.temperature_energy
+        self.measures.vibrated[:] = 0.0
         self.far.prepare(self.part)
-        self.measures = self.part.engine.memory_for("awake clusters", cluster_measures)
-        self.measures.grain[:], self.measures.vibrated[:] = self.grains, 0.0
-        self.measures.limits[:] = limits_of(engine).vibration, engine.parameters.gas.gas.temperature_energy
         return taken
 
     def take_with_loads(self, engine: Engine, state: State) -> State:
@@ -118,7 +124,7 @@ class AwakeSteps:
         for stage, numbers in inner.content.of_components.get(Hook.END_OF_BODIES, ()):
             stage.run(inner.table, numbers, Hook.END_OF_BODIES)
         self.measures.slipped[:] = self._slips(state, own) if own.count[SLIPPED] else 0.0
-        self.part.give_back(engine)
+        self._have_changed = self.part.give_back(engine)
         self.columns = self.part.columns
         return Stop.NONE
 
@@ -127,11 +133,15 @@ class AwakeSteps:
         inner = self.part.engine
         measure_clusters_stage(inner.law).run(inner.table, self.measures)
 
-    def clusters(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Grains of each cluster that was measured, as indices of awake grains, and their vectors from its centre."""
+    def clusters(self, chosen: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """First grain and grains, as indices of awake grains, of clusters, and vectors from their centres of mass [m].
+
+        Of the clusters that were measured those with a `chosen` (n,) first grain.
+        """
         numbers, offset = self.measures.first, self.part.state.clusters.offset
-        order = np.argsort(numbers, kind="stable")
-        return [(own, offset[:, own]) for own in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)]
+        for first in np.flatnonzero(chosen & (numbers == np.arange(len(numbers)))).tolist():
+            own = np.flatnonzero(numbers == first)
+            yield first, own, offset[:, own]
 
     def kick(self, engine: Engine, state: State, loads: tuple[np.ndarray, np.ndarray], step: float) -> None:
         """Half a kick of the awake clusters between steps.
@@ -156,32 +166,27 @@ class AwakeSteps:
         state, own, measures = engine.regular_state, self.part.state, self.measures
         self.far.end(state, self.part)
         self.measure()
-        firsts = self.grains[measures.first.astype(np.int64)]
-        if not np.array_equal(firsts, state.bodies.first[self.grains]):
-            changed = rename_clusters(state, self.grains, firsts)
+        if self._have_changed:
+            changed = rename_clusters(state, self.grains, self.grains[measures.first.astype(np.int64)])
             self.sort_members(state)
-            for cluster, offset in self.clusters():
-                if changed[cluster[0]]:
-                    describe_body(state, self.grains[cluster], offset)
+            for _, cluster, offset in self.clusters(changed):
+                describe_body(state, self.grains[cluster], offset)
         table = engine.table_of(state)
         grains = own.grains.arrays
         place_awake_grains.run(table, (grains.velocity, grains.spin, own.clusters.offset, measures.grain))
-        mark_near(engine)
+        mark_near(engine, table)
         if find_resting_clusters.run(table, measures):
             self._rest(engine)
 
     def _rest(self, engine: Engine) -> None:
         """Make bodies of the clusters that may come to rest, if they fit into the box."""
         state, measures, rested = engine.regular_state, self.measures, False
-        for cluster, offset in self.clusters():
-            if measures.rests[cluster[0]] == 0.0:
-                continue
+        for first, cluster, offset in self.clusters(measures.rests == 1.0):
             index = self.grains[cluster]
             if len(cluster) == 1:
                 rest_grain(state, int(index[0]))
             elif fits_in_box(engine, offset):
-                k = cluster[0]
-                rest_as_body(engine, index, offset, float(measures.strain[k]), measures.strength[:, k])
+                rest_as_body(engine, index, offset, float(measures.strain[first]), measures.strength[:, first])
             else:
                 continue
             rested = True
@@ -201,12 +206,12 @@ class AwakeSteps:
         return slipped
 
 
-def mark_near(engine: Engine) -> None:
+def mark_near(engine: Engine, table: Table) -> None:
     """Mark bodies near others or walls, and those with driven grains, which do not come to rest."""
-    state, table, heavy = engine.regular_state, engine.table_of(engine.regular_state), engine.content.heavy
+    bodies, heavy = engine.regular_state.bodies, engine.content.heavy
     mark_near_bodies.run(table)
     for stage, numbers in engine.content.of_components.get(Hook.NEAR_BODIES, ()):
         stage.run(table, numbers, Hook.NEAR_BODIES)
     if heavy.size:
-        firsts = state.bodies.first[heavy]
-        state.bodies.near[firsts] = np.maximum(state.bodies.near[firsts], NEAR)
+        firsts = bodies.first[heavy]
+        bodies.near[firsts] = np.maximum(bodies.near[firsts], NEAR)

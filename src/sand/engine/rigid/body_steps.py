@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -55,8 +56,8 @@ from .cluster_bodies import describe_body, form_bodies, members, set_friction
 from .quick_bodies import QuickBodies
 from .rigid_loads import may_stay_at_rest
 
-MOVING_BODIES = ("centre", "orientation", "momentum", "angular_momentum")
-"""Arrays of bodies that change in a step."""
+OF_GRAINS, OF_BODIES = attrgetter(*MOVING), attrgetter("centre", "orientation", "momentum", "angular_momentum")
+"""Arrays of grains and bodies that change in a step."""
 
 
 @dataclass
@@ -79,6 +80,7 @@ class BodySteps(GrainSteps):
     quick: QuickBodies | None = None
     made: Callable[[Engine, Sequence[Force]], BodySteps] | None = None
     _had_substeps: bool = field(init=False, default=False)  # of the present step
+    _before: list[np.ndarray] = field(init=False, default_factory=list)  # arrays at the start of the present step
     _changed_forces: Sequence[Force] | None = field(init=False, default=None)  # which the parts do not have yet
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BodySteps:
@@ -122,7 +124,7 @@ class BodySteps(GrainSteps):
         if awake.grains.size:  # the search for touches needs mass and inertia of awake clusters
             awake.take(engine, state)
             awake.measure()
-            for own, offset in awake.clusters():
+            for _, own, offset in awake.clusters(np.ones(len(awake.grains), bool)):
                 describe_body(state, awake.grains[own], offset)
         self.sum_outer_loads(engine)
 
@@ -218,10 +220,9 @@ class BodySteps(GrainSteps):
         if state.count[BODIES] == 0 or (state.count[PHASE] == 1 and state.clock[STEP] == 0.0):
             return super().call(engine, until, last, shorten)
         self.awake.list(state)  # of a copy of the state, or a loaded one
-        before: dict[str, np.ndarray] = {}
         while True:
             if self.awake.grains.size and state.count[PHASE] == 0:
-                before = {name: array.copy() for name, array in _moving_arrays(state).items()}
+                self._keep(state)
             stop = engine.run_driver(advance_bodies, until, last, shorten)
             began, failed = time.thread_time(), Stop.NONE
             if stop is Stop.HAS_TO_WAKE:
@@ -231,7 +232,7 @@ class BodySteps(GrainSteps):
                 self._update_parts(engine)
                 failed = self.awake.take_contact_steps(engine)
                 if failed is not Stop.NONE:
-                    self._return_to(before, state)
+                    self._return(state)
             elif stop is Stop.AWAKE_LOADS:
                 if self._had_substeps:
                     assert self.quick is not None
@@ -272,16 +273,22 @@ class BodySteps(GrainSteps):
         if woken:
             self.awake.sort_members(state)
 
-    def _return_to(self, before: dict[str, np.ndarray], state: State) -> None:
+    def _keep(self, state: State) -> None:
+        """Keep what a step of bodies changes, but for forces and lists, before awake grains are copied back."""
+        moving = _moving_arrays(state)
+        if [array.shape for array in moving] != [array.shape for array in self._before]:
+            self._before = [array.copy() for array in moving]
+        for before, array in zip(self._before, moving, strict=True):
+            before[...] = array
+
+    def _return(self, state: State) -> None:
         """Return to the state at the start of a step, in whose contact steps something failed, and name the grains."""
-        for name, array in _moving_arrays(state).items():
-            array[...] = before[name]
+        for before, array in zip(self._before, _moving_arrays(state), strict=True):
+            array[...] = before
         self.awake.sort_members(state)
         self.awake.part.name_limiting(state)
 
 
-def _moving_arrays(state: State) -> dict[str, np.ndarray]:
-    """Arrays that change in a step of bodies, but for forces and lists, before awake grains are copied back."""
-    found = {name: getattr(state.grains.arrays, name) for name in MOVING}
-    found |= {f"bodies/{name}": getattr(state.bodies, name) for name in MOVING_BODIES}
-    return found | {"clock": state.clock, "count": state.count, "lost": state.lost}
+def _moving_arrays(state: State) -> list[np.ndarray]:
+    """Arrays that change in a step of bodies."""
+    return [*OF_GRAINS(state.grains.arrays), *OF_BODIES(state.bodies), state.clock, state.count, state.lost]

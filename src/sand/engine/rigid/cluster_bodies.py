@@ -95,7 +95,7 @@ def describe_body(state: State, index: np.ndarray, offset: np.ndarray) -> None:
     m, inertia = grains.mass[index], grains.inertia[index]
     tensor = ((m * offset**2).sum() + inertia.sum()) * np.eye(3) - (m * offset) @ offset.T
     principal, axes = np.linalg.eigh(tensor)
-    if np.linalg.det(axes) < 0.0:
+    if axes[:, 0] @ _cross(axes[:, 1:2], axes[:, 2:])[:, 0] < 0.0:
         axes[:, 0] *= -1.0
     bodies.mass[first], bodies.inertia[:, first] = m.sum(), principal
     bodies.centre[:, first] = state.box.wrap((grains.position[:, first] - offset[:, 0])[None])[0]
