@@ -64,6 +64,8 @@ CLOCK = (
     *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
     *("largest_overlap", "largest_impact", "impact_speed"),
 )
+EXTREMES, SUMS = (LARGEST_LOAD, LARGEST_OVERLAP), (SOME_AWAKE, CORRECTED)
+"""Entries that are the largest of all parts of the grains, and that add up over parts."""
 LEAST_CLOCK = LARGEST_OVERLAP
 """Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0."""
 
@@ -98,6 +100,9 @@ COUNT = (
     *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "unused"),
     *("bodies", "contact_steps", "woken", "rested", "late", "substeps"),
 )
+
+EVENTS = (MADE, BROKEN, SLIPPED, WOKEN, RESTED, LATE)
+"""Numbers of events, which add up over parts of the grains."""
 
 # --- indices of State.cutoff (float64): the cut-off of dipoles that follows the largest clusters -----------------
 CUT_RADIUS = 0  # cut-off [m]; 0 without such a cut-off

@@ -15,10 +15,11 @@ from ..basics.array_groups import copy_group, resized
 from ..basics.arrays import SAVED_BODIES, ContactArrays, body_arrays, cluster_arrays
 from ..basics.grains import GrainArrays
 from ..basics.state import BROKEN, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE, SETTLED, State
+from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
+from ..integrate.column_copies import ColumnCopies, array_pairs, copy_columns
 from ..integrate.part_stages import add_sums_of_part, begin_part
 from ..integrate.task_queue import uses_task_queue
-from ..numerics.column_copies import ColumnCopies, array_pairs, copy_columns
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
@@ -69,6 +70,7 @@ class Part:
     columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))
     _engines: dict[int, Engine] = field(init=False, default_factory=dict)
     _pairs: dict[Any, Any] = field(init=False, default_factory=dict)  # pairs of arrays, by the groups that have them
+    _moved: tuple[Any, Any] = field(init=False, default=(None, None))  # contacts, and pairs of each array with itself
     _copies: Copies | None = field(init=False, default=None)
     _start: np.ndarray = field(init=False, default_factory=lambda: np.zeros(4))  # numbers of `begin_part`
     _numbers: np.ndarray = field(init=False, default_factory=lambda: np.zeros(2))  # and of `add_sums_of_part`
@@ -129,15 +131,15 @@ class Part:
         """
         state, own = engine.regular_state, self.state
         changed = bool(own.count[MADE] + own.count[BROKEN])
+        table = engine.table_of(state)
         if changed:
-            self.columns = self._make_room(state, int(own.count[CONTACTS]))
+            self.columns = self._make_room(state, table, int(own.count[CONTACTS]))
             if state.uniform_contacts:
                 state.contacts.constants[...] = own.contacts.constants
-        table = engine.table_of(state)
         copy_columns.run(table, self._copies_of(state, own).give)
         self._give_component_arrays(own, state, np.arange(len(self.index)), self.index)
         if changed:
-            resort_contacts_by_grain.run(table)
+            resort_contacts_by_grain.run(engine.table_of(state))
         add_sums_of_part.run(table, (own.clock, own.count, own.lost, self._numbers))
         return changed
 
@@ -203,16 +205,18 @@ class Part:
 
         return pairs(state, own, GrainArrays._fields), pairs(own, state, MOVING)
 
-    def _make_room(self, state: State, used: int) -> np.ndarray:
+    def _make_room(self, state: State, table: Table, used: int) -> np.ndarray:
         """Move the contacts of all other grains to the first columns; returns `used` columns behind them."""
         kept = np.setdiff1d(np.arange(state.count[CONTACTS]), self.columns)
         first, end = len(kept), len(kept) + used
         if state.contacts.pair.shape[1] < end:
             state.grow("contacts", end)
-        if first > 0:
-            moved = np.array([*array_pairs(state.contacts, state.contacts, contact_columns(state))])
+        if first > 0 and kept[-1] >= first:
+            if self._moved[0] is not state.contacts:
+                pairs = array_pairs(state.contacts, state.contacts, contact_columns(state))
+                self._moved = state.contacts, np.array([*pairs])
             columns = np.array([kept, np.arange(first)])
-            copy_columns(ColumnCopies(moved, columns, columns, kept))
+            copy_columns.run(table, ColumnCopies(self._moved[1], columns, columns, kept))
         state.count[CONTACTS] = end
         state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
         return np.arange(first, end)

@@ -3,29 +3,22 @@
 import math
 
 from ..basics.state import (
-    BROKEN,
     CHECKED,
     COMPARED,
     CONTACT_LIMIT,
     CONTACT_STEPS,
     CONTACTS,
-    CORRECTED,
+    EVENTS,
+    EXTREMES,
     GRAINS_AWAKE,
     IMPACT_SPEED,
     KICKED,
     LARGEST_IMPACT,
-    LARGEST_LOAD,
-    LARGEST_OVERLAP,
-    LATE,
-    MADE,
-    RESTED,
     SETTLED,
-    SLIPPED,
-    SOME_AWAKE,
     STEP_INCREASES,
     STEPS,
+    SUMS,
     TIME,
-    WOKEN,
 )
 from ..compiler.stage import stage
 from ..contact.gather import sort_contacts_by_grain
@@ -63,18 +56,18 @@ def begin_part(grains, contacts, pair_list, long_range, clock, count, lost, para
 def add_sums_of_part(clock, count, lost, parameters):
     """Add what a part has counted and lost; `parameters`: its clock, count, lost, and (steps are, share of grains)."""
     part_clock, part_count, part_lost, numbers = parameters
-    for number in (MADE, BROKEN, SLIPPED, WOKEN, RESTED, LATE):
+    for number in EVENTS:
         count[number] += part_count[number]
     count[CONTACT_STEPS] = part_count[CONTACT_STEPS]
     count[int(numbers[0])] += part_count[STEPS]
     for k in range(lost.size):
         lost[k] += part_lost[k]
+    for k in SUMS:
+        clock[k] += part_clock[k]
+    for k in EXTREMES:
+        clock[k] = max(clock[k], part_clock[k])
     clock[SETTLED] = part_clock[SETTLED]
-    clock[SOME_AWAKE] += part_clock[SOME_AWAKE]
     clock[GRAINS_AWAKE] += part_clock[GRAINS_AWAKE] * numbers[1]
-    clock[CORRECTED] += part_clock[CORRECTED]
-    for largest in (LARGEST_LOAD, LARGEST_OVERLAP):
-        clock[largest] = max(clock[largest], part_clock[largest])
     if part_clock[LARGEST_IMPACT] > clock[LARGEST_IMPACT]:
         clock[LARGEST_IMPACT], clock[IMPACT_SPEED] = part_clock[LARGEST_IMPACT], part_clock[IMPACT_SPEED]
     return 0

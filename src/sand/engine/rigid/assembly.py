@@ -143,7 +143,7 @@ class BodiesKind(Kind):
             stages = dict(inner.content.of_components)
             stages[Hook.LOADS] = [*stages.get(Hook.LOADS, ()), (add_held_loads, no_loads(0))]
             inner.content = inner.content._replace(of_components=stages).for_part(len(inner.regular_state.grains))
-        limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
+        limits = parameters.flight_limits._replace(substeps=False, excludes_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
         steps = BodySteps(AwakeSteps(Part(inner, CONTACT_STEPS)))
         of_quick = dataclasses.replace(inner, parameters=own, warnings=engine.warnings, stepper=steps)

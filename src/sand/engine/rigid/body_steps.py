@@ -34,6 +34,7 @@ from ...compiler.stage import PythonStage, Stage
 from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
 from ...forces.base import Force
+from ...integrate.column_copies import NO_COPIES, copy_columns
 from ...integrate.hooks import Hook
 from ...integrate.part_stages import add_sums_of_part, begin_part
 from ...integrate.parts import Stop
@@ -48,7 +49,6 @@ from ...integrate.rigid.awake_clusters import (
 )
 from ...integrate.rigid.body_touches import LOADED
 from ...integrate.rigid.rigid_driver import advance_bodies, mark_near_bodies
-from ...numerics.column_copies import NO_COPIES, copy_columns
 from ..engine import Engine, GrainSteps
 from ..part import MOVING
 from .awake_steps import AwakeSteps
@@ -126,7 +126,7 @@ class BodySteps(GrainSteps):
             awake.measure()
             for _, own, offset in awake.clusters(np.ones(len(awake.grains), bool)):
                 describe_body(state, awake.grains[own], offset)
-        self.sum_outer_loads(engine)
+        self.sum_loads(engine)
 
     def loads(self, engine: Engine) -> tuple[np.ndarray, np.ndarray]:
         """As `GrainSteps.loads`, with those of the contacts of awake clusters."""
@@ -182,10 +182,6 @@ class BodySteps(GrainSteps):
             self.awake.part, self.quick, self._changed_forces = steps.awake.part, steps.quick, None
             self.awake.part.prototype.workers = workers  # instead of more and more threads
 
-    def sum_loads(self, engine: Engine) -> None:
-        """As `GrainSteps.sum_loads`: clusters at rest stay at rest."""
-        self.sum_outer_loads(engine)
-
     def _set_frictions(self, engine: Engine) -> None:
         """The modes of friction of all clusters at rest."""
         state, gas = engine.regular_state, engine.parameters.gas.gas
@@ -194,8 +190,8 @@ class BodySteps(GrainSteps):
             for first in firsts[(sizes > 1) & (state.bodies.asleep[firsts] == 1)].tolist():
                 set_friction(state, gas, members(state, first))
 
-    def sum_outer_loads(self, engine: Engine) -> None:
-        """Sum the loads of all bodies on each other."""
+    def sum_loads(self, engine: Engine) -> None:
+        """As `GrainSteps.sum_loads`, of all bodies; clusters at rest stay at rest."""
         state = engine.regular_state
         sums = int(state.count[LONG_RANGE_SUMS])
         state.count[PHASE], state.clock[STEP] = 1, 0.0

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...basics.box import nearest_image
 from ...basics.clusters import labels_of
 from ...basics.state import BODIES, CONTACTS, State
 from ...forces.gas_loops import GasParameters
@@ -98,7 +99,7 @@ def describe_body(state: State, index: np.ndarray, offset: np.ndarray) -> None:
     if axes[:, 0] @ _cross(axes[:, 1:2], axes[:, 2:])[:, 0] < 0.0:
         axes[:, 0] *= -1.0
     bodies.mass[first], bodies.inertia[:, first] = m.sum(), principal
-    bodies.centre[:, first] = state.box.wrap((grains.position[:, first] - offset[:, 0])[None])[0]
+    bodies.centre[:, first] = nearest_image(grains.position[:, first] - offset[:, 0], state.box.span)
     bodies.orientation[:, first] = quaternion_of(axes)
     bodies.offset[:, index] = axes.T @ offset
 

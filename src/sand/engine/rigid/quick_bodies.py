@@ -89,7 +89,7 @@ class QuickBodies:
         own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]
         steps: Any = self.part.engine.stepper  # `body_steps.BodySteps`
         steps.awake.sort_members(own)
-        steps.sum_outer_loads(self.part.engine)
+        steps.sum_loads(self.part.engine)
         return steps
 
     def _exclude_loads(self, engine: Engine) -> None:
@@ -102,11 +102,11 @@ class QuickBodies:
         find_slow_rate.run(self.part.engine.table_of(own), (slow[0], slow[2], rate))
         longest = engine.parameters.flight_limits.step_fraction / max(float(rate[0]), LEAST_RATE)
         state.clock[STEP] = min(state.clock[STEP], longest)
-        for name, held in (("force", slow[0]), ("torque", slow[1])):
+        for name, kept in (("force", slow[0]), ("torque", slow[1])):
             acting, excluded = getattr(own.grains.arrays, name), f"excluded_{name}"
             getattr(state.bodies, excluded)[:, index] = acting
-            getattr(own.bodies, excluded)[...] = held
-            acting += held
+            getattr(own.bodies, excluded)[...] = kept
+            acting += kept
 
     def _store(self, engine: Engine) -> None:
         """Give grains, contacts and bodies back, and the loads that acted in the last substep."""

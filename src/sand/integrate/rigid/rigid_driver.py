@@ -192,8 +192,8 @@ def update_lists(s):
 
 
 @caller
-def sum_outer_loads(s, holds_loads):
-    """Sum all loads but those of contacts, over all pairs of grains, at the time of the end of the step."""
+def sum_loads(s, excludes_loads):
+    """Sum all loads on the grains but those of contacts, at the time of the end of the step; add those excluded."""
     for i in range(s.grains.mass.size):
         put(s.grains.force, i, (0.0, 0.0, 0.0))
         put(s.grains.torque, i, (0.0, 0.0, 0.0))
@@ -201,7 +201,7 @@ def sum_outer_loads(s, holds_loads):
     if s.forces.pair > 0:
         sum_pair_forces(s)
         add_long_range_loads(s.grains, s.long_range)
-    if holds_loads:
+    if excludes_loads:
         for i in range(s.grains.mass.size):
             accrue(s.grains.force, i, load(s.bodies.excluded_force, i))
             accrue(s.grains.torque, i, load(s.bodies.excluded_torque, i))
@@ -220,7 +220,7 @@ def awake_grains(bodies):
 def first_half(s, some_awake):
     """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
     s.bodies.quick[:] = 0
-    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
+    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.excludes_loads)
     h, longest = longest_step(s.grains, s.bodies, s.pair_list, s.count, s.span, s.criteria, s.flight_limits, some_awake)
     if not h > 0.0:
         call_stage(s, StageNumber.EXPLAIN, Stop.NOT_FINITE.value)
@@ -260,8 +260,8 @@ def second_half(s, awake, had_substeps):
     stop = update_lists(s)
     if stop != Stop.NONE.value:
         return stop
-    sum_outer_loads(s, s.flight_limits.holds_loads)
-    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
+    sum_loads(s, s.flight_limits.excludes_loads)
+    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.excludes_loads)
     kick_bodies(s.bodies, s.count, 0.5 * s.clock[STEP])
     move_velocities(s.grains, s.bodies, s.count)
     s.bodies.quick[:] = 0
@@ -315,7 +315,7 @@ def advance_bodies(s):
 @stage("the search for touches of bodies")
 def mark_near_bodies(grains, bodies, pair_list, clock, count, span, gas, flight_limits):
     """Mark bodies near others, for a step as long as the last one."""
-    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
+    sum_body_loads(grains, bodies, count, flight_limits.excludes_loads)
     bodies.near[:] = CLEAR
     find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, clock[STEP])
     return 0
