@@ -17,8 +17,7 @@ from ..basics.grains import GrainArrays
 from ..basics.state import BROKEN, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE, SETTLED, State
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
-from ..integrate.column_copies import ColumnCopies, array_pairs, copy_columns
-from ..integrate.part_stages import add_sums_of_part, begin_part
+from ..integrate.part_copies import ColumnCopies, add_sums_of_part, array_pairs, begin_part, copy_columns
 from ..integrate.task_queue import uses_task_queue
 from .changed_state import subset
 from .engine import Engine
@@ -26,9 +25,10 @@ from .new_state import new_state
 
 NOT_COPIED = ("constants", "every_step", "kept", "side", "start", "gather_order")
 CONTACT_COLUMNS = tuple(name for name in ContactArrays._fields if name not in NOT_COPIED)
+"""Arrays of contacts that a part needs and changes; constants only if they are not uniform, the others follow."""
 MOVING = ("position", "velocity", "orientation", "spin", "moment", "image")
 """Arrays of grains that change in a step."""
-BODY_COLUMNS = ("first", *SAVED_BODIES[1:], "decay", "mode")
+BODY_COLUMNS = (*SAVED_BODIES, "decay", "mode")
 """Arrays of bodies that a part with bodies needs and changes."""
 INDICES = ("pair", "first")
 """Those of these arrays that have indices of grains."""
@@ -223,5 +223,5 @@ class Part:
 
 
 def contact_columns(state: State) -> tuple[str, ...]:
-    """Arrays of contacts that a part needs; others follow from them, or serve one step."""
+    """Arrays of contacts that are copied."""
     return CONTACT_COLUMNS if state.uniform_contacts else (*CONTACT_COLUMNS, "constants")

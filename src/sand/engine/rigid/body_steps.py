@@ -34,9 +34,8 @@ from ...compiler.stage import PythonStage, Stage
 from ...compiler.table import Table
 from ...contact.gather import resort_contacts_by_grain
 from ...forces.base import Force
-from ...integrate.column_copies import NO_COPIES, copy_columns
 from ...integrate.hooks import Hook
-from ...integrate.part_stages import add_sums_of_part, begin_part
+from ...integrate.part_copies import NO_COPIES, add_sums_of_part, begin_part, copy_columns
 from ...integrate.parts import Stop
 from ...integrate.rigid.awake_clusters import (
     cluster_measures,
