@@ -20,7 +20,7 @@ from ..compiler.table import Table
 from ..contact.law import ContactLaw
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.pair.long_range_loops import LongRangeSums
-from ..integrate.parts import HEAVY, LAST, PARTS, SCRATCH, SHORTEN, UNTIL, StepParameters, Stop
+from ..integrate.parts import HEAVY, PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.stage_list import ProgramContent, build_program
 from ..integrate.task_queue import (
     SHARED,
@@ -154,9 +154,9 @@ class CompiledState:
     def table_for_call(self, until: float = np.inf, last: float = 1, *, shorten: bool = False) -> Table:
         """The table as for a call of the driver, with all parts that stages take."""
         state, table = self.stored_state, self.table_of(self.stored_state)
-        table.set("queue", self._task_queue(len(state.grains), state.contacts.flag.size))
-        scratch = table["scratch"]
-        scratch[UNTIL], scratch[LAST], scratch[SHORTEN] = until, last, shorten
+        queue = self._task_queue(len(state.grains), state.contacts.flag.size)
+        for name, value in (("queue", queue), ("until", float(until)), ("last", int(last)), ("shorten", shorten)):
+            table.set(name, value)
         return table
 
     def _task_queue(self, grains: int, contacts: int) -> TaskQueue:
@@ -212,9 +212,9 @@ class CompiledState:
             if self.compiles_ahead:
                 self.compiles_ahead = False
                 compile_ahead(self.stages(table), min(cores(), threads()))
-            program = self.program_for(table)  # which the threads take from the table
-            alone = table["scratch"][SHORTEN] and len(state.grains) < ALONE  # threads start later than one step ends
+            alone = table["shorten"] and len(state.grains) < ALONE  # threads start later than one step ends
             loops = len(self.content.pair_forces), int(state.count[CONTACTS])
+            program = self.program_for(table)  # which the threads take from the table
             if workers is not None and not alone and benefits_from_workers(*loops):
                 workers.start(table)
             return Stop(program.run(driver, table))

@@ -270,6 +270,7 @@ class Engine(CompiledState):
 
     def drive(self, until: float, last: float, shorten: bool = False) -> Stop:
         """Take steps up to a time [s] or a step, in the present order of the arrays."""
+        last = min(last, 2**62)
         while True:
             stop = self.stepper.call(self, until, last, shorten)
             if stop is not Stop.CLUSTERS_CHANGED:

@@ -53,7 +53,7 @@ from .force_calls import (
 from .force_stages import ENERGY, WRAPPING
 from .hooks import Hook, call_hook
 from .motion import kick, wrap_all
-from .parts import DRIVER_PARTS, DT, LAST, LIMIT, SHORTEN, SINCE, UNTIL, Stop
+from .parts import DRIVER_PARTS, DT, LIMIT, SINCE, Stop
 from .respa import (
     add_constant_loads,
     add_long_range_loads,
@@ -224,10 +224,10 @@ def first_half(s):
         return stop
     if s.clock[LEFT] == 0.0:
         cycle = dt * cycle_steps(s.clock, s.count, s.respa, dt)
-        if is_past(s.clock[TIME] + cycle, s.scratch[UNTIL]):
-            if s.scratch[SHORTEN] == 0.0:
+        if is_past(s.clock[TIME] + cycle, s.until):
+            if not s.shorten:
                 return Stop.TIME_REACHED.value
-            cycle = s.scratch[UNTIL] - s.clock[TIME]
+            cycle = s.until - s.clock[TIME]
             dt = cycle / max(1, math.ceil(cycle / dt - 1e-6))
         begin_cycle(s, dt, cycle)
     elif s.respa.impulse:  # between two steps of clock[STEP] and dt seconds
@@ -341,9 +341,9 @@ def steps_until(s):
                 # before all other returns, so that no output lies between the step and the new cut-off
                 if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                     return Stop.CLUSTERS_CHANGED.value
-                if has_arrived(s.clock, s.scratch):
+                if has_arrived(s.clock[TIME], s.until, s.shorten):
                     return Stop.TIME_REACHED.value
-                if s.count[STEPS] >= s.scratch[LAST]:
+                if s.count[STEPS] >= s.last:
                     return Stop.NONE.value
             if s.count[CONTACTS] == 0 and s.clock[LEFT] == 0.0 and has_stage(s, StageNumber.FLIGHT):
                 stop = call_stage(s, StageNumber.FLIGHT)

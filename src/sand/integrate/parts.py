@@ -15,26 +15,23 @@ PARTS = (
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
     # data of one call of the driver
-    *("program", "queue", "scratch"),
+    *("program", "queue", "scratch", "until", "last", "shorten"),
 )
 """Names of the parts of a simulation, in the order of the table of addresses; the groups of its components follow."""
 DRIVER_PARTS = (
     *("program", "grains", "pair_list", "long_range", "clock", "count", "lost", "scratch", "span", "search"),
-    *("external_work", "criteria", "forces", "queue"),
+    *("external_work", "criteria", "forces", "queue", "until", "last", "shorten"),
 )
 """Parts that every driver and flight uses."""
 
-# --- indices of the part `scratch` (float64): numbers that one stage of a step, or the caller, leaves for another -----
+# --- indices of the part `scratch` (float64): numbers that one stage of a step leaves for another ---------------------
 DT = 0  # length of the step, or of the kick [s]
 LOAD_TIME = 1  # time at which external forces are evaluated [s]
 EXTERNAL = 2  # energy, power or work of external forces, summed over grains [J, W]
 CYCLE_LENGTH = 3  # length of the cycle for which rates are computed [s]; 0 for a single step
 SINCE = 4  # time since the last sum of the long-range forces [s]
 LIMIT = 5  # longest step that components allow now [s]
-UNTIL = 6  # time [s] up to which the driver takes steps
-LAST = 7  # number of the last step
-SHORTEN = 8  # 1: the last step is shortened to end at UNTIL
-SCRATCH = 9
+SCRATCH = 6
 
 HEAVY = 2.0**30
 """Factor of masses that count as infinite in contact events, whose impulses are read from the changes of velocity."""

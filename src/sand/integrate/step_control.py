@@ -22,14 +22,12 @@ from ..basics.state import (
     STEP,
     STEP_INCREASES,
     STEPS,
-    TIME,
 )
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
 from ..forces.external_formulas import stiffness_of_field
 from ..numerics.simd import float_bits, float_from_bits
 from ..numerics.vec import dot, load, nearest_image, sub
-from .parts import SHORTEN, UNTIL
 
 CHECK_INTERVAL = 16
 """Steps between two evaluations of the criteria while contacts determine the step."""
@@ -263,9 +261,9 @@ def is_close(time, until):
 
 
 @loop
-def has_arrived(clock, scratch):
-    """Whether steps have arrived at scratch[UNTIL], to rounding if a last step is shortened to end there."""
-    return clock[TIME] >= scratch[UNTIL] or (scratch[SHORTEN] == 1.0 and is_close(clock[TIME], scratch[UNTIL]))
+def has_arrived(time, until, shorten):
+    """Whether steps have arrived at `until` [s], to rounding if the last step is shortened to end there."""
+    return time >= until or (shorten and is_close(time, until))
 
 
 @loop

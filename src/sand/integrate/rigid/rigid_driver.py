@@ -38,7 +38,7 @@ from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
 from ..hooks import Hook, call_hook
 from ..motion import wrap_all
-from ..parts import DRIVER_PARTS, LAST, SHORTEN, UNTIL, Stop
+from ..parts import DRIVER_PARTS, Stop
 from ..respa import add_long_range_loads
 from ..stages import StageNumber
 from ..step_control import has_arrived, is_past
@@ -231,11 +231,11 @@ def first_half(s, some_awake):
     if s.flight_limits.substeps:
         shared = choose_shared_step(s, h, longest)
         h, takes_substeps = shared, shared > h
-    if is_past(s.clock[TIME] + h, s.scratch[UNTIL]):
-        if s.scratch[SHORTEN] == 0.0:
+    if is_past(s.clock[TIME] + h, s.until):
+        if not s.shorten:
             s.bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
-        h = s.scratch[UNTIL] - s.clock[TIME]
+        h = s.until - s.clock[TIME]
     s.clock[STEP] = h
     if not takes_substeps:
         find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
@@ -286,9 +286,9 @@ def body_steps_until(s):
         if s.count[PHASE] == 0:
             if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
-            if has_arrived(s.clock, s.scratch):
+            if has_arrived(s.clock[TIME], s.until, s.shorten):
                 return Stop.TIME_REACHED.value
-            if s.count[STEPS] >= s.scratch[LAST]:
+            if s.count[STEPS] >= s.last:
                 return Stop.NONE.value
             stop = first_half(s, awake > 0)
         elif s.count[PHASE] == AFTER_SUBSTEPS:
