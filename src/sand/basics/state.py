@@ -59,13 +59,15 @@ LARGEST_LOAD = 15  # largest change of the loads of the contacts of a cluster at
 LARGEST_OVERLAP = 16  # largest overlap at the end of a step, in radii of the smaller grain
 LARGEST_IMPACT = 17  # largest speed of an impact in units of `contact.impact.impact_share`
 IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
+CHANGED = 19  # time at which a contact last formed or broke [s]
+SLID = 20  # time at which a contact last slipped [s]
 CLOCK = (
     *("time", "step", "level", "contact_limit", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
     *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
-    *("largest_overlap", "largest_impact", "impact_speed"),
+    *("largest_overlap", "largest_impact", "impact_speed", "changed", "slid"),
 )
-EXTREMES, SUMS = (LARGEST_LOAD, LARGEST_OVERLAP), (SOME_AWAKE, CORRECTED)
-"""Entries that are the largest of all parts of the grains, and that add up over parts."""
+EXTREMES, SUMS = (LARGEST_LOAD, LARGEST_OVERLAP, CHANGED, SLID), (SOME_AWAKE, CORRECTED)
+"""Entries that are the largest, or latest, of all parts of the grains, and that add up over parts."""
 LEAST_CLOCK = LARGEST_OVERLAP
 """Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0."""
 

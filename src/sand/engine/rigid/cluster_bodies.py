@@ -105,7 +105,7 @@ def describe_body(state: State, index: np.ndarray, offset: np.ndarray) -> None:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (3, n), faster than `np.cross` for few; in its order of memory, which sums depend on."""
+    """Cross products of vectors (3, n), faster than `np.cross` for few, and in its order of memory, as sums need it."""
     return np.asfortranarray(a[[1, 2, 0]] * b[[2, 0, 1]] - a[[2, 0, 1]] * b[[1, 2, 0]])
 
 
