@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import is_
@@ -39,7 +40,10 @@ MOST_ENGINES = 64
 class Copies(NamedTuple):
     """Copies of grains and their contacts to a part, and back."""
 
-    of: tuple[Any, ...]  # the groups of arrays, the grains, and the columns of contacts
+    arrays: tuple[
+        weakref.ref[np.ndarray], ...
+    ]  # the first and the last array of each group, of all grains and the part
+    of: tuple[np.ndarray, np.ndarray]  # the grains, and the columns of contacts
     take: ColumnCopies
     give: ColumnCopies
 
@@ -69,8 +73,8 @@ class Part:
     index: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))
     columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))
     _engines: dict[int, Engine] = field(init=False, default_factory=dict)
-    _pairs: dict[Any, Any] = field(init=False, default_factory=dict)  # pairs of arrays, by the groups that have them
-    _moved: tuple[Any, Any] = field(init=False, default=(None, None))  # contacts, and pairs of each array with itself
+    _pairs: dict[int, Any] = field(init=False, default_factory=dict)  # of arrays that are copied, by number of grains
+    _moved: tuple[Any, Any] = field(init=False, default=((), None))  # contacts, and pairs of each array with itself
     _copies: Copies | None = field(init=False, default=None)
     _start: np.ndarray = field(init=False, default_factory=lambda: np.zeros(4))  # numbers of `begin_part`
     _numbers: np.ndarray = field(init=False, default_factory=lambda: np.zeros(2))  # and of `add_sums_of_part`
@@ -178,17 +182,19 @@ class Part:
     def _copies_of(self, state: State, own: State) -> Copies:
         """What copies the grains and contacts to the part, and back."""
         groups = state.grains.arrays, state.contacts, state.bodies, own.grains.arrays, own.contacts, own.bodies
-        of = *groups, self.index, self.columns
-        if self._copies is None or not all(map(is_, of, self._copies.of)):
-            key, here = tuple(map(id, groups)), np.arange(len(self.index))
-            if key not in self._pairs:
-                self._pairs[key] = groups, *map(np.array, self._array_pairs(state, own))
-            _, taken, given = self._pairs[key]
-            number, contacts = np.zeros(len(state.grains), np.int64), np.arange(len(self.columns))
+        arrays = [array for group in groups for array in (group[0], group[-1])]
+        of = self.index, self.columns
+        if self._copies is None or not (all(map(is_, of, self._copies.of)) and are_those(arrays, self._copies.arrays)):
+            here, contacts = np.arange(len(self.index)), np.arange(len(self.columns))
+            known, taken, given = self._pairs.get(len(here), ((), None, None))
+            if not are_those(arrays, known):
+                known, (taken, given) = references(arrays), map(np.array, self._array_pairs(state, own))
+                self._pairs[len(here)] = known, taken, given
+            number = np.zeros(len(state.grains), np.int64)
             number[self.index] = here
             there, of_contacts = np.array([self.index, here]), np.array([self.columns, contacts])
             give = ColumnCopies(given, there[::-1].copy(), of_contacts[::-1].copy(), self.index)
-            self._copies = Copies(of, ColumnCopies(taken, there, of_contacts, number), give)
+            self._copies = Copies(known, of, ColumnCopies(taken, there, of_contacts, number), give)
         return self._copies
 
     def _array_pairs(self, state: State, own: State) -> tuple[list[list[int]], list[list[int]]]:
@@ -212,14 +218,24 @@ class Part:
         if state.contacts.pair.shape[1] < end:
             state.grow("contacts", end)
         if first > 0 and kept[-1] >= first:
-            if self._moved[0] is not state.contacts:
+            if not are_those([state.contacts.pair], self._moved[0]):
                 pairs = array_pairs(state.contacts, state.contacts, contact_columns(state))
-                self._moved = state.contacts, np.array([*pairs])
+                self._moved = references([state.contacts.pair]), np.array([*pairs])
             columns = np.array([kept, np.arange(first)])
             copy_columns.run(table, ColumnCopies(self._moved[1], columns, columns, kept))
         state.count[CONTACTS] = end
         state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
         return np.arange(first, end)
+
+
+def references(arrays: Sequence[np.ndarray]) -> tuple[weakref.ref[np.ndarray], ...]:
+    """Weak references: the memory of a state that is no longer used is free."""
+    return tuple(map(weakref.ref, arrays))
+
+
+def are_those(arrays: Sequence[np.ndarray], known: Sequence[weakref.ref[np.ndarray]]) -> bool:
+    """Whether references are to these arrays."""
+    return len(known) == len(arrays) and all(each() is array for each, array in zip(known, arrays, strict=True))
 
 
 def contact_columns(state: State) -> tuple[str, ...]:

@@ -113,7 +113,7 @@ class AwakeSteps:
             for force in engine.external:
                 state.lost[OUTSIDE] += external_energy(inner, force, end) - external_energy(inner, force, before)
         self.far.begin(state, self.part)
-        pieces = math.ceil(SAMPLES * float(state.clock[STEP]) / limits_of(engine).longest_awake)
+        pieces = max(math.ceil(SAMPLES * float(state.clock[STEP]) / limits_of(engine).longest_awake), 1)
         for k in range(1, pieces + 1):
             # vibrations at the end of the last piece are measured after the kick by the far loads, in `finish`
             stop = inner.drive(before + (end - before) * k / pieces if k < pieces else end, math.inf, shorten=True)
