@@ -80,7 +80,7 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
 
     @rare
     def update_flagged_contacts(grains, contacts, pair_list, count, lost, step):
-        """Break or slip the flagged contacts, one by one, in a step (`update.ContactStep`).
+        """Break or slip the flagged contacts, one by one, in a step (`update.PresentStep`).
 
         Returns
         -------
@@ -231,7 +231,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
 
     @rare
     def form_contacts(grains, contacts, pair_list, count, lost, clock, step):
-        """Form the contacts of pairs that began to touch within the step (`update.ContactStep`)."""
+        """Form the contacts of pairs that began to touch within the step (`update.PresentStep`)."""
         for p in range(count[PAIRS]):
             i, j = pair_list.pair[0, p], pair_list.pair[1, p]
             separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), step.span)
