@@ -17,7 +17,7 @@ from .sources import SOURCES, UNIT_TESTS, identifiers, nodes_of, text_of
 CAPABILITIES = {
     "rigid clusters with walls, driven grains and ramps, settling with driven grains": 242,
     "loops over contacts by what they did in the last step, with displacements that these keep": 198,
-    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 0,
+    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 1200,
     "end of a collision when its outcome is decided": 220,
     "presets of papers": 160,
 }

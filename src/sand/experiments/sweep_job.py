@@ -405,14 +405,14 @@ class _Table:
         """Write the table of all runs that have ended: those of the design in its order, then earlier ones."""
         began = time.monotonic()
         place, known = self._place, self.known
-        keys = dict.fromkeys(key for cells in known.values() for key in cells["keys"])
+        keys = [*self.job.keys, *sorted({key for cells in known.values() for key in cells["keys"]} - {*self.job.keys})]
         order = sorted(known, key=lambda name: (place.get(name, len(place)), str(known[name]["values"]), name))
         rows = []
         for name in order:
             cells = dict(known[name])
             values = cells.pop("values")
             del cells["keys"]
-            rows.append({key: values.get(key) for key in [*self.job.keys, *keys]} | cells)
+            rows.append({key: values.get(key) for key in keys} | cells)
         write_sweep(self.job.folder, rows, self.job.parquet)
         self._written = time.monotonic()
         self._took = self._written - began
