@@ -100,7 +100,7 @@ def test_info_refuses_what_collide_refuses(tmp_path, monkeypatch, capsys, old, n
     assert len(list(tmp_path.iterdir())) == 1
 
 
-@pytest.mark.parametrize("given", ['"0"', "0", '"0 nm"', '"0.5 b"', '"10 nm"', '"0b"'])
+@pytest.mark.parametrize("given", ['"0"', "0", '"0 nm"', '"0.5 b"', '"10 nm"', '"0b"', '"0.5 c"'])
 def test_impact_parameters(tmp_path, capsys, given):
     """A length, or a fraction of the sum of radii; 0 needs no unit."""
     (tmp_path / "a.toml").write_text(COLLIDE.replace('"2 m/s"', f'"2 m/s"\nimpact_parameter = {given}'))

@@ -38,6 +38,12 @@ def test_two_grains_stick_or_bounce():
     assert fast.impact_energy == pytest.approx(4 * numbers.cycle_energy, rel=1e-3, abs=0.0)
     assert (fast.made, fast.broken, fast.contacts_before, fast.contacts_after) == (1, 1, 0, 0)
     assert fast.quiet
+    assert (slow.kind, slow.growth_efficiency, slow.second_remnant) == ("sticking", 1.0, 0.0)
+    assert (fast.kind, fast.growth_efficiency, fast.second_remnant) == ("bouncing", 0.0, 0.5)
+    assert fast.break_energy == pytest.approx(numbers.break_energy, rel=1e-6, abs=0.0)
+    assert fast.roll_energy == pytest.approx(numbers.roll_energy_clamped, rel=1e-6, abs=0.0)
+    assert (fast.reach, fast.grains_before) == (pytest.approx(2.0 * R, rel=1e-9, abs=0.0), (1, 1))
+    assert (fast.filling_before, slow.coordination_before, slow.coordination_after) == ((1.0, 1.0), (0.0, 0.0), 1.0)
 
 
 @pytest.mark.compiled("contacts")
@@ -50,6 +56,9 @@ def test_a_fast_grain_breaks_a_chain():
     assert sum(result.fragments) == 8
     assert result.contacts_before == 6
     assert result.gyration_before[1] == 0.0
+    assert result.kind == "fragmentation" and result.coordination_before == (12 / 7, 0.0)
+    assert result.growth_efficiency == pytest.approx(max(result.fragments) - 7, abs=1e-9)
+    assert result.second_remnant == pytest.approx(sorted(result.fragments)[-2] / 8, rel=1e-9, abs=0.0)
     chain_gyration = np.sqrt((sim.start.position[:7, 0] ** 2).mean())
     assert result.gyration_before[0] == pytest.approx(chain_gyration, rel=1e-6, abs=0.0)
 

@@ -341,7 +341,7 @@ def test_a_job_keeps_what_is_finished(workdir):
     with pytest.raises(sand.BadInput, match="exists and is not empty"):
         Squares(path).run()
     again = Squares(folder / "case.toml", folder, resume=True)
-    assert again.run() == (found := {"squares": [18, 2, 8, 18]})
+    assert again.run() == (found := {"squares": [18, 2, 8, 18], "sand": sand.__version__})
     assert json.loads((folder / "squares.json").read_text()) == found
     assert job.computed == (3, 1) and again.computed == (2,)
     assert {one.name for one in folder.iterdir()} == {"case.toml", "squares.json", LOCK}

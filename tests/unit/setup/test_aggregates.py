@@ -1,9 +1,12 @@
 """Aggregates and encounters: contacts in equilibrium, no overlaps, the requested offset."""
 
+import math
+
 import numpy as np
 import pytest
 
 import sand
+from sand.analysis.shape import gyration_radius
 from sand.setup import bpca, chain, encounter, grain, lattice, turned_at_random
 from sand.setup.aggregates import rest_distance
 
@@ -56,9 +59,9 @@ def test_built_aggregates_are_at_rest():
 
 
 @pytest.mark.compiled("small")
-@pytest.mark.parametrize("b", ["0 b", "0.5 b", "0.9 b"])
+@pytest.mark.parametrize("b", ["0 b", "0.5 b", "0.9 b", "0.9 c"])
 def test_an_encounter(b):
-    """Centre of mass at rest, requested relative speed and offset, no contact at the start; then they collide."""
+    """Centre of mass at rest, requested speed and offset, no contact at the start; then they collide."""
     target, projectile = bpca(20, radius=R, material=M, seed=1), bpca(10, radius=R, material=M, seed=2)
     collided = encounter(target, projectile, speed="5 m/s", impact_parameter=b)
     g, n = collided.grains, collided.target
@@ -68,7 +71,11 @@ def test_an_encounter(b):
     assert g.velocity[n:].mean(axis=0) - g.velocity[:n].mean(axis=0) == pytest.approx([5.0, 0, 0], rel=1e-6, abs=0.0)
     gap = np.linalg.norm(g.position[:n, None] - g.position[None, n:], axis=-1) - 2 * R
     assert gap.min() >= 0.5 * R * (1 - 1e-9)
-    reach = sum(np.linalg.norm(x.position - x.position.mean(axis=0), axis=1).max() + R for x in (target, projectile))
+    bodies = (target, projectile)
+    if b.endswith("b"):
+        reach = sum(np.linalg.norm(x.position - x.position.mean(axis=0), axis=1).max() + R for x in bodies)
+    else:  # √(5/3) r_g, which is the radius of a homogeneous sphere
+        reach = sum(math.sqrt(5.0 / 3.0) * gyration_radius(x.position, x.mass, R) for x in bodies)
     offset = g.position[n:].mean(axis=0) - g.position[:n].mean(axis=0)
     assert offset[1] == pytest.approx(float(b[:-2]) * reach, abs=1e-15)
     assert offset[2] == pytest.approx(0.0, abs=1e-15)
