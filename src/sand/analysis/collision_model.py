@@ -16,6 +16,7 @@ import numpy as np
 from ..basics.arguments import checked
 from ..basics.errors import BadInput, did_you_mean
 from ..basics.units import si
+from .collision_kinds import growth_efficiency
 
 
 class Collisions(NamedTuple):
@@ -31,8 +32,8 @@ class Collisions(NamedTuple):
     @property
     def growth(self) -> np.ndarray:
         """Growth efficiency f (K,)."""
-        largest = np.array([one[0] for one in self.fragments])
-        return np.asarray((largest - self.target) / self.projectile)
+        bodies = zip(self.target, self.projectile, self.fragments, strict=True)
+        return np.array([growth_efficiency(first, second, one[0]) for first, second, one in bodies])
 
     @property
     def mass_ratio(self) -> np.ndarray:
@@ -85,7 +86,7 @@ def collisions(
         Names of the columns: relative speed [m/s], or text with a unit; numbers of grains of the bodies, which may be
         one number for all rows instead; numbers of grains of all fragments, a list or text such as "493 5 2".
     filling, weight : str, optional
-        Names of the columns of filling factors and weights, if there are such columns.
+        Names of the columns of filling factors and of weights, such as those of `impact_average.impact_weights`.
 
     Raises
     ------

@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
-from ..basics.material import PRESETS
 from ..config.commands import command_for
 from ..io import run_folder as files
 from . import options, parsing, report
@@ -100,6 +99,7 @@ def _software(results: dict[str, Any]) -> str:
 
 def _common(case: Any, names: Iterable[str], results: dict[str, Any], forces: Any) -> Sentences:
     """Materials of these names, forces and integrator of a case."""
+    from ..basics.material import PRESETS
     from .method_text import of_forces, of_materials, of_steps
 
     library = {**PRESETS, **{name: table.build(name) for name, table in case.materials.items()}}

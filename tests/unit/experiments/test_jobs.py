@@ -431,7 +431,13 @@ def test_a_stream_without_a_reader():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "redirect", "code"),
-    [("info box.toml", ">/dev/full", 2), ("info box.toml", "2>&-", 0), ("info nowhere", "2>/dev/full", 2)],
+    [
+        ("cite", ">/dev/full", 2),
+        ("cite", "2>&-", 0),
+        ("info nowhere", "2>/dev/full", 2),
+        pytest.param("info box.toml", ">/dev/full", 2, marks=pytest.mark.validate),
+        pytest.param("info box.toml", "2>&-", 0, marks=pytest.mark.validate),
+    ],
 )
 def test_full_and_closed_streams(workdir, words, redirect, code):
     """Lost results are an error of files, lost messages are not; no internal error."""

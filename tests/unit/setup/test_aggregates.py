@@ -7,7 +7,7 @@ import pytest
 
 import sand
 from sand.analysis.shape import gyration_radius
-from sand.setup import bpca, chain, encounter, grain, lattice, turned_at_random
+from sand.setup import bpca, chain, encounter, lattice, turned_at_random
 from sand.setup.aggregates import rest_distance
 
 R, M = 3e-7, sand.SILICA
@@ -90,29 +90,3 @@ def test_rotation_preserves_the_body():
     axis = (one.position[1] - one.position[0]) / np.linalg.norm(one.position[1] - one.position[0])
     assert one.moment[0] / body.mass[0] == pytest.approx(axis, rel=1e-6, abs=0.0)
     assert (one.position == two.position).all()
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: chain(0, radius=R, material=M), "grains of a chain = 0 must be .* at least 1"),
-        (lambda: chain(3, radius=-1.0, material=M), "radius = -1.0 must be above 0"),
-        (lambda: lattice(2, 0, radius=R, material=M), "side of a lattice = 0"),
-        (lambda: bpca(2.5, radius=R, material=M), "grains = 2.5 must be a whole number"),
-        (lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=0.0), "speed = 0.0"),
-        (
-            lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=1.0, along="w"),
-            "along = 'w'",
-        ),
-        (
-            lambda: encounter(
-                grain(radius=R, material=M), grain(radius=R, material=M), speed=1.0, impact_parameter="-1 m"
-            ),
-            "impact_parameter = '-1 m'",
-        ),
-    ],
-)
-def test_bad_input(build, message):
-    """One line each."""
-    with pytest.raises(sand.BadInput, match=message):
-        build()
