@@ -79,7 +79,7 @@ def compare_mass_ratios(rows: Sequence[Row]) -> list[Compared]:
     compared, values = [], []
     for name, some in grouped(rows, "bodies").items():
         found = averaged(some).falls_below(0.0)
-        verdict = found.verdict(paper, EQUAL_MASSES)
+        verdict = found.verdict(paper, EQUAL_MASSES if some[0]["mass_ratio"] == 1.0 else "no reason is known")
         compared.append(Compared(f"critical speed of {name}", stated, found.text("m/s"), verdict))
         values += [found.value] if math.isfinite(found.value) else []
     if len(values) > 1:

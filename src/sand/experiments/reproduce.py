@@ -163,7 +163,7 @@ class Reproduction(SweepJob):
             columns = [[float(text) for text in str(cells[name]).split()] for name in ("largest", *MEASURED)]
             return [shared | _sizes(n, radius, *several) for n, *several in zip(columns[0], *columns[1:], strict=True)]
         target, projectile = case.target.grains, case.projectile.grains
-        growth = {"bodies": f"{target} + {projectile} grains"}
+        growth = {"bodies": f"{target} + {projectile} grains", "mass_ratio": target / projectile}
         growth["growth_efficiency"] = (cells["largest"] - target) / projectile
         sizes = _sizes(
             target + projectile,

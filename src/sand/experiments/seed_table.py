@@ -51,6 +51,8 @@ class SeedTable(NamedTuple):
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest value of the seeds, (V,) each."""
+        if not self.of_seeds.size:
+            return self.mean, self.mean
         return np.fmin.reduce(self.of_seeds, axis=0), np.fmax.reduce(self.of_seeds, axis=0)
 
     def falls_below(self, level: float) -> Interval:

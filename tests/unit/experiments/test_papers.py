@@ -14,10 +14,17 @@ from sand.cli.main import main
 from sand.experiments import reproduce
 from sand.experiments.paper_chain import compare_chain
 from sand.experiments.paper_compression import compare_compression
-from sand.experiments.paper_growth import averaged, break_up_speed, compare_mass_ratios, compare_parameter
+from sand.experiments.paper_growth import (
+    averaged,
+    break_up_speed,
+    compare_mass_ratios,
+    compare_parameter,
+    mass_ratio_panels,
+)
 from sand.experiments.reproduce import FIGURES, Reproduction, papers_folder
 from sand.experiments.seed_table import Interval, falls_below, seed_table
 from sand.experiments.sequential import collide_in_sequence
+from sand.plotting.papers import panels_figure
 from sand.setup import bpca, grain
 from sand.theory import contact
 
@@ -71,7 +78,7 @@ def growth_rows(zero, **extra):
     found = [
         {"seed": s, "speed": v, "offset": b, "growth_efficiency": (1 + b * b) * math.log(zero / v)} for s, v, b in runs
     ]
-    return [SAME | {"grain_mass": MASS} | row | extra for row in found]
+    return [SAME | {"grain_mass": MASS, "mass_ratio": 1.0} | row | extra for row in found]
 
 
 def test_the_break_up_speed_of_ice():
@@ -84,6 +91,14 @@ def test_runs_that_are_missing_are_left_out():
     rows = growth_rows(50.0)
     table = averaged([row for row in rows if (row["seed"], row["speed"], row["offset"]) != (1, 10.0, OFFSETS[2])])
     assert math.isnan(table.of_seeds[0, 0]) and table.mean[0] == pytest.approx(1.5 * math.log(5.0), rel=1e-12, abs=0.0)
+
+
+def test_a_campaign_that_has_just_begun():
+    """One run, of one of six impact parameters: no average, no critical speed; the figure is drawn all the same."""
+    rows = growth_rows(50.0, bodies="500 + 500")[:1]
+    assert compare_mass_ratios(rows)[0].ours == "outside the range of the campaign"
+    assert [len(curve.x) for panel in mass_ratio_panels(rows) for curve in panel.curves] == [0, 1]
+    panels_figure(mass_ratio_panels(rows), "title")
 
 
 def test_mass_ratios_are_compared():
