@@ -200,14 +200,14 @@ class Centre(NamedTuple):
 def append_range(long_range, sorted_position, span, folded, centre, cells, used):
     """Append the sorted indices of the neighbours of a `Centre` in a range of cells; returns the new length, or FULL.
 
-    Squared distances are computed first, in a loop that vectorises.  Then each index is written, and the length is
-    increased if the pair is close enough: without branches.  Separations of i and j have equal magnitudes to the last
-    bit, because sums of coordinates and box lengths are exact; so both rows contain the pair or neither.
+    Whether pairs are close is computed first, as integers, in a loop that vectorises.  Then each index is written, and
+    the length is increased by that integer: without branches.  Separations of i and j have equal magnitudes to the last
+    bit, because sums of coordinates and box lengths are exact: both rows contain the pair, or neither.
     """
     s, own_position, limit = centre
     first, last = np.uint64(long_range.cell_start[cells[0]]), np.uint64(long_range.cell_start[cells[1]])
     length = last - first
-    if used + np.int64(length) + SIMD_WIDTH > long_range.neighbour.size:  # whole SIMD vectors are read
+    if used + np.int64(length) + SIMD_WIDTH > long_range.neighbour.size:  # one entry more than neighbours is written
         return FULL
     padded = min(round_up_to_simd_width(length, np.uint64(1)), np.uint64(long_range.order.size) - first)
     if folded:
@@ -306,13 +306,11 @@ def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
     for dz in range(-1, 2):
         tz, shift_z = neighbour_on_axis(cz, dz, nz, grid.periods[2])
         gap_z = gap_on_axis(x[2], cz, dz, grid.width_z)
-        if tz < 0:
-            continue
         for dy in range(-1, 2):
             ty, shift_y = neighbour_on_axis(cy, dy, ny, grid.periods[1])
             gap_y = gap_on_axis(x[1], cy, dy, grid.width_y)
             squared_half_width = squared_reach - gap_y * gap_y - gap_z * gap_z
-            if ty >= 0 and squared_half_width > 0.0:
+            if ty >= 0 and tz >= 0 and squared_half_width > 0.0:
                 row = CellRow(x[0], (tz * ny + ty) * nx, squared_half_width)
                 shifted = position[0], position[1] - shift_y, position[2] - shift_z
                 centre = Centre(np.uint64(s), shifted, reach * reach)
