@@ -41,7 +41,7 @@ def keys_of(model: Any) -> list[tuple[str, str, str]]:
 
 
 class Records(SphinxDirective):
-    """`records:: NAME`: a table of the fields of a pydantic model, or of a tuple or dict of records."""
+    """`records:: NAME`: a table of the fields of a pydantic model, of records in a tuple or dict, or returned."""
 
     required_arguments = 1
 
@@ -51,6 +51,7 @@ class Records(SphinxDirective):
         if isinstance(thing, type):
             heads, rows = ["key", "default", "meaning"], keys_of(thing)
         else:
+            thing = thing() if callable(thing) else thing
             records = list(thing.values()) if isinstance(thing, dict) else list(thing)
             first = records[0]
             heads = first._fields if isinstance(first, tuple) else [field.name for field in dataclasses.fields(first)]

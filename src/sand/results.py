@@ -23,6 +23,7 @@ from .io import run_folder as files
 from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
+from .io.sweep_files import DONE, LAST, RUNS, STATE, read_sweep
 from .io.trajectory import Frame, Frames
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -66,6 +67,8 @@ class Run:
                 raise BadInput(f"{folder} holds a job of sand scatter, which keeps no trajectories of grains")
             if any(self.folder.glob("seed-*")):
                 raise BadInput(f"{folder} holds the boxes of sand grow; give the folder of one of them, such as seed-1")
+            if (self.folder / RUNS).is_dir():
+                raise BadInput(f"{folder} holds a sweep, none of whose runs has ended")
             if (self.folder / files.CASE).exists():
                 raise BadInput(f"{folder} has no {files.TRAJECTORY} yet; wait until its run has written a frame")
             raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")
@@ -293,6 +296,74 @@ class Runs(Sequence[Run]):
         return "\n".join([f"<{len(self)} runs>", *(line.rstrip() for line in lines)])
 
 
+SHOWN = ("growth_efficiency", "largest_remnant", "sigma", "mean_cluster_size")
+"""Columns of results, the first of which in the table of a sweep is drawn if none is asked for."""
+
+
+@checked
+class Sweep:
+    """The results of a sweep, as returned by `sand.open(DIR)`: one table with a row for each run that has ended.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the sweep.
+
+    Raises
+    ------
+    BadInput
+        If it does not hold the table of a sweep.
+    """
+
+    def __init__(self, folder: str | Path):
+        self.folder = user_path(folder)
+        if not (self.folder / files.SWEEP_CSV).exists():
+            raise BadInput(f"{folder} is not the folder of a sweep, or none of its runs has ended")
+
+    @cached_property
+    def table(self) -> Columns:
+        """Columns by name, (K,): keys, seed, state, results, message, seconds, cpu_seconds, version, run.
+
+        Empty cells are NaN in columns of numbers.  Raises BadInput.
+        """
+        return Columns(read_sweep(self.folder))
+
+    @property
+    def keys(self) -> list[str]:
+        """The keys that change: the columns before `seed`."""
+        return list(self.table)[: list(self.table).index("seed")]
+
+    @property
+    def results(self) -> list[str]:
+        """The columns of results: those after `state`, but for message, cost, version and name."""
+        names = list(self.table)
+        return [name for name in names[names.index(STATE) + 1 :] if name not in LAST]
+
+    @property
+    def shown(self) -> list[str]:
+        """The columns that `sand plot` draws: the outcome, and the most telling result."""
+        telling = [name for name in SHOWN if name in self.table]
+        return [name for name in ("outcome", *telling[:1]) if name in self.table]
+
+    @property
+    def done(self) -> Columns:
+        """The rows of runs that are done."""
+        chosen = self.table[STATE] == DONE
+        return Columns({name: column[chosen] for name, column in self.table.items()})
+
+    @checked
+    def run(self, row: int) -> Run:
+        """The run of a row of the table.  Raises BadInput if the sweep keeps no files of its runs."""
+        return Run(self.folder / RUNS / str(self.table["run"][row]))
+
+    def to_pandas(self) -> Any:
+        """Convert the table to a pandas DataFrame; needs pandas."""
+        return self.table.to_pandas()
+
+    def __repr__(self) -> str:
+        return f"<sweep in {self.folder}: {len(self.table['seed'])} runs over {', '.join(self.keys)}>"
+
+
 def _cell(name: str, value: Any) -> str:
     if name == "time":
         return format_quantity(float(value), "s")
@@ -310,7 +381,7 @@ def _summary_row(run: Run) -> dict[str, Any]:
 
 
 @overload
-def open(folder: Path) -> Run: ...
+def open(folder: Path) -> Any: ...
 @overload
 def open(folder: str) -> Any: ...
 @overload
@@ -321,7 +392,7 @@ def open(folder: Sequence[str | Path]) -> Runs: ...
 
 @checked
 def open(folder: Any, *others: Any) -> Any:
-    """Open the results of the run in a folder, or of several runs.
+    """Open the results of the run in a folder, of several runs, or of a sweep.
 
     Parameters
     ----------
@@ -332,8 +403,8 @@ def open(folder: Any, *others: Any) -> Any:
 
     Returns
     -------
-    Run or Runs
-        `Run` for one folder, `Runs` for several folders, a list or a pattern.
+    Run or Runs or Sweep
+        `Run` for one folder, `Runs` for several folders, a list or a pattern, `Sweep` for the folder of a sweep.
 
     Raises
     ------
@@ -354,7 +425,10 @@ def open(folder: Any, *others: Any) -> Any:
             folders += sorted(found, key=lambda name: _natural(str(name)))
         else:
             folders.append(one)
-    return Runs(folders) if several else Run(folders[0])
+    if several:
+        return Runs(folders)
+    is_sweep = (Path(folders[0]) / files.SWEEP_CSV).exists()
+    return Sweep(folders[0]) if is_sweep else Run(folders[0])
 
 
 def _natural(name: str) -> list[tuple[int, str]]:

@@ -58,8 +58,14 @@ def units_of(thing: Any) -> dict[str, str]:
 
 def documented_units(thing: Any) -> dict[str, str]:
     """Units in the docstring of a class or function, by parameter; those without a unit are missing."""
-    found = {name: _UNIT.search(text) for name, text in parameter_docs(thing).items()}
-    return {name: match[1].replace("²", "^2").replace("³", "^3") for name, match in found.items() if match}
+    found = {name: documented_unit(text) for name, text in parameter_docs(thing).items()}
+    return {name: unit for name, unit in found.items() if unit}
+
+
+def documented_unit(text: str) -> str:
+    """The unit in the description of a parameter; empty if there is none."""
+    match = _UNIT.search(text)
+    return match[1].replace("²", "^2").replace("³", "^3") if match else ""
 
 
 def changed_arguments(thing: Any) -> dict[str, Any]:

@@ -124,11 +124,13 @@ def first_problems(problems: Sequence[str], total: int, kind: str) -> list[str]:
     return [*problems, *([f"… and {rest} more {kind}"] if rest > 0 else [])]
 
 
-def did_you_mean(word: str, allowed: Sequence[str]) -> str:
-    """Advice for a misspelt word: the nearest allowed one, or the list of all."""
+def did_you_mean(word: str, allowed: Sequence[str], most: int = 1) -> str:
+    """Advice for a misspelt word: at most this many of the nearest allowed ones, or the list of all."""
     names = [str(name) for name in allowed]  # keys of the user's dictionary may be anything
-    near = difflib.get_close_matches(word[:LONGEST], names, n=1)
-    return f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(names)}"
+    near = difflib.get_close_matches(word[:LONGEST], names, n=most)
+    quoted = [f"'{name}'" for name in near]
+    choice = " or ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
+    return f"did you mean {choice}?" if near else f"allowed: {', '.join(names)}"
 
 
 def shown(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from .arguments import checked
 from .errors import BadInput, did_you_mean, shown
@@ -85,6 +85,25 @@ class Material(Settings):
                 raise BadInput(f"a material has no '{key}'; {did_you_mean(key, known)}")
         return dataclasses.replace(self, **changes)
 
+    @classmethod
+    @checked
+    def like(cls, preset: str, **changes: Any) -> Material:
+        """Return the material of a preset, with some values changed.
+
+        Parameters
+        ----------
+        preset : str
+            Name of a preset, such as "iron" or "ice (Wada et al. 2013)"; case is ignored.
+        changes
+            Arguments of `Material` that differ from the preset, such as `name` and `surface_energy`.
+
+        Raises
+        ------
+        BadInput
+            If there is no such preset, or no such argument.
+        """
+        return material_named(preset).but(**changes)
+
 
 # Sources: DT97 = Dominik & Tielens 1997; Wada et al. 2007; the paper = Dominik & Nübold 2002.
 ICE = Material("ice", 1000.0, 0.10, 7.0e9, 0.25, rolling_limit=8e-10)
@@ -102,22 +121,117 @@ MAGNETITE = Material("magnetite", 5200.0, None, 230.0e9, 0.26, "10 angstrom", 92
 """Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`. K₁ (cubic) and A
 at room temperature are recalled from the literature, as for iron."""
 
-PRESETS = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
-PRESETS["quartz"] = SILICA.but(name="quartz")
+COMMON = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
+COMMON["quartz"] = SILICA.but(name="quartz")
+
+
+class PaperPreset(NamedTuple):
+    """The material of a paper, and what the paper changed in the contact model.
+
+    The numbers were recalled, not read in the paper, where `read` does not say otherwise.
+    """
+
+    material: Material  # its name is that of the preset
+    radius: float  # of the grains [m]
+    contact: dict[str, Any]  # settings of `sand.Contact` that are not the default
+    source: str
+    read: str  # what was read of the source or of another one
+
+
+_MEMORY = "from memory"
+_ABSTRACT = "abstract; numbers from memory"
+_ICE, _SILICA = (0.1, 7.0e9, 0.25), (0.025, 54.0e9, 0.17)  # γ [J/m²], E [Pa], ν
+
+
+def _paper(
+    name: str,
+    density: float,
+    solid: tuple[float, float, float],
+    rolling_limit: float,
+    source: str,
+    read: str = _MEMORY,
+    *,
+    radius: float = 1e-7,
+    **contact: Any,
+) -> PaperPreset:
+    """A preset; density ρ [kg/m³], γ, E and ν, ξ_c [m], radius [m]."""
+    return PaperPreset(Material(name, density, *solid, rolling_limit), radius, contact, source, read)
+
+
+_DT97, _W07, _W08 = "ApJ 480, 647", "ApJ 661, 320, doi:10.1086/514332", "ApJ 677, 1296"
+_W09, _W13, _K13 = "ApJ 702, 1490", "A&A 559, A62", "A&A 554, A4"
+_S12, _T19 = "A&A 541, A59, arXiv:1203.3630", "ApJ 874, 159, arXiv:1902.08356"
+_T23, _A22 = "ApJ 953, 6, arXiv:2306.09259", "ApJ 939, 100, arXiv:2210.00913"
+_PROGRAM = "abstract; material: default of the public program of the first author; factors from memory"
+PAPERS = (
+    _paper("ice (Dominik & Tielens 1997)", 1000.0, (0.37, 7.0e9, 0.25), 2e-10, _DT97, stiffness="dt97"),
+    _paper("quartz (Dominik & Tielens 1997)", 2600.0, _SILICA, 2e-10, _DT97, stiffness="dt97"),
+    _paper("ice (Wada et al. 2007)", 1000.0, _ICE, 2e-10, _W07, _ABSTRACT),
+    _paper("quartz (Wada et al. 2007)", 2600.0, _SILICA, 2e-10, _W07, _ABSTRACT),
+    _paper("ice (Wada et al. 2008)", 1000.0, _ICE, 8e-10, _W08),
+    _paper("ice (Wada et al. 2009)", 1000.0, _ICE, 8e-10, _W09),
+    _paper("silica (Wada et al. 2009)", 2600.0, _SILICA, 20e-10, _W09),
+    _paper(
+        "silica (Seizinger et al. 2012)",
+        2650.0,
+        _SILICA,
+        20e-10,
+        _S12,
+        _PROGRAM,
+        radius=6e-7,
+        roll_factor=8.0,
+        slide_factor=2.5,
+    ),
+    _paper("ice (Wada et al. 2013)", 1000.0, _ICE, 8e-10, _W13),
+    _paper("silica (Wada et al. 2013)", 2600.0, _SILICA, 20e-10, _W13),
+    _paper("ice (Kataoka et al. 2013)", 1000.0, _ICE, 8e-10, _K13, _ABSTRACT),
+    _paper("ice (Tatsuuma et al. 2019)", 1000.0, _ICE, 8e-10, _T19, _ABSTRACT),
+    _paper("silicate (Tatsuuma et al. 2019)", 2650.0, (0.02, 54.0e9, 0.17), 20e-10, _T19, _ABSTRACT),
+    _paper("ice (Arakawa et al. 2022)", 1000.0, _ICE, 8e-10, _A22, _ABSTRACT),
+    _paper("ice (Tatsuuma et al. 2023)", 1000.0, _ICE, 8e-10, _T23, _ABSTRACT),
+    _paper("silicate (Tatsuuma et al. 2023)", 2650.0, (0.02, 54.0e9, 0.17), 20e-10, _T23, _ABSTRACT),
+)
+"""Materials of papers; the table with E_roll and E_break is `sand.theory.paper_table`."""
+PRESETS = COMMON | {p.material.name: p.material for p in PAPERS}
+NEAREST = 3
+"""Names that a message about an unknown preset shows."""
+
+LIKE = (
+    'Paper whose settings are taken: the name of its material, such as "silica (Seizinger et al. 2012)", which has '
+    "roll_factor = 8 and slide_factor = 2.5; keys beside it override. Materials are chosen in [materials]."
+)
+"""Meaning of the key `like` of [forces.contact]."""
 
 
 def material_named(name: str) -> Material:
-    """Look up a preset by name (case ignored). Raises BadInput that suggests the nearest name."""
-    try:
-        return PRESETS[name.lower()]
-    except KeyError:
-        raise BadInput(f"unknown material '{name}'; {did_you_mean(name.lower(), list(PRESETS))}") from None
+    """Look up a preset by name (case ignored). Raises BadInput that shows the nearest names."""
+    found = {known.lower(): material for known, material in PRESETS.items()}.get(name.lower())
+    if found is None:
+        raise BadInput(f"unknown material '{name}'; {did_you_mean(name, list(PRESETS), NEAREST)}")
+    return found
+
+
+def contact_settings(preset: str) -> dict[str, Any]:
+    """Settings of `sand.Contact` in a paper, by the name of its preset (case ignored).
+
+    Raises BadInput that shows the nearest names.
+    """
+    for paper in PAPERS:
+        if paper.material.name.lower() == preset.lower():
+            return dict(paper.contact)
+    names = [paper.material.name for paper in PAPERS]
+    raise BadInput(f"there are no contact settings of '{preset}'; {did_you_mean(preset, names, NEAREST)}")
+
+
+def listed_presets() -> str:
+    """Names of presets for messages and comments; one of papers stands for all of them."""
+    return f"{', '.join(COMMON)}, or of a paper, such as '{PAPERS[-1].material.name}' (docs: Materials)"
 
 
 def like_preset(preset: str, name: str) -> Material:
     """Look up the preset from which a material `name` is derived. Raises BadInput if `name` is a different preset."""
     found = material_named(preset)
-    if PRESETS.get(name.lower(), found).name != found.name:
+    if {known.lower(): known for known in PRESETS}.get(name.lower(), found.name) != found.name:
         raise BadInput(f"'{name}' is the name of a preset, but like = '{preset}'; choose another name")
     return found
 
@@ -126,5 +240,5 @@ def as_material(given: Any, name: str = "material") -> Material:
     """Convert a Material or the name of a preset to a Material. Raises BadInput."""
     found = material_named(given) if isinstance(given, str) else given
     if not isinstance(found, Material):
-        raise BadInput(f"{name} = {shown(given)}; give a sand.Material or the name of a preset: {', '.join(PRESETS)}")
+        raise BadInput(f"{name} = {shown(given)}; give a sand.Material or the name of a preset: {listed_presets()}")
     return found

@@ -22,9 +22,8 @@ RESERVED = frozenset(
         *BY_NAME,
         # attributes of grains, frames, sequences of frames and changes
         *("arrays", "material", "materials", "id", "own", "overlaps", "touching", "own_units", "with_arrays"),
-        *("with_own", "copy", "grains", "forces", "box"),
+        *("with_own", "copy", "grains", "forces", "box", "refuse_overlaps", "kept"),
         *("remove", "add", "scale_box", "replace", "regroups", "is_of_own", "checked_forces", "checked_grains"),
-        "refuse_overlaps",
         *("step", "time", "pair", "overlap", "formed", "slide", "roll", "twist", "share", "drawn", "at_rest"),
         *("image", "images", "unwrapped", "ix", "iy", "iz", "v_time", "material_names"),
         *("path", "close", "frames", "at", "count", "index", "stored", "pairs", "identities"),

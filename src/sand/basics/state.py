@@ -61,10 +61,12 @@ LARGEST_LOAD = 15  # largest change of the loads of the contacts of a cluster at
 LARGEST_OVERLAP = 16  # largest overlap at the end of a step, in radii of the smaller grain
 LARGEST_IMPACT = 17  # largest speed of an impact in units of `contact.impact.impact_share`
 IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
+CHANGED = 19  # time at which a contact last formed or broke [s]
+SLID = 20  # time at which a contact last slipped [s]
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
     *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
-    *("largest_overlap", "largest_impact", "impact_speed"),
+    *("largest_overlap", "largest_impact", "impact_speed", "changed", "slid"),
 )
 LEAST_CLOCK = LARGEST_OVERLAP
 """Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0."""
@@ -220,9 +222,10 @@ class State:
             other.of_components[name] = copy_group(group, present, own, theirs)
 
     def take_extremes(self, part: State) -> None:
-        """Take over the largest overlap and the largest impact of a part of the grains that took steps of its own."""
+        """Take over largest overlap and impact, and last events, of a part of the grains that took steps of its own."""
         own, other = self.clock, part.clock
-        own[LARGEST_OVERLAP] = max(own[LARGEST_OVERLAP], other[LARGEST_OVERLAP])
+        for number in (LARGEST_OVERLAP, CHANGED, SLID):
+            own[number] = max(own[number], other[number])
         if other[LARGEST_IMPACT] > own[LARGEST_IMPACT]:
             own[LARGEST_IMPACT], own[IMPACT_SPEED] = other[LARGEST_IMPACT], other[IMPACT_SPEED]
 

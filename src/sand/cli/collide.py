@@ -28,7 +28,7 @@ SHOWN = 12
 def command(
     case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
 ) -> None:
-    """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
+    """Collide the bodies that CASE.toml describes and follow them until the outcome is decided.
 
     Writes collision.json and a figure to the folder; for a single seed also the trajectory, the ledger and all other
     files of `sand run`. Ctrl-C interrupts it; continue with `sand resume`.
@@ -66,7 +66,7 @@ def _collision(r: dict[str, Any]) -> str:
     pieces = f"{bodies} bod{'ies' if bodies > 1 else 'y'}, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
-    unfinished = "" if r["quiet"] else " (stopped before it came to rest)"
+    unfinished = "" if r["quiet"] else " (stopped before it was decided)"
     if r["outcome"] == "miss" and r.get("end"):
         return f"miss{unfinished}: no contact formed; {r['end']}; drift {r['drift']:.1e}"
     return (

@@ -15,6 +15,7 @@ from ..config.commands import command_for
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
+from ..io.sweep_files import ROW, RUNS
 from . import options, parsing, report
 from .collide import collision_rows
 from .scatter import result_rows
@@ -27,6 +28,7 @@ JOBS = {
     "scatter": ("a scattering job", "scattering"),
     "collide": ("collisions", "collision"),
     "grow": ("boxes", "growth"),
+    "sweep": ("a sweep", "sweep"),
 }
 """Names of jobs by command: for people, and the `kind` for machines."""
 
@@ -38,7 +40,7 @@ JOBS = {
 def command(path: str, **output: bool) -> None:
     """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
 
-    Also describes cases, folders and results of `sand scatter`, `sand collide` and `sand grow`.
+    Also describes cases, folders and results of `sand scatter`, `sand collide`, `sand grow` and `sand sweep`.
 
     A case file is checked as by `sand run`, but not run.
     """
@@ -150,6 +152,13 @@ def _describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: r
     if not begun:
         start = ("run it with", f"sand {job_command} {shlex.quote(str(case))}")
         return name, [("state", "not started"), *rows, start], content
+    if job_command == "sweep":
+        rows.append(("ended", f"{sum(1 for _ in path.glob(f'{RUNS}/*/{ROW}'))} runs"))
+        if (path / files.SWEEP).exists():
+            found = files.read_json(path / files.SWEEP)
+            numbers = f"{found['done']} of {found['runs']} done, {found['failed']} failed"
+            rows = [("state", f"finished: {numbers}"), *rows, ("draw with", f"sand plot {shlex.quote(str(path))}")]
+            return name, rows, content | {"finished": True} | found
     if job_command == "grow":
         ends = [files.read_json(summary).get("outcome") for summary in path.glob(f"seed-*/{files.SUMMARY}")]
         rows.append(("boxes", f"{ends.count('finished')} finished"))
@@ -190,19 +199,21 @@ def _cost(
     """Expected cost of a run, or of several like it one after the other, which draw one figure or one each."""
     from ..compiler.jit import COMPILE_TIMES
     from ..compiler.progress import compile_times
-    from ..simulation.cost.cost import expected_cost
 
-    cost, missing = expected_cost(simulation, end, last_step, condition), simulation._engine.uncompiled()
+    cost, missing = simulation.expected_cost(end, last_step, condition), simulation._engine.uncompiled()
     if cost.seconds is not None:
         parts = {name: (figures if name == "start" else runs) * value for name, value in cost.parts.items()}
-        cost = cost._replace(parts=parts, seconds=sum(parts.values()))
+        # collisions of many seeds keep no files
+        disk = runs * cost.disk if figures == runs and cost.disk is not None else None
+        cost = cost._replace(parts=parts, seconds=sum(parts.values()), disk=disk)
     known = compile_times(COMPILE_TIMES)
     compilation = sum(known.get(name, COMPILATION) for name in missing)
     names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
     rows = [
         ("steps", _steps(cost)),
         ("wall time", _wall_time(cost)),
-        ("memory", f"about {cost.memory / 1e6:.0f} MB" if cost.memory < 1e9 else f"about {cost.memory / 1e9:.2g} GB"),
+        ("memory", f"about {report.format_bytes(cost.memory)}"),
+        *([] if cost.disk is None else [("disk", f"about {report.format_bytes(cost.disk)}")]),
         ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
     ]
     content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": missing}
@@ -241,7 +252,7 @@ def _limits(simulation: Any) -> dict[str, str]:
 
 def _collision_case(path: Path, start: tuple[str, str]) -> Description:
     from ..basics.units import format_quantity
-    from ..experiments.collision import INTERVAL, MOST_CHECKS, expected_end
+    from ..experiments.collision import expected_end, latest_end
     from ..experiments.collision_case import read_collision
 
     case = read_collision(path)
@@ -249,9 +260,10 @@ def _collision_case(path: Path, start: tuple[str, str]) -> Description:
     with report.naming(path):
         simulation, start_of_first = case.check(), case.approach(seeds[0])
     bodies = f"{case.projectile.kind} on {case.target.kind}, {len(simulation.grains)} grains"
-    cost, costs = _cost(simulation, expected_end(start_of_first), math.inf, None, len(seeds))
-    longest = start_of_first.flight + MOST_CHECKS * INTERVAL * start_of_first.check_every
-    note = f"the contacts decide when a collision ends, at {format_quantity(longest, 's')} at the latest"
+    expected, longest = (each(start_of_first, case.ending()) for each in (expected_end, latest_end))
+    cost, costs = _cost(simulation, expected, math.inf, None, len(seeds))
+    note = f"the outcome decides when a collision ends, at {format_quantity(longest, 's')} at the latest"
+    note = note if longest > expected else f"at {format_quantity(longest, 's')}"
     rows = [
         ("bodies", bodies),
         ("seeds", str(len(seeds))),
@@ -310,6 +322,18 @@ def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
         "cost": {"flights": number, "seconds": seconds},
     }
     return "a valid scattering case", rows, content
+
+
+def _sweep_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.sweep_job import SweepJob
+    from .sweep import costs_of
+
+    job = SweepJob(path)
+    expected = job.expected(job.rows)
+    keys = [(key, f"{len({str(row.values[key]) for row in job.rows})} values") for key in job.keys]
+    rows = [("runs", f"{len(job.rows)} of sand {job.command}"), *keys, *costs_of(expected, len(job.rows), 1), start]
+    content = {"kind": "sweep case", "case": files.read_toml(path), "runs": len(job.rows)}
+    return "a valid case of a sweep", rows, content | {"cost": expected._asdict()}
 
 
 def describe_trajectory(path: Path) -> Description:
@@ -400,6 +424,7 @@ JOB_CASES: dict[str, Callable[[Path, tuple[str, str]], Description]] = {
     "scatter": _scattering_case,
     "collide": _collision_case,
     "grow": _growth_case,
+    "sweep": _sweep_case,
 }
 """Description of the case files of jobs; the second argument is the row with the command that runs the case."""
 FILE_TYPES: dict[str, Callable[[Path], Description]] = {

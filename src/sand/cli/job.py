@@ -149,9 +149,10 @@ def run_job(
 
     hidden, single = quiet or as_json, job.is_single
     observers = [Progress(math.inf, math.inf)] if single and not hidden else []
+    is_first = True
     no_bar = hidden or single or (lines and not sys.stderr.isatty())
     with (
-        report.progress_bar(1.0, no_bar, bar_format=report.LAYOUT) as bar,
+        report.progress_bar(1.0, no_bar, bar_format=report.LAYOUT, every=report.JOB_LINE_EVERY) as bar,
         running_job(job.folder, 1 if single else workers, quiet=quiet, **execution) as (executor, interrupts),
     ):
 
@@ -159,6 +160,10 @@ def run_job(
             interrupts.see(None, {})
             if line and not hidden:
                 report.write_line(line)
+            nonlocal is_first
+            if is_first:  # what was done before says nothing about the time left
+                bar.initial = bar.n = part
+                is_first = False
             bar.set_description_str(text, refresh=False)
             bar.update(part - bar.n)
 

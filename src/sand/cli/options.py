@@ -145,10 +145,10 @@ wall_time = click.option(
 
 def seeds(text: str) -> Any:
     """The option --seeds with the help text `text`; its value is a list of integers."""
-    return click.option("--seeds", metavar="LIST", callback=_seeds, help=text)
+    return click.option("--seeds", metavar="LIST", callback=read_seeds, help=text)
 
 
-def _seeds(_context: click.Context, _option: click.Parameter, text: str | None) -> list[int] | None:
+def read_seeds(_context: click.Context, _option: click.Parameter, text: str | None) -> list[int] | None:
     """Read '3', '1,2,5' or '1-20' as integers.  Raises BadInput."""
     if text is None:
         return None

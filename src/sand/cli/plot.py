@@ -14,7 +14,7 @@ from . import options, parsing, report
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
-FOLDER = "plots"  # as `io.run_folder.PLOTS`, whose import is slow
+FOLDER, SWEEP_TABLE = "plots", "sweep.csv"  # as `PLOTS` and `SWEEP_CSV` of `io.run_folder`, whose import is slow
 
 
 class PrintSize(NamedTuple):
@@ -39,10 +39,10 @@ DEFAULT_SIZE = PrintSize(10.0, 6.25, "in")
 
 
 class Source(NamedTuple):
-    """The data to plot: a run, or a trajectory alone."""
+    """The data to plot: a run, a trajectory alone, or a sweep."""
 
     path: Path
-    frames: Any
+    frames: Any  # None for a sweep
     run: Any  # None for a trajectory
 
 
@@ -75,6 +75,8 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     from ..plotting.render.still import check_picture_options
 
     given = {name: values[name] for name in options.READING}
+    if values["source"] is not None and (Path(values["source"]) / SWEEP_TABLE).exists():
+        return
     one = None if values["source"] is None else _first_frame(Path(values["source"]), given)
     allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
     yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
@@ -149,7 +151,8 @@ def command(
 ) -> None:
     """Draw the run in DIR: figures over time, a still picture of a frame, histograms over grains.
 
-    DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD.
+    DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD; or a sweep, of which
+    WHAT are columns of results, such as largest_remnant or outcome.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
     QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
@@ -159,6 +162,8 @@ def command(
     """
     from ..io.run_folder import make_folder, replace_file
 
+    if (Path(source) / SWEEP_TABLE).exists():
+        what = _of_sweep(Path(source), what)
     folder, names = _place(Path(source), what, out, form, overwrite)
     how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
     given = {name: how.pop(name) for name in options.READING}
@@ -170,6 +175,19 @@ def command(
         replace_file(path, content)
     rows = [("folder", str(folder)), ("files", ", ".join(path.name for path in paths))]
     report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json, quiet=quiet)
+
+
+def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
+    """Columns of a sweep to draw.  Raises BadInput for others."""
+    from ..results import Sweep
+
+    sweep = Sweep(folder)
+    if what is None:
+        return sweep.shown
+    allowed = sweep.results
+    if wrong := [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in what if name not in allowed]:
+        raise BadInput(wrong)
+    return what
 
 
 def _place(
@@ -199,11 +217,13 @@ def _place(
 def _open_source(path: Path, given: Mapping[str, Any]) -> Source:
     """Open a run, a trajectory or a file of grains.  Raises BadInput."""
     from ..io.file_frames import open_frames
-    from ..results import Run
+    from ..results import Run, Sweep
 
     if path.is_file():
         return Source(path, open_frames(path, **given), None)
     options.refuse_reading(path, given)
+    if (path / SWEEP_TABLE).exists():
+        return Source(path, None, Sweep(path))
     run = Run(path)
     return Source(path, run.frames, run)
 
@@ -221,6 +241,8 @@ def _first_frame(path: Path, given: Mapping[str, Any]) -> Any:
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
+    if source.frames is None:
+        return _draw_sweep(source.run, names, form, how)
     from ..analysis.ledger_columns import LedgerColumns
     from ..basics.temperature import kinetic_temperature
     from ..io.ledger_table import read_ledger
@@ -244,6 +266,15 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
         return grains_figure(one, name, field, dark=how["dark"])
 
     return [figure_bytes(draw(name), form, how["transparent"], how["dpi"]) for name in names]
+
+
+def _draw_sweep(sweep: Any, names: list[str], form: str, how: dict[str, Any]) -> list[bytes]:
+    """Draw columns of a sweep."""
+    from ..plotting.run_figure import figure_bytes
+    from ..plotting.sweeps import sweep_figure
+
+    figures = (sweep_figure(sweep.done, sweep.keys, name) for name in names)
+    return [figure_bytes(figure, form, how["transparent"], how["dpi"]) for figure in figures]
 
 
 def _frame(source: Source, number: int) -> Any:

@@ -20,6 +20,7 @@ from . import (
     export,
     grow,
     info,
+    methods,
     new,
     options,
     parsing,
@@ -28,11 +29,15 @@ from . import (
     resume,
     run,
     scatter,
+    sweep,
     view,
 )
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
-COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite, completion)
+COMMANDS = (
+    *(new, run, resume, build, collide, scatter, grow, sweep),
+    *(analyse, plot, view, export, info, methods, cite, completion),
+)
 """One module per command, with a click command named `command`."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from ..basics.version import __version__
@@ -31,6 +32,12 @@ class Article(NamedTuple):
         names = ", ".join(f"{family} {_initials(given)}" for family, given in self.authors)
         where = f"doi:{self.doi}" if self.doi else f"arXiv:{self.eprint}"
         return f"{names} ({self.year}): {self.title}. {self.abbreviation} {self.volume}, {self.page}. {where}"
+
+    def short(self) -> str:
+        """Family names and year."""
+        names = [family for family, _ in self.authors]
+        shown = f"{names[0]} et al." if len(names) > 2 else " & ".join(names)
+        return f"{shown} {self.year}"
 
     def bibtex(self) -> str:
         """The reference as an entry of BibTeX."""
@@ -112,15 +119,16 @@ ARTICLES = (
 """The paper whose program SAND is, and the papers of its contacts."""
 
 
-def software() -> str:
-    """SAND as one line of text."""
-    return f"{TITLE}, version {__version__}"
+def software(version: str | None = __version__) -> str:
+    """SAND as one line of text; without a version if that is None."""
+    return TITLE if version is None else f"{TITLE}, version {version}"
 
 
-def bibtex() -> str:
-    """SAND and all articles as a file of BibTeX, in ASCII."""
-    fields = {"author": f"{{{AUTHORS}}}", "title": f"{{{TITLE}}}", "note": f"Version {__version__}"}
-    return "\n\n".join([_entry("misc", "SAND", fields), *(article.bibtex() for article in ARTICLES)])
+def bibtex(articles: Iterable[Article] = ARTICLES, version: str | None = __version__) -> str:
+    """SAND, of a version unless that is None, and articles as a file of BibTeX, in ASCII."""
+    fields = {"author": f"{{{AUTHORS}}}", "title": f"{{{TITLE}}}"}
+    fields |= {"note": f"Version {version}"} if version else {}
+    return "\n\n".join([_entry("misc", "SAND", fields), *(article.bibtex() for article in articles)])
 
 
 def cff() -> str:

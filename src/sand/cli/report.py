@@ -164,6 +164,8 @@ LAYOUT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
 """Layout of a line of progress whose end is known."""
 LINE_EVERY, LINE_PART, LINE_AT_LEAST = 30.0, 0.05, 1.0
 """Where there is no terminal: a line after this wall time [s], or this part of the work but not before the last [s]."""
+JOB_LINE_EVERY = 3600.0
+"""The same wall time [s] for jobs, whose parts may take hours."""
 
 
 class ProgressLines:
@@ -177,15 +179,18 @@ class ProgressLines:
         Position at the beginning.
     desc : str, optional
         Description of the work.
+    every : float, optional
+        Wall time [s] after which a line is printed that is not due by the progress.
+
+    Attributes
+    ----------
+    initial : float
+        Position at the beginning, also if it becomes known later.
     """
 
-    def __init__(self, total: float | None, initial: float = 0.0, desc: str = ""):
-        self.n, self._total, self._first, self._texts = (
-            initial,
-            total or math.inf,
-            initial,
-            {"desc": desc, "postfix": ""},
-        )
+    def __init__(self, total: float | None, initial: float = 0.0, desc: str = "", every: float = LINE_EVERY):
+        self.n, self._total, self.initial, self._every = initial, total or math.inf, initial, every
+        self._texts = {"desc": desc, "postfix": ""}
         self._began = self._last = time.monotonic()
         self._last_part = self._part()
 
@@ -201,7 +206,7 @@ class ProgressLines:
     @property
     def format_dict(self) -> dict[str, float]:
         """The mean rate, as `tqdm.format_dict`."""
-        return {"rate": (self.n - self._first) / max(time.monotonic() - self._began, 1e-9)}
+        return {"rate": (self.n - self.initial) / max(time.monotonic() - self._began, 1e-9)}
 
     def set_description_str(self, text: str, refresh: bool = True) -> None:
         """Set the description."""
@@ -216,7 +221,7 @@ class ProgressLines:
         self.n += by
         now = time.monotonic()
         waited, done = now - self._last, self._part() - self._last_part
-        if waited < LINE_EVERY and (done < LINE_PART or waited < LINE_AT_LEAST):
+        if waited < self._every and (done < LINE_PART or waited < LINE_AT_LEAST):
             return
         self._last, self._last_part = now, self._part()
         known, rate = math.isfinite(self._total), self.format_dict["rate"]
@@ -233,9 +238,10 @@ class ProgressLines:
 def progress_bar(total: float | None, hidden: bool, **layout: Any) -> Any:
     """One line of progress on a terminal, otherwise `ProgressLines`."""
     if not (hidden or sys.stderr.isatty()):
-        return ProgressLines(total, layout.get("initial", 0.0), layout.get("desc", ""))
+        return ProgressLines(total, layout.get("initial", 0.0), layout.get("desc", ""), layout.get("every", LINE_EVERY))
     from .progress_line import progress_line
 
+    layout.pop("every", None)
     return progress_line(total, disable=hidden, **layout)
 
 
@@ -379,6 +385,11 @@ def format_wall_time(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60:02d} s"
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def format_bytes(number: float) -> str:
+    """A size in memory or on a disk for people: '350 MB', '1.2 GB'."""
+    return f"{number / 1e6:.3g} MB" if number < 1e9 else f"{number / 1e9:.2g} GB"
 
 
 def named(grains: Iterable[int]) -> str:

@@ -12,16 +12,18 @@ import click
 
 from ..basics.errors import BadInput
 from ..basics.threads import set_threads
-from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, read_json
+from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, SWEEP, read_json
 from . import options, parsing, report
 from .collide import collide
 from .grow import grow
 from .scatter import scatter
+from .sweep import sweep
 
 JOBS = {
     "collide": (COLLISION, "collision_job", "CollisionJob", collide),
     "scatter": (SCATTERING, "scattering.job", "ScatterJob", scatter),
     "grow": (GROWTH, "growth_boxes", "GrowthJob", grow),
+    "sweep": (SWEEP, "sweep_job", "SweepJob", sweep),
 }
 """Results file, module and class of each job, and what runs it and prints its results."""
 
@@ -48,8 +50,8 @@ def command(
 
     A run whose condition (`stop`) was met goes on with another condition in its case.toml, or to --until.
 
-    Jobs of `sand collide`, `sand scatter` and `sand grow` are continued as well: finished parts are kept, and the
-    results are those of an uninterrupted job.
+    Jobs of `sand collide`, `sand scatter`, `sand grow` and `sand sweep` are continued as well: finished parts are kept,
+    and the results are those of an uninterrupted job.
     """
     set_threads(threads)
     place = Path(folder)
@@ -58,10 +60,9 @@ def command(
         if until is not None:
             raise BadInput(f"--until applies to runs; {folder} holds a job of `sand {kind}`")
         if scheduler is not None and kind == "collide":
-            raise BadInput("--scheduler applies to jobs of `sand scatter` and `sand grow`; use --workers")
+            raise BadInput("--scheduler applies to jobs of `sand scatter`, `sand grow` and `sand sweep`; use --workers")
         how = {"workers": workers, "scheduler": scheduler, "threads": threads, "wall_time": wall_time}
-        _job(kind, place, case, {**how, **output})
-        return None
+        return _job(kind, place, case, {**how, **output})
     if workers > 1 or scheduler is not None:
         raise BadInput("--workers and --scheduler apply to jobs of many parts; for a run use --threads")
     return _run(place, until, wall_time, **output)
@@ -80,18 +81,18 @@ def _kind(folder: Path) -> tuple[str, Path]:
     return kind or "run", case
 
 
-def _job(kind: str, folder: Path, case: Path, how: dict[str, Any]) -> None:
-    """Continue a job of `sand collide`, `sand scatter` or `sand grow`."""
+def _job(kind: str, folder: Path, case: Path, how: dict[str, Any]) -> int | None:
+    """Continue a job; returns the exit code."""
     file, module, name, command = JOBS[kind]
     if (folder / file).exists():
         content = {**read_json(folder / file), "folder": str(folder)}
         text = f"{folder} is finished; its results are in {folder / file}"
         report.answer(content, text, [], as_json=how["as_json"], quiet=how["quiet"])
-        return
+        return None
     if kind == "scatter":
         del how["threads"]  # a flight uses one thread
     made = getattr(import_module(f"sand.experiments.{module}"), name)
-    command(made(case, folder, resume=True), **how)
+    return command(made(case, folder, resume=True), **how)
 
 
 def _run(place: Path, until: float | None, wall_time: float | None, *, quiet: bool, as_json: bool) -> int | None:

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, ValidationError, create_model, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, create_model, model_validator
 
 from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, did_you_mean
-from ..basics.material import PRESETS, Material, like_preset
+from ..basics.material import NEAREST, PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
 from ..components.driven import Driven
 from ..forces.own import IMPORT, own_force
@@ -103,7 +103,11 @@ class MaterialSection(Section):
         """Build the material.  Raises BadInput for missing or impossible numbers."""
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
-            return like_preset(self.like, name).but(name=name, **given)
+            try:
+                preset = like_preset(self.like, name)
+            except BadInput as error:
+                raise error.at(f"{name}.like") from None
+            return preset.but(name=name, **given)
         missing = [key for key in ("density", "young_modulus", "poisson_ratio") if key not in given]
         if missing:
             raise BadInput(f"{name} lacks {', '.join(missing)}; give them, or like = 'iron'")
@@ -207,6 +211,21 @@ class _Forces(Section):
         return [given[key] for key in dict.fromkeys(order) if given[key] is not None]
 
 
+def _table_of(force: type) -> Any:
+    """What reads the table of a force; that of contacts may name a paper by `like`."""
+    if not hasattr(force, "with_paper"):
+        return force | None
+
+    def read(table: Any) -> Any:
+        """The table with the settings of the paper; without an unknown one, which `material_errors` reports."""
+        try:
+            return force.with_paper(table)
+        except BadInput:
+            return {key: value for key, value in table.items() if key != "like"}
+
+    return Annotated[force | None, BeforeValidator(read)]
+
+
 if TYPE_CHECKING:
 
     class ForcesSection(_Forces):
@@ -217,7 +236,7 @@ else:
         __base__=_Forces,
         __module__=__name__,
         __doc__=_Forces.__doc__,
-        **{name: (force | None, None) for name, force in FORCES.items()},
+        **{name: (_table_of(force), None) for name, force in FORCES.items()},
     )
 
 
@@ -248,7 +267,7 @@ class Case(Section):
 
 
 def material_errors(content: dict[str, Any], tables: Iterable[str], default: str | None = None) -> list[str]:
-    """Error messages for numbers in [materials] and [[walls]], and for materials that do not exist.
+    """Error messages for numbers in [materials] and [[walls]], and for materials and presets that do not exist.
 
     Parameters
     ----------
@@ -281,7 +300,13 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
         for place, given in parts.items():
             for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
                 if isinstance(name, str) and name not in known:
-                    problems.append(f"{place}.material: unknown material '{name}'; {did_you_mean(name, known)}")
+                    problems.append(
+                        f"{place}.material: unknown material '{name}'; {did_you_mean(name, known, NEAREST)}"
+                    )
+    forces, errors = content.get("forces"), ErrorCollector()
+    contact: Any = FORCES["contact"]
+    errors.take(contact.with_paper, forces.get("contact") if isinstance(forces, dict) else None)
+    problems += [f"forces.contact.{line}" for line in errors.problems]
     return problems + wall_errors(content.get("walls"), known)
 
 

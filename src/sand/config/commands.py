@@ -8,12 +8,14 @@ from typing import Any
 from ..basics.errors import BadInput
 
 OWN_TABLES = {
+    "sweep": {"sweep"},
     "grow": {"grow"},
     "scatter": {"flight", "measure"},
     "collide": {"impact"},
     "run": {"run", "grains", "box", "neighbours"},
 }
-"""Tables found only in case files of one command; a case of `sand grow` also has those of `sand run`."""
+"""Tables found only in case files of one command; a case of `sand grow` also has those of `sand run`, and one of `sand
+sweep` those of any other command."""
 BODIES = {"target", "projectile"}
 """Tables of the bodies of `sand collide` and `sand scatter`."""
 
@@ -30,6 +32,6 @@ def refuse_other_command(content: dict[str, Any], path: str | Path, command: str
     """Raise BadInput if a case file is meant for another command than the one given."""
     intended = command_for(content)
     own = OWN_TABLES[command] | (OWN_TABLES["run"] if command == "grow" else set())
-    if intended in (None, command) or (own & content.keys() and intended != "grow"):
+    if intended in (None, command) or (own & content.keys() and intended not in ("grow", "sweep")):
         return
     raise BadInput(f"{path}: this is a case for `sand {intended}`; use: sand {intended} {path}")

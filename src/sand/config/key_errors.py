@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from ..basics.errors import MOST_ERRORS, BadInput, did_you_mean, first_problems
+from ..basics.settings import Setting
 from .sections import INTEGRATORS
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -55,11 +56,11 @@ def _messages(slip: Any, model: type, table: str) -> list[str]:
     parts = [str(part) for part in ((table,) if table else ()) + tuple(path)]
     place = ".".join(part for part in parts if not part.startswith("function-"))
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        allowed = _keys_at(model, path[:-1])
+        allowed = keys_at(model, path[:-1])
         renamed = RENAMED.get(str(path[-1]))
         advice = f"it is now called '{renamed}'" if renamed in allowed else did_you_mean(str(path[-1]), allowed)
         for key in allowed:
-            if str(path[-1]) in _keys_at(model, (*path[:-1], key)):
+            if str(path[-1]) in keys_at(model, (*path[:-1], key)):
                 advice = f"it is a key of [{place.removesuffix(parts[-1])}{key}]"
         return [f"{place}: there is no such key; {advice}"]
     if kind == "missing":
@@ -78,13 +79,34 @@ def _at(place: str, key: str, line: str) -> str:
     return f"{place}: {line.removeprefix(f'{key}: ')}"
 
 
-def _keys_at(model: type, path: tuple[Any, ...]) -> list[str]:
+def keys_at(model: type, path: tuple[Any, ...]) -> list[str]:
     """The keys allowed in a table of the case file."""
+    return [key for key in _fields(_annotation_at(model, path)) if key != "*"]
+
+
+def setting_at(model: type, path: tuple[str, ...]) -> Setting | None:
+    """What a key of the case file takes, as its annotation says; None if that says nothing."""
+    table = _annotation_at(model, path[:-1])
+    for candidate in (table, *typing.get_args(table)):
+        if isinstance(candidate, type) and issubclass(candidate, BaseModel):
+            field = candidate.model_fields.get(path[-1])
+            about: Iterable[Any] = field.metadata if field else ()
+        elif dataclasses.is_dataclass(candidate):
+            hint = typing.get_type_hints(candidate, include_extras=True).get(path[-1])
+            about = getattr(hint, "__metadata__", ())
+        else:
+            continue
+        return next((each for each in about if isinstance(each, Setting)), None)
+    return None
+
+
+def _annotation_at(model: type, path: tuple[Any, ...]) -> Any:
+    """The annotation of a table of the case file."""
     table: Any = model
     for name in path:
         fields = _fields(table)
         table = fields[name] if name in fields else fields.get("*", table)
-    return [key for key in _fields(table) if key != "*"]
+    return table
 
 
 def _fields(annotation: Any) -> dict[str, Any]:
@@ -98,5 +120,7 @@ def _fields(annotation: Any) -> dict[str, Any]:
         if dataclasses.is_dataclass(candidate):
             hints = typing.get_type_hints(candidate)
             own = {f.name: hints[f.name] for f in dataclasses.fields(candidate)}
+            if hasattr(candidate, "with_paper"):
+                return {"like": str} | own
             return {"method": str, "clusters": str} | own if candidate in INTEGRATORS.values() else own
     return {}

@@ -15,7 +15,7 @@ import tomli_w
 from pydantic import BaseModel
 
 from ..basics.descriptions import docstring, parameter_docs
-from ..basics.material import PRESETS
+from ..basics.material import LIKE, listed_presets
 from ..basics.settings import Whole
 from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
@@ -147,7 +147,7 @@ def summary(kind: type) -> str:
 
 def material_table() -> Table:
     """The table [materials.NAME]."""
-    note = f"A new material, or changes to a preset. Presets: {', '.join(PRESETS)}."
+    note = f"A new material, or changes to a preset. Presets: {listed_presets()}."
     return Table("[materials.NAME]", note, keys_of(MaterialSection))
 
 
@@ -165,7 +165,10 @@ def keys_of(kind: Any) -> list[Key]:
             for name, field in kind.model_fields.items()
         ]
     meanings = parameter_docs(kind)
-    return [Key(one.name, meanings.get(one.name, ""), _default_of(one)) for one in dataclasses.fields(kind) if one.init]
+    paper = [Key("like", LIKE, None)] * hasattr(kind, "with_paper")
+    return paper + [
+        Key(one.name, meanings.get(one.name, ""), _default_of(one)) for one in dataclasses.fields(kind) if one.init
+    ]
 
 
 def _default_of(one: Any) -> Any:

@@ -225,14 +225,35 @@ def reduced_constants(law: ContactLaw) -> Callable:
     return constants_of
 
 
+def rest_energy(law: ContactLaw, c: ContactConstants, pairing: Pairing) -> float:
+    """Energy U(δ₀) [J] of a contact at equilibrium, from its constants and the parameters of its materials."""
+    rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
+    return float(law.energy(rest, law.radius_root(rest, c), c))
+
+
 def ringing_energy(law: ContactLaw, pairing: Pairing, r1: float, r2: float) -> float:
     """Energy U(0) − U(δ₀) [J] that a touch at zero speed leaves in the vibration of an undamped contact.
 
     0.607082 F_c δ_c for JKR; radii [m].
     """
     c = contact_constants(law)(pairing, r1, r2, 1.0, 1.0)
-    rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
-    return float(law.at_touch(c) - law.energy(rest, law.radius_root(rest, c), c))
+    return float(law.at_touch(c)) - rest_energy(law, c, pairing)
+
+
+class Strength(NamedTuple):
+    """What it takes to break a contact at rest, and to roll or twist it beyond its limit."""
+
+    rest: float  # energy U(δ₀) at equilibrium [J]
+    breaking: float  # energy U(−δ_c) − U(δ₀) to break it [J], 1.542585 F_c δ_c for JKR
+    turning: float  # moment that turns it, the smaller of R k_r ξ_c = 4 F_c ξ_c for JKR and k_t φ_c [N m]
+
+
+@functools.cache
+def contact_strength(law: ContactLaw, pairing: Pairing, r1: float, r2: float) -> Strength:
+    """Strength of the contact of two grains; radii [m]."""
+    c = contact_constants(law)(pairing, r1, r2, 1.0, 1.0)
+    rest, roll = rest_energy(law, c, pairing), c.reduced_radius * c.roll_stiffness * c.roll_limit
+    return Strength(rest, float(law.at_break(c)[0]) - rest, min(roll, c.twist_stiffness * c.twist_limit))
 
 
 def contact_periods(law: ContactLaw, pairing: Pairing, r1: float, r2: float, m1: float, m2: float) -> dict[str, float]:

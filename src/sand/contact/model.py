@@ -11,9 +11,9 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
-from ..basics.material import Material
+from ..basics.material import Material, contact_settings
 from ..basics.ramps import rampable
 from ..basics.settings import RAMP, For, Number, Settings, Word
 from ..basics.units import format_quantity
@@ -116,6 +116,43 @@ class Contact(Settings):
         """A bath without damping."""
         if "damping" not in wrong and self.damping == "none" and self.bath_temperature is not None:
             yield "bath_temperature needs damping, which exchanges energy with the bath; set damping = 'critical'"
+
+    @classmethod
+    @checked
+    def like(cls, preset: str, **changes: Any) -> Contact:
+        """Return the contact model of a paper, with some settings changed.
+
+        Parameters
+        ----------
+        preset : str
+            Name of the paper's material, such as "silica (Seizinger et al. 2012)"; case is ignored. The material is
+            chosen where grains are made: `sand.Material.like`.
+        changes
+            Arguments of `Contact`, which override those of the paper.
+
+        Raises
+        ------
+        BadInput
+            If there is no such preset, or a setting is unknown or out of range.
+        """
+        return cls(**contact_settings(preset) | changes)
+
+    @staticmethod
+    def with_paper(table: Any) -> Any:
+        """Settings in a table [forces.contact] with a key `like`: those of the paper, replaced by those given.
+
+        Anything but a table with this key stays as it is. Raises BadInput if there is no such preset.
+        """
+        if not isinstance(table, dict) or "like" not in table:
+            return table
+        given = dict(table)
+        preset = given.pop("like")
+        if not isinstance(preset, str):
+            raise BadInput(f"like = {shown(preset)} must be the name of a preset, as in docs: Materials")
+        try:
+            return contact_settings(preset) | given
+        except BadInput as error:
+            raise error.at("like") from None
 
     @property
     def contact_law(self) -> ContactLaw:

@@ -17,11 +17,21 @@ PERIOD_FRACTION = 0.05
 
 
 @formula
-def solve_symmetric(xx, yy, zz, xy, xz, yz, b):
-    """Solution x of A x = b, with a symmetric, positive definite A, by its factors L D Lᵀ.
+def with_grain(tensor, m, inertia, s):
+    """Tensor (xx, yy, zz, xy, xz, yz) of inertia, with that of a grain at s from the centre: m (s² 1 − s s) + I 1."""
+    xx, yy, zz, xy, xz, yz = tensor
+    x, y, z = s
+    a, b, c = (m * (y * y + z * z) + inertia), (m * (x * x + z * z) + inertia), (m * (x * x + y * y) + inertia)
+    return xx + a, yy + b, zz + c, xy - m * x * y, xz - m * x * z, yz - m * y * z
+
+
+@formula
+def solve_symmetric(tensor, b):
+    """Solution x of A x = b, with a symmetric, positive definite A (xx, yy, zz, xy, xz, yz), by its factors L D Lᵀ.
 
     The residual is of the order of rounding for any condition of A, as for the tensor of inertia of a long chain.
     """
+    xx, yy, zz, xy, xz, yz = tensor
     l1, l2 = xy / xx, xz / xx
     d = yy - l1 * xy
     rest = yz - l1 * xz
@@ -71,20 +81,15 @@ def rigid_motion(grains, clusters, size):
         centre = axpy(grains.mass[i], load(clusters.offset, i), centre)
         momentum = axpy(grains.mass[i], load(grains.velocity, i), momentum)
     centre, velocity, angular = scale(1.0 / mass, centre), scale(1.0 / mass, momentum), (0.0, 0.0, 0.0)
-    xx = yy = zz = xy = xz = yz = 0.0
+    tensor = (0.0,) * 6
     for k in range(size):
         i = clusters.member[k]
         m, inertia, s = grains.mass[i], grains.inertia[i], sub(load(clusters.offset, i), centre)
         put(clusters.offset, i, s)
         angular = axpy(m, cross(s, sub(load(grains.velocity, i), velocity)), angular)
         angular = axpy(inertia, load(grains.spin, i), angular)
-        xx += m * (s[1] * s[1] + s[2] * s[2]) + inertia
-        yy += m * (s[0] * s[0] + s[2] * s[2]) + inertia
-        zz += m * (s[0] * s[0] + s[1] * s[1]) + inertia
-        xy -= m * s[0] * s[1]
-        xz -= m * s[0] * s[2]
-        yz -= m * s[1] * s[2]
-    return velocity, solve_symmetric(xx, yy, zz, xy, xz, yz, angular)
+        tensor = with_grain(tensor, m, inertia, s)
+    return velocity, solve_symmetric(tensor, angular)
 
 
 @loop

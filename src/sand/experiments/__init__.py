@@ -1,4 +1,4 @@
-"""Numerical experiments: collisions, cross-sections, growth of ensembles and collision kernels.
+"""Numerical experiments: collisions, cross-sections, growth of ensembles, collision kernels, and sweeps of all these.
 
 Submodules are imported on first use: `sand.experiments.scattering.cross_section(...)` needs no further import.
 """
@@ -15,6 +15,8 @@ MODULES = ("chain_impact", "collision", "kernel_table", "scattering")
 
 
 def __getattr__(name: str) -> Any:
+    if name == "sweep":
+        return importlib.import_module(".sweep_job", __name__).sweep
     if name in MODULES:
         return importlib.import_module(f".{name}", __name__)
-    raise NoSuchAttribute(f"module 'sand.experiments' has no '{name}'; {did_you_mean(name, MODULES)}")
+    raise NoSuchAttribute(f"module 'sand.experiments' has no '{name}'; {did_you_mean(name, (*MODULES, 'sweep'))}")

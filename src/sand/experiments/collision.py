@@ -1,42 +1,78 @@
-"""Collision of two bodies, simulated until contacts no longer change."""
+"""Collision of two bodies, simulated until its outcome is decided."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..basics.arguments import checked
+from ..analysis.clusters import cluster_labels
+from ..basics.arguments import MOST_STEPS, checked
 from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.paths import user_path
-from ..basics.units import seed_given, si
+from ..basics.settings import Reading, Settings, Whole
+from ..basics.state import BROKEN, CHANGED, MADE, SLID, SLIPPED
+from ..basics.units import is_word, seed_given, si
 from ..config.build import resume
 from ..contact.model import Contact
 from ..forces.base import Force
-from ..integrate.integrator import Integrator
+from ..integrate.integrator import Integrator, moves_bodies
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
+from ..simulation.cadence import FRAMES, duration
+from ..simulation.condition import EVERY, GIVEN
 from ..simulation.serialise import changed_tables
 from ..simulation.simulation import Simulation
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
-from .parting import cannot_touch
+from .parting import can_tell, cannot_touch, forces_at_distance
+from .settled import are_settled
 
-QUIET = 3
-"""Number of consecutive intervals without contacts formed, slipped or broken that end a collision."""
-MOST_CHECKS = 400
-"""Largest number of intervals."""
-INTERVAL = 10.0
-"""Length of an interval, in units of `Approach.check_every`."""
-USUAL_CHECKS = 60
-"""Intervals that two aggregates of silica take to come to rest (`examples/collision.toml`: 75 to 130)."""
+QUIET = 30.0
+"""Time without contacts formed, slipped or broken after which they are at rest, in units of `Approach.unit_of_time`."""
+LONGEST = 4000.0
+"""Longest time of a collision after the earliest contact, in the same units."""
+USUAL = 600.0
+"""Time of a usual collision."""
+LOOK_EVERY = 10
+"""Checks of the condition of a run, every `EVERY` regular steps, between two looks whether a collision has ended."""
+ENDS = ("outcome", "rest")
+"""Words for the end of a collision."""
+
+
+def _end(value: Any, name: str) -> Any:
+    """Read the end of a collision: a word of `ENDS`, or a time [s].  Raises BadInput."""
+    if any(is_word(value, word) for word in ENDS):
+        return value
+    try:
+        return duration(value, name)
+    except BadInput as error:
+        raise BadInput([f"{line}; or give 'outcome' or 'rest'" for line in error.problems]) from None
+
+
+@dataclass(frozen=True)
+class Ending(Settings):
+    """When a collision ends, and how often it is recorded.
+
+    Parameters
+    ----------
+    end : str or float, optional
+        "outcome": when the fragments are apart for good and hold together; "rest": when contacts no longer change; or
+        a time [s].
+    frames : int, optional
+        Number of frames, and rows of the ledger, of a collision of the usual length; each doubling of the time adds
+        half of it.
+    """
+
+    end: Annotated[Any, Reading(_end)] = "outcome"
+    frames: Annotated[int, Whole(1, MOST_STEPS)] = FRAMES
 
 
 @checked
@@ -50,11 +86,13 @@ def collide(
     seed: int | None = None,
     forces: Sequence[Force] | None = None,
     stepping: Integrator | None = None,
+    end: Any = "outcome",
+    frames: Any = FRAMES,
     out: str | Path | None = None,
     overwrite: bool = False,
     observers: Sequence[Any] = (),
 ) -> tuple[Collision, Simulation]:
-    """Simulate the collision of a projectile with a target in open space until contacts no longer change.
+    """Simulate the collision of a projectile with a target in open space until its outcome is decided.
 
     Parameters
     ----------
@@ -66,6 +104,8 @@ def collide(
         Seed of random rotations of both bodies; None keeps their orientations.
     forces : sequence of Force or None, optional
         `[sand.Contact()]` by default.
+    end, frames : optional
+        See `Ending`.
     stepping, out, overwrite, observers : optional
         As for `sand.Simulation`.
 
@@ -81,9 +121,10 @@ def collide(
     BadInput
         As `sand.setup.encounter` and `sand.Simulation`.
     """
+    ending = Ending(end, frames)
     start = approach(target, projectile, speed=speed, impact_parameter=impact_parameter, along=along, seed=seed)
     simulation = prepare(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
-    return run_to_end(start, simulation), simulation
+    return run_to_end(start, simulation, ending), simulation
 
 
 def approach(
@@ -107,7 +148,6 @@ def prepare(
         [Contact()] if forces is None else forces,
         stepping=stepping,
         seed=start.seed,
-        frame_every=start.check_every,
         **options,
     )
 
@@ -146,7 +186,7 @@ def resume_collision(
     return simulation
 
 
-def run_to_end(start: Approach, simulation: Simulation) -> Collision:
+def run_to_end(start: Approach, simulation: Simulation, ending: Ending = Ending()) -> Collision:
     """Run a collision to its end and classify the outcome.
 
     Raises
@@ -159,8 +199,8 @@ def run_to_end(start: Approach, simulation: Simulation) -> Collision:
     before = len(simulation.contacts["pair"]) if simulation.steps == 0 else int(simulation.ledger.rows[0]["contacts"])
     record = simulation.writer
     if record is not None:
-        record.draws = False  # the figure is drawn once at the end, not after each interval
-    end = _until_quiet(simulation, start)
+        record.draws = False  # the figure is drawn once at the end, not after each part
+    end = _run(simulation, start, ending)
     found = classify_collision(simulation, start, before, end)
     simulation.title = collision_title([asdict(found)], start.bodies())
     if record is not None:
@@ -168,45 +208,62 @@ def run_to_end(start: Approach, simulation: Simulation) -> Collision:
     return found
 
 
-def expected_end(start: Approach) -> float:
-    """Time [s] at which a collision with contacts usually ends; it takes `MOST_CHECKS` intervals at most."""
-    return start.flight + USUAL_CHECKS * INTERVAL * start.check_every
+def expected_end(start: Approach, ending: Ending = Ending()) -> float:
+    """Time [s] at which a collision with contacts usually ends; see `latest_end`."""
+    return start.flight + USUAL * start.unit_of_time if ending.end in ENDS else ending.end
 
 
-def _until_quiet(simulation: Simulation, start: Approach) -> str:
-    """Run until contacts neither form, slip nor break for `QUIET` intervals, or bodies that miss cannot touch any more.
+def latest_end(start: Approach, ending: Ending = Ending()) -> float:
+    """Time [s] at which a collision ends at the latest."""
+    return start.flight + LONGEST * start.unit_of_time if ending.end in ENDS else ending.end
 
-    Checks made before an interruption are repeated with the ledger: each uses the row of its time.
 
-    Returns
-    -------
-    str
-        Why it ended; "" after `MOST_CHECKS` intervals.
+def _run(simulation: Simulation, start: Approach, ending: Ending) -> str:
+    """Run a collision to its end; returns why it ended, "" if it was stopped before the outcome was decided.
+
+    The end depends on regular states alone, at regular steps, and so neither on output nor on interruptions. The
+    interval of frames is that of `Ending.frames` up to the expected end, and doubles whenever the time has doubled.
     """
-    across = float(np.ptp(start.grains.position, axis=0).max())
-    until, unchanged, last = start.flight, 0, (-1, -1, -1)
-    for check in range(1 + MOST_CHECKS):  # the first one is at the earliest contact
-        row = next((row for row in simulation.ledger.rows if row["time"] >= until), None)
-        if row is None:
-            result = simulation.run(until=until)
+
+    def has_ended(simulation: Simulation) -> bool:
+        # a check is at the end of the cycle of r-RESPA in which a multiple of EVERY lies
+        is_due = moves_bodies(simulation.stepping) or simulation.steps % (EVERY * LOOK_EVERY) < EVERY
+        return is_due and bool(why_ended(simulation, start, ending))
+
+    condition = has_ended if ending.end in ENDS else None
+    part, last = expected_end(start, ending), latest_end(start, ending)
+    every = part / ending.frames
+    while simulation.met_condition != GIVEN and simulation.time < last:
+        until = min(part, last)
+        if simulation.time < until:
+            simulation.frame_every = every
+            result = simulation.run(until=until, stop=condition)
             if result.outcome.is_physics:
                 raise BadInput(f"the collision cannot be computed: {result}")
-            row = simulation.ledger.rows[-1]
-        until = row["time"] + INTERVAL * start.check_every
-        now = (int(row["made"]), int(row["moved"]), int(row["broken"]))
-        # had it been so at an earlier row, the collision would have ended there
-        if not any(now) and row["time"] >= simulation.time:
-            parted = cannot_touch(simulation, len(start.target))
-            if parted:
-                return parted
-        if check == 0:
-            continue
-        unchanged = unchanged + 1 if now == last else 0
-        last = now
-        contact = now[0] > 0 or row["time"] > start.flight + across / start.speed
-        if contact and unchanged >= QUIET:
-            return "contacts no longer change"
-    return ""
+        part, every = 2.0 * part, 2.0 * every
+    return why_ended(simulation, start, ending)
+
+
+def why_ended(simulation: Simulation, start: Approach, ending: Ending = Ending()) -> str:
+    """Why a collision has ended; "" if it goes on."""
+    state, time = simulation.regular_state, simulation.time
+    if time < start.flight:  # the earliest contact
+        return ""
+    made, touched = state.count[MADE], state.count[[MADE, BROKEN, SLIPPED]].any()
+    across = float(np.ptp(start.grains.position, axis=0).max())
+    last = float(max(state.clock[CHANGED], state.clock[SLID])) if made else start.flight + across / start.speed
+    is_at_rest, knows = time - last >= QUIET * start.unit_of_time, can_tell(simulation)
+    if is_at_rest and (ending.end == "rest" or not knows):
+        return "contacts no longer change"
+    if not knows or (ending.end == "rest" and touched):
+        return ""
+    labels = cluster_labels(len(start.grains), simulation.contacts["pair"])
+    apart = cannot_touch(simulation, labels)
+    if not (apart and touched):
+        return apart
+    holds = is_at_rest if forces_at_distance(simulation) else are_settled(simulation, labels)
+    text = "the fragments are apart and hold together" if labels.any() else "one body is left and holds together"
+    return text if holds else ""
 
 
 @checked

@@ -12,7 +12,7 @@ from pydantic import Field
 from ..basics.arguments import MOST_GRAINS
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
-from ..basics.settings import For, List, Number, Reading, Whole, Word
+from ..basics.settings import For, List, Number, Reading, Whole, Word, declared
 from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
 from ..config.key_errors import validate
 from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator
@@ -23,8 +23,9 @@ from ..setup.from_file import body_from_file
 from ..setup.grain_classes import BODY_FILE
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
+from ..simulation.cadence import FRAMES
 from ..simulation.simulation import Simulation
-from .collision import Approach, Collision, approach, prepare, run_to_end
+from .collision import Approach, Collision, Ending, approach, prepare, run_to_end
 
 BodyKind = Annotated[str, Word("file", among=KINDS)]
 """A builder, or "file"."""
@@ -102,6 +103,12 @@ class ImpactSection(Section):
     """Rotate both bodies at random, by the seed."""
     seeds: Seeds = Field(default_factory=lambda: [1])
     """One collision is run for each seed."""
+    end: Annotated[Any, declared(Ending)["end"].setting] = "outcome"
+    """`outcome`: when the fragments are apart for good and hold together; `rest`: when contacts no longer change; or a
+    time [s]."""
+    frames: Annotated[int, declared(Ending)["frames"].setting] = FRAMES
+    """Number of frames, and rows of the ledger, of a collision of the usual length; each doubling of its time adds half
+    of it."""
     out: PathName | None = None
     """Folder of the results."""
 
@@ -128,6 +135,10 @@ class CollisionCase(Section):
             seed=seed if self.impact.turn else None,
         )
 
+    def ending(self) -> Ending:
+        """When collisions end, and how often they are recorded."""
+        return Ending(self.impact.end, self.impact.frames)
+
     def physics(self) -> tuple[list[Any] | None, Verlet]:
         """Forces and integrator, as `collision.prepare` and `collision.resume_collision` take them."""
         return self.forces.build() or None, self.stepping
@@ -146,7 +157,7 @@ class CollisionCase(Section):
         """Simulate one collision; options are those of `Simulation`. Raises BadInput."""
         start = self.approach(seed)
         simulation = prepare(start, *self.physics(), **options)
-        return run_to_end(start, simulation), simulation
+        return run_to_end(start, simulation, self.ending()), simulation
 
 
 def read_collision(path: str | Path) -> CollisionCase:

@@ -81,7 +81,7 @@ class CollisionJob(Job):
                 lambda: prepare(start, *physics, out=self.folder, overwrite=replace, observers=observers)
             )
             self.describe(ONE_COLLISION)
-        return run_to_end(start, simulation).to_dict()
+        return run_to_end(start, simulation, self.case.ending()).to_dict()
 
     def results(self, outcomes: list[dict[str, Any]]) -> dict[str, Any]:
         """All outcomes and how often each occurred; draws a figure."""

@@ -53,8 +53,8 @@ class Approach(NamedTuple):
         return " + ".join(f"{n} grain{'s' * (n > 1)} of {m}" for n, m in zip((first, second), names, strict=True))
 
     @property
-    def check_every(self) -> float:
-        """Time between frames [s]: 0.1 r/v of the smallest grain, a twentieth of the time for its diameter.
+    def unit_of_time(self) -> float:
+        """Unit of the times of a collision [s]: 0.1 r/v of the smallest grain, a twentieth of the time of its diameter.
 
         At least 30 sound crossing times of its radius.
         """
@@ -100,9 +100,9 @@ class Collision:
     drift : float
         Relative energy error of the ledger.
     quiet : bool
-        False if the simulation was stopped while contacts still changed.
+        False if the simulation was stopped before its outcome was decided.
     end : str
-        Why the simulation ended: contacts no longer change, or bodies that miss each other cannot touch any more.
+        Why the simulation ended.
     """
 
     outcome: str
@@ -163,7 +163,7 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
     before : int
         Initial number of contacts.
     end : str
-        Why the simulation ended; "" if it was stopped while contacts still changed.
+        Why the simulation ended; "" if it was stopped before its outcome was decided.
     """
     target, projectile, speed = start.target, start.projectile, start.speed
     grains, row = simulation.grains, simulation.ledger.rows[-1]
@@ -197,7 +197,7 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
         steps=simulation.steps,
         drift=simulation.ledger.drift,
         quiet=bool(end),
-        end=end or "stopped while contacts still changed",
+        end=end or "stopped before the outcome was decided",
     )
 
 

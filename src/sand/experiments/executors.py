@@ -21,7 +21,7 @@ from ..basics.errors import BadInput, import_optional, warn
 from ..compiler.program import before_first_calls
 from ..forces.own import IMPORTED
 from ..simulation.signals import STOPS
-from .worker import LONGEST_STOP, SHIELDED, Item, Result, begin_worker, do_task, done_apart
+from .worker import LONGEST_STOP, SHIELDED, STOPPED, Item, Result, begin_worker, do_task, done_apart
 
 ANSWER = 10.0
 """Timeout of the connection to a scheduler [s]."""
@@ -133,7 +133,7 @@ class _Pool(ProcessPoolExecutor):
         begin = partial(begin_worker, threads, list(IMPORTED))
         super().__init__(workers, mp_context=multiprocessing.get_context("spawn"), initializer=begin)
         self._workers = self._processes  # the base class drops its own
-        self._has_started = False
+        self._has_started, self._threads, self._number = False, threads, workers
 
     def submit(self, work: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Submit a task; starts a process if there are fewer than `workers`."""
@@ -145,6 +145,16 @@ class _Pool(ProcessPoolExecutor):
         for future in [self.submit(int) for _ in range(workers)]:
             future.result()
         self._has_started = True
+
+    def renew(self) -> dict[int, str]:
+        """Start all processes again after one has died; returns how it, or several, ended, by process id."""
+        processes = list(self._workers.values())
+        self.stop()
+        dead = {one.pid: one.exitcode for one in processes if one.exitcode not in (None, 0, STOPPED)}
+        with starting_processes():
+            self.__init__(self._number, self._threads)  # type: ignore[misc]
+        self.start(self._number)
+        return {pid: _end_of(code) for pid, code in dead.items() if code != -signal.SIGTERM}  # type: ignore[misc]
 
     def stop(self) -> None:
         """Stop all processes; a process that runs a simulation with files writes a checkpoint first."""
@@ -163,6 +173,14 @@ class _Pool(ProcessPoolExecutor):
                     process.kill()
                 if manager is not None:  # at the end of the program it must not be at work
                     manager.join(LONGEST_STOP)
+
+
+def _end_of(code: int) -> str:
+    """How a process ended, in words, from its exit code."""
+    try:
+        return f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+    except ValueError:
+        return f"by signal {-code}"
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ..basics.errors import BadInput
+from ..basics.version import __version__
 from ..config.case import with_absolute_files
 from ..io.lock import writing
 from ..io.run_folder import CASE, make_folder, read_toml, write_json, write_toml
@@ -107,7 +108,7 @@ class Job:
             make_folder(self.folder, overwrite=self.overwrite)
         with writing(self.folder):
             self.describe(CASE)
-            content = self.compute(executor, observers, progress)
+            content = {**self.compute(executor, observers, progress), "sand": __version__}
             write_json(self.folder / self.RESULTS, content)
             if self.KEPT:  # its content is in the results
                 (self.folder / self.KEPT).unlink(missing_ok=True)

@@ -129,9 +129,8 @@ def write_csv(path: str | Path, kernel: KernelFunction, masses: np.ndarray) -> N
     """
     table, m = on_grid(kernel, masses), si_array(masses, "kg", "masses")
     i, j = np.triu_indices(len(m))
-    columns = {"mass1": m[i], "mass2": m[j], "kernel": table[i, j]}
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    write_table(Path(path), [dict(zip(columns, row, strict=True)) for row in rows])
+    rows = np.stack([m[i], m[j], table[i, j]], axis=1).tolist()
+    write_table(Path(path), [dict(zip(("mass1", "mass2", "kernel"), row, strict=True)) for row in rows])
 
 
 @checked

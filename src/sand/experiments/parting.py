@@ -1,13 +1,19 @@
-"""When two bodies that have not touched cannot touch any more: a bound from their positions, velocities and forces.
+"""When bodies in open space cannot touch any more: a bound from their positions, velocities and forces.
 
 Each body is within a sphere of radius R about its centre of mass.  With the separation x and the relative velocity v of
 the centres, straight paths stay apart by d = |x + v t|, t = max(−x·v/v², 0): the bodies cannot touch if d > R₁ + R₂.
 
-With forces between the bodies that fall off at least as a power of the distance, the work of their attraction from now
-to infinity is at most W = Σ_ij w_ij(|x| − ρ_i − ρ_j), summed over pairs of grains at distances ρ from their centres of
-mass, with w = 2 k μ μ'/r³ for dipoles in any orientation (the work of the largest force 6 k μ μ'/r⁴), |k q q'|/r for
-charges and G m m'/r for masses.  Since the tangential motion only adds a centrifugal force, bodies that recede with
-½ m̄ (x·v/|x|)² > W recede for ever.
+With forces between the bodies that fall off at least as a power of the distance, the work of the attraction of two of
+them from now to infinity is at most W = Σ_ij w_ij(|x| − ρ_i − ρ_j), summed over pairs of grains at distances ρ from
+their centres of mass, with w = 2 k μ μ'/r³ for dipoles in any orientation (the work of the largest force 6 k μ μ'/r⁴),
+|k q q'|/r for charges and G m m'/r for masses.  Since the tangential motion only adds a centrifugal force, two bodies
+that recede at u = x·v/|x| with ½ m̄ u² > W recede for ever.
+
+Of more bodies, each pair has to recede at u > 0.  As long as forces have changed no relative velocity by more than u/2,
+the distance of each pair is at least |x| + u t/2, so that the force between them has given at most the momentum
+∫ F dt ≤ W/(u/2).  The bodies recede for ever if these momenta, 2W/u, change no relative velocity by more than u/2:
+
+    p_ij (1/M_i + 1/M_j) + Σ_k (p_ik/M_i + p_jk/M_j) ≤ u_ij/2,   p = 2W/u,   k other than i and j.
 """
 
 from __future__ import annotations
@@ -20,6 +26,7 @@ import numpy as np
 from ..basics.constants import COULOMB, GRAVITATION, MAGNETIC
 from ..basics.grains import Grains
 from ..contact.model import Contact
+from ..forces.base import Force
 from ..simulation.simulation import Simulation
 
 MARGIN = 0.01
@@ -33,57 +40,79 @@ WORK = {
 """Forces with such a bound: power of the distance, and a strength s of each grain, with w = s s'/r^power."""
 
 
-def cannot_touch(simulation: Simulation, target: int) -> str:
-    """Why two bodies that have not touched cannot touch any more; "" if they may.
+def forces_at_distance(simulation: Simulation) -> list[Force]:
+    """Forces other than those of contacts."""
+    return [force for force in simulation.forces if not isinstance(force, Contact)]
+
+
+def can_tell(simulation: Simulation) -> bool:
+    """Whether there is a bound: external forces, a gas, forces of the user, walls and a box may bring bodies back."""
+    items = (each.items for each in simulation._system.given.values())
+    known = all(force.name in WORK for force in forces_at_distance(simulation))
+    return simulation.box.is_open and not any(items) and known
+
+
+def cannot_touch(simulation: Simulation, labels: np.ndarray) -> str:
+    """Why no two of several bodies can touch any more; "" if they may.
 
     Parameters
     ----------
     simulation : Simulation
-        Simulation of two bodies in open space, without contacts between them.
-    target : int
-        Number of grains of the first body.
+        Simulation of bodies without contacts between them.
+    labels : ndarray
+        The body of each grain (N,), integers 0…K−1.
     """
-    grains, forces = simulation.grains, [force for force in simulation.forces if not isinstance(force, Contact)]
-    if not simulation.box.is_open or any(each.items for each in simulation._system.given.values()):
+    if not can_tell(simulation):
         return ""
-    if any(force.name not in WORK for force in forces):
-        return ""  # external forces, a gas and forces of the user may bring bodies back
-    bodies = [_Body(grains, part) for part in (slice(target), slice(target, None))]
-    one, other = bodies
-    x, v = other.centre - one.centre, other.velocity - one.velocity
-    distance, speed = float(np.linalg.norm(x)), float(np.linalg.norm(v))
-    reach = (1.0 + MARGIN) * (one.radius + other.radius)
-    approach = float(x @ v)
+    if not labels.any():
+        return "one body is left"
+    grains, forces = simulation.grains, forces_at_distance(simulation)
+    bodies = _Bodies(grains, labels)
+    one, other = np.triu_indices(len(bodies.mass), 1)
+    x, v = bodies.centre[other] - bodies.centre[one], bodies.velocity[other] - bodies.velocity[one]
+    distance, approach = np.linalg.norm(x, axis=1), (x * v).sum(axis=1)
+    reach = (1.0 + MARGIN) * (bodies.radius[one] + bodies.radius[other])
     if not forces:
-        closest = distance if approach >= 0.0 else float(np.linalg.norm(x - approach / speed**2 * v))
-        return "the paths of the bodies are straight and do not meet" if closest > reach else ""
-    if approach <= 0.0 or distance <= reach:
+        with np.errstate(invalid="ignore", divide="ignore"):  # at rest, where no time is needed
+            later = np.where(approach < 0.0, -approach / (v * v).sum(axis=1), 0.0)
+        closest = np.linalg.norm(x + later[:, None] * v, axis=1)
+        return "the paths of the bodies are straight and do not meet" if (closest > reach).all() else ""
+    if (approach <= 0.0).any() or (distance <= reach).any():
         return ""
-    reduced = one.mass * other.mass / (one.mass + other.mass)
-    work = math.fsum(_work(force, one, other, distance) for force in forces)
-    parts = 0.5 * reduced * (approach / distance) ** 2 > work
+    recede = approach / distance
+    pairs = zip(one.tolist(), other.tolist(), distance.tolist(), strict=True)
+    work = np.array([math.fsum(bodies.work(force, a, b, d) for force in forces) for a, b, d in pairs])
+    mass = bodies.mass
+    if len(mass) == 2:
+        parts = bool((0.5 * mass[0] * mass[1] / mass.sum() * recede**2 > work).all())
+    else:
+        momentum = 2.0 * work / recede
+        given = np.bincount(one, momentum, len(mass)) + np.bincount(other, momentum, len(mass))
+        parts = bool((given[one] / mass[one] + given[other] / mass[other] <= 0.5 * recede).all())
     return "the bodies recede too fast for their attraction" if parts else ""
 
 
-class _Body:
-    """Mass, centre, velocity and radius of a body, and the distances of its grains from its centre."""
+class _Bodies:
+    """Masses (K,), centres and velocities (K, 3), radii (K,) of bodies, and distances of grains from the centres."""
 
-    def __init__(self, grains: Grains, part: slice):
-        mass, position = np.asarray(grains.mass[part]), np.asarray(grains.position[part])
-        self.mass = float(mass.sum())
-        self.centre = mass @ position / self.mass
-        self.velocity = mass @ np.asarray(grains.velocity[part]) / self.mass
-        self.distance = np.linalg.norm(position - self.centre, axis=1)
-        self.radius = float((self.distance + grains.radius[part]).max())
-        self.grains, self.part = grains, part
+    def __init__(self, grains: Grains, labels: np.ndarray):
+        mass = np.asarray(grains.mass)
+        self.mass = np.bincount(labels, mass)
+        self.centre, self.velocity = (
+            np.column_stack([np.bincount(labels, mass * each) for each in np.asarray(values).T]) / self.mass[:, None]
+            for values in (grains.position, grains.velocity)
+        )
+        self.distance = np.linalg.norm(grains.position - self.centre[labels], axis=1)
+        self.radius = np.zeros(len(self.mass))
+        np.maximum.at(self.radius, labels, self.distance + grains.radius)
+        self.grains, self.labels = grains, labels
 
-
-def _work(force: Any, one: _Body, other: _Body, distance: float) -> float:
-    """Largest work [J] of the attraction between two bodies from a distance [m] to infinity."""
-    power, strength = WORK[force.name]
-    found = strength(one.grains)
-    product = np.multiply.outer(found[one.part], found[other.part])
-    nearest = distance - (1.0 + MARGIN) * np.add.outer(one.distance, other.distance)
-    if not product.any():
-        return 0.0
-    return math.inf if nearest.min() <= 0.0 else float((product / nearest**power).sum())
+    def work(self, force: Any, one: int, other: int, distance: float) -> float:
+        """Largest work [J] of the attraction between two bodies from a distance [m] to infinity."""
+        power, strength = WORK[force.name]
+        found, first, second = strength(self.grains), self.labels == one, self.labels == other
+        product = np.multiply.outer(found[first], found[second])
+        nearest = distance - (1.0 + MARGIN) * np.add.outer(self.distance[first], self.distance[second])
+        if not product.any():
+            return 0.0
+        return math.inf if nearest.min() <= 0.0 else float((product / nearest**power).sum())

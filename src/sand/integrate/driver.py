@@ -15,6 +15,7 @@ import math
 
 from ..basics.state import (
     BROKEN,
+    CHANGED,
     COMPARED,
     CONTACTS,
     CORRECTED,
@@ -28,6 +29,8 @@ from ..basics.state import (
     MADE,
     OUTSIDE,
     PAIR_LIST_SKIN,
+    SLID,
+    SLIPPED,
     SQUARED_SPEED,
     SQUARED_SPIN,
     STAGE,
@@ -290,6 +293,7 @@ def second_half(s):
         return Stop.CONTACTS_FULL.value
     call_hook(s, Hook.BEFORE_CONTACTS)
     stop = call_hook(s, Hook.CONTACTS)
+    slipped = s.count[SLIPPED]
     broken = stop == Stop.NONE.value and update_contacts(s)
     if stop == Stop.NONE.value and formed > 0:
         call_stage(s, StageNumber.FORM)
@@ -316,6 +320,10 @@ def second_half(s):
         call_stage(s, StageNumber.SORT)
         call_stage(s, StageNumber.CONTACT_STEP)
     s.clock[TIME] += dt
+    if broken or formed > 0:
+        s.clock[CHANGED] = s.clock[TIME]
+    if s.count[SLIPPED] != slipped:
+        s.clock[SLID] = s.clock[TIME]
     s.count[STEPS] += 1
     s.count[STAGE] = 0
     call_hook(s, Hook.END_STEP)

@@ -1,4 +1,4 @@
-"""Export of frames to other programs: extended XYZ, LAMMPS data and dump, VTK (.vtp with .pvd).
+"""Export of frames to other programs: extended XYZ, LAMMPS data and dump, VTK (.vtp with .pvd), optics (`optics.py`).
 
 All quantities are SI, except lengths in extended XYZ: its readers expect ångström, and a comment in the file says so.
 LAMMPS files are for `units si` and `atom_style hybrid sphere dipole` (data), or a custom dump. The formats are written
@@ -21,6 +21,7 @@ from ..basics.errors import BadInput, warn
 from ..basics.paths import user_path
 from .extended_xyz import ANGSTROM, format_rows, listed, own_columns, row_form, symbol_of, xyz_frame
 from .frame import Frame, FrameSequence
+from .optics import DEFAULT, Optics, to_adda, to_ddscat, to_mstm
 from .run_folder import replace_file, replacing
 
 
@@ -31,6 +32,7 @@ class Exported(NamedTuple):
     cluster: np.ndarray  # (N,) label of the cluster of each grain
     materials: list[str]  # names of the materials of all frames, which so have the same numbers in each
     number: int  # number of the frame, which no other one has
+    optics: Optics = DEFAULT
 
     @property
     def material(self) -> np.ndarray:
@@ -188,6 +190,9 @@ FORMATS: dict[str, tuple[Callable[[Exported], str], str]] = {
     "lammps-dump": (to_lammps_dump, ".dump"),
     "lammps-data": (to_lammps_data, "-{:012d}.data"),
     "vtk": (to_vtp, "-{:012d}.vtp"),
+    "adda": (to_adda, "-{:012d}.geom"),
+    "ddscat": (to_ddscat, "-{:012d}.dat"),
+    "mstm": (to_mstm, "-{:012d}.pos"),
 }
 """Text of a frame, and end of the file name; one file per frame if the name has the step."""
 
@@ -230,6 +235,7 @@ def export_frames(
     form: str,
     clusters: Callable[[int, np.ndarray], np.ndarray],
     chosen: slice = slice(None),
+    optics: Optics = DEFAULT,
 ) -> list[Path]:
     """Write frames for another program, one after the other: only one is in memory at a time.
 
@@ -240,12 +246,15 @@ def export_frames(
     stem : str or Path
         Path without suffix; "run/pictures" gives run/pictures.xyz, or run/pictures-000000000100.vtp and so on.
     form : str
-        "xyz", "lammps-dump", "lammps-data" or "vtk".
+        "xyz", "lammps-dump", "lammps-data", "vtk", "adda", "ddscat" or "mstm"; of the last three each file holds the
+        largest cluster of a frame.
     clusters : Callable
         Function of the number of grains and the contacts (C, 2) that returns cluster labels (N,), such as
         `analysis.clusters.cluster_labels`.
     chosen : slice, optional
-        Frames to write, by default all. Materials have the same numbers whichever are chosen.
+        Frames to write, by default all. Materials have the same numbers whichever are chosen, but for optics.
+    optics : Optics, optional
+        Settings of files for optics.
 
     Returns
     -------
@@ -278,7 +287,7 @@ def export_frames(
                     left = ", ".join(frame.own)
                     warn(f"LAMMPS data files have no place for own quantities: {left} left out; lammps-dump has them")
                 times[path] = frame.time
-                one = Exported(frame, clusters(len(frame), frame.pair), materials, name)
+                one = Exported(frame, clusters(len(frame), frame.pair), materials, name, optics)
                 file.write(text_of(one).encode())
     if form != "vtk":
         return list(times)

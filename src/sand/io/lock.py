@@ -40,6 +40,8 @@ class FolderLock:
         Whether this process is named in the lock file: its pid, machine, and a random number.
     patience : float, optional
         Longest wall time [s] to wait for another process.
+    name : str, optional
+        Name of the lock file.
 
     Raises
     ------
@@ -49,10 +51,10 @@ class FolderLock:
         If the folder does not exist, or nothing can be written to it.
     """
 
-    def __init__(self, folder: Path, *, write_pid: bool = True, patience: float = 0.0):
+    def __init__(self, folder: Path, *, write_pid: bool = True, patience: float = 0.0, name: str = LOCK):
         from filelock import FileLock, Timeout
 
-        self._path, self._process = folder / LOCK, os.getpid()
+        self._path, self._process = folder / name, os.getpid()
         self._lock: Any = None
         self._name = ""  # what this process has written to the lock file
         if not folder.is_dir():  # filelock would create it
@@ -132,11 +134,11 @@ def _content(path: Path) -> str | None:
     return None
 
 
-def _holder(folder: Path) -> int | None:
-    """The pid in a lock file; None if it cannot be read."""
+def holder(folder: Path, name: str = LOCK) -> int | None:
+    """The pid in a lock file, of the process that had the lock last; None if it cannot be read."""
     for _ in range(READ_ATTEMPTS):
         with contextlib.suppress(ValueError, IndexError):
-            return int((_content(folder / LOCK) or "").split()[0])
+            return int((_content(folder / name) or "").split()[0])
         time.sleep(READ_SECONDS / READ_ATTEMPTS)  # the holder may be writing it
     return None
 
@@ -166,7 +168,7 @@ def _runs_here(folder: Path) -> bool:
 
 def _in_use(folder: Path) -> str:
     """Error message for a folder whose lock is held."""
-    number = _holder(folder)
+    number = holder(folder)
     if number == os.getpid():
         return f"another simulation of this process (pid {number}) writes to {folder}; give each a folder of its own"
     pid = "" if number is None else f" (pid {number})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,14 +53,7 @@ def bpca(
     BadInput
         If an argument is invalid, or grains cannot be placed with a single contact.
     """
-
-    def place(sample: Population, seed: np.uint64) -> np.ndarray:
-        position = np.zeros((3, len(sample.radius)))
-        done = grow_ballistic(empty_hash_grid(sample.grain_set), position, sample.grain_set, seed)
-        require_all_placed(done, len(sample.radius), f"grain {done}")
-        return position.T
-
-    return aggregate(place, grains, radius, material, moment, moments, magnetic, seed)
+    return aggregate(partial(_one_by_one, grow_ballistic), grains, radius, material, moment, moments, magnetic, seed)
 
 
 @checked
@@ -77,14 +71,7 @@ def dla(
     ----------
     Witten & Sander (1981), Phys. Rev. Lett. 47, 1400.
     """
-
-    def place(sample: Population, seed: np.uint64) -> np.ndarray:
-        count = len(sample.radius)
-        position = np.zeros((3, count))
-        done = grow_diffusing(empty_hash_grid(sample.grain_set), position, np.zeros(count), sample.grain_set, seed)
-        require_all_placed(done, count, f"grain {done}")
-        return position.T
-
+    place = partial(_one_by_one, grow_diffusing, work=1)
     return aggregate(place, grains, radius, material, moment, moments, magnetic, seed)
 
 
@@ -145,6 +132,18 @@ def aggregate(
     sample = population(grain_count(grains, "grains of an aggregate"), radius, material, rng.population)
     body = centred_grains(place(sample, rng.positions), sample)
     return assign_moments(body, moment, moments, magnetic, rng.moments)
+
+
+def _one_by_one(grow: Callable[..., int], sample: Population, seed: np.uint64, work: int = 0) -> np.ndarray:
+    """Positions (N, 3) [m] of grains that `grow`, which takes `work` work arrays (N,), adds one by one to an aggregate.
+
+    Raises BadInput if a grain cannot be placed.
+    """
+    position = np.zeros((3, len(sample.radius)))
+    arrays = np.zeros((work, len(sample.radius)))
+    done = grow(empty_hash_grid(sample.grain_set), position, sample.grain_set, seed, *arrays)
+    require_all_placed(done, len(sample.radius), f"grain {done}")
+    return position.T
 
 
 def merge_clusters(

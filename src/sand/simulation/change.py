@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..analysis.clusters import unwrapped
-from ..basics.arrays import SAVED_LONG_RANGE
 from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
 from ..basics.grains import Grains
@@ -18,33 +16,12 @@ from ..basics.initial_pairs import at_same_place
 from ..basics.own_quantities import own_values
 from ..basics.quantity_array import QuantityArray
 from ..basics.schema import BY_NAME, CHANGEABLE, stored
-from ..basics.state import (
-    BROKEN,
-    CHECKED,
-    COMPARED,
-    CONTACTS,
-    FLIGHT,
-    FORMING,
-    MADE,
-    NEEDED,
-    STEP_INCREASES,
-    STEPS,
-    TIME,
-    State,
-    grains_from_arrays,
-)
 from ..basics.units import has_unit_within, si
-from ..components import components_of
 from ..contact.model import Contact
-from ..engine.assemble import build_engine, fitting_forces
-from ..engine.changed_state import joined, refuse_cut_contacts, regrouped_arrays, scaled_positions, subset
-from ..engine.component import Component, in_use
-from ..engine.engine import Engine
+from ..engine.changed_state import joined, refuse_cut_contacts, scaled_positions, subset
 from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
 from ..engine.input_checks import outside_box
-from ..engine.measures import force_columns
-from ..forces.base import Force, LongRangeForce
-from ..integrate.step_control import INCREASE_INTERVAL
+from ..forces.base import Force
 from ..numerics.quaternion import turned_back
 from .settings import read_forces
 
@@ -79,6 +56,8 @@ class Change:
         The grains, to be read: `position`, `radius`, …
     id : ndarray
         (N,) uint32: identity of each grain, its index at the start or the next number that no grain has had.
+    kept : ndarray
+        (K,) indices, before the change, of the grains that stay.
     """
 
     velocity: np.ndarray
@@ -89,8 +68,8 @@ class Change:
     forces: tuple[Force, ...]
     box: Box
     grains: Grains
+    kept: np.ndarray
     _before: tuple[Grains, Box, tuple[Force, ...]]
-    _kept: np.ndarray  # indices before of the grains that stay
     _pair: np.ndarray  # contacts (C, 2) before
     _next_id: int
     _errors: ErrorCollector  # of `remove` and `add`
@@ -100,7 +79,7 @@ class Change:
         fixed: dict[str, Any] = {
             "grains": grains.copy(),
             "_before": (grains, box, tuple(forces)),
-            "_kept": np.arange(len(grains)),
+            "kept": np.arange(len(grains)),
             "_pair": pair,
         }
         fixed |= {"_next_id": next_id, "_errors": ErrorCollector(), "_is_scaled": False}
@@ -187,7 +166,7 @@ class Change:
         rows = np.flatnonzero(stays)
         self._read_own()
         self._set_grains(subset(self.grains, rows), lambda values: values[rows] if len(values) == count else values)
-        object.__setattr__(self, "_kept", self._kept[stays[: len(self._kept)]])
+        object.__setattr__(self, "kept", self.kept[stays[: len(self.kept)]])
 
     def add(self, grains: Grains) -> None:
         """Add grains, such as those of `sand.setup`; they may touch others, and have contacts then, without strain.
@@ -292,7 +271,7 @@ class Change:
     def _pairs(self) -> np.ndarray:
         """Contacts (C, 2) of the grains that stay, in the numbers of the change."""
         number = np.full(len(self._before[0]), -1, np.int64)
-        number[self._kept] = np.arange(len(self._kept))
+        number[self.kept] = np.arange(len(self.kept))
         pair = number[self._pair]
         return pair[(pair >= 0).all(axis=1)]
 
@@ -338,7 +317,7 @@ class Change:
         if self.regroups:
             errors.problems += outside_box(grains, self.box)
             before, box, _ = self._before
-            errors.take(refuse_cut_contacts, subset(before, self._kept), box, grains, self.box, self._pairs())
+            errors.take(refuse_cut_contacts, subset(before, self.kept), box, grains, self.box, self._pairs())
         errors.done()
         return grains
 
@@ -349,116 +328,7 @@ class Change:
         contact = next((force for force in forces if isinstance(force, Contact)), None)
         if contact is None or not self.regroups:
             return
-        added = len(grains) - len(self._kept)
-        numbers = f"{len(self._kept)} to {len(grains) - 1} are those added" if added else "none is added"
+        added = len(grains) - len(self.kept)
+        numbers = f"{len(self.kept)} to {len(grains) - 1} are those added" if added else "none is added"
         found, given = overlapping_pairs(grains, self.box), np.sort(self._pairs(), axis=1)
         refuse_overlaps(grains, contact, found, given, f"after the change, in whose numbers {numbers}")
-
-
-def as_chosen(force: Force, grains: Grains, box: Box) -> Force:
-    """The force with its automatic cut-off as a number, if it was chosen once for these grains at the start.
-
-    A run that is resumed has this number, too, so that a change has the same result in it.
-    """
-    if not isinstance(force, LongRangeForce) or getattr(force, "cutoff", None) != "auto":
-        return force
-    radius = force.resolved(grains, box).get("cutoff")
-    if radius == "auto":
-        return force
-    chosen = copy.copy(force)
-    object.__setattr__(chosen, "cutoff", None if radius == "none" else radius)
-    return chosen
-
-
-def changed_engine(
-    change: Change,
-    present: Sequence[Force],
-    engine: Engine,
-    columns: Sequence[str],
-    seed: int,
-    given: Mapping[str, Component],
-) -> tuple[Engine, tuple[Force, ...], dict[str, Component]]:
-    """The engine after a change, its forces and components; the engine before stays as it is.
-
-    Parameters
-    ----------
-    present : Sequence[Force]
-        The forces before.
-    engine : Engine
-        The engine before.
-    columns : Sequence[str]
-        Columns of the ledger, which are those of the start.
-    given : Mapping[str, Component]
-        The components before that the user gave.
-
-    Raises
-    ------
-    BadInput
-        If something does not fit; all problems at once, as far as each can be found without the others.
-    """
-    errors, state = ErrorCollector(), engine.state
-    given = {name: each.kept(change._kept) for name, each in given.items()}
-    forces = errors.take(change.checked_forces, present)
-    grains = errors.take(change.checked_grains)
-    if forces is not None and grains is not None:
-        errors.take(change.refuse_overlaps, grains, forces)
-    if grains is not None:
-        for each in in_use(given):
-            errors.problems += each.problems_of_motion(grains)
-    errors.done()
-    regroups = change.regroups
-    arrays = {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
-    same = grains_from_arrays(arrays, [grains.materials[k] for k in grains.material], grains.own_units)
-    forces = fitting_forces(forces, engine.stepping)
-    extra = components_of(given, forces, same, change.box)
-    saved = {name: array for each in extra for name, array in each.saved_for_change(state, change.box).items()}
-    parts = (same, forces, change.box, engine.stepping, engine.neighbours, seed, extra)
-    new = build_engine(*parts, fresh=False, saved=saved)
-    without = [name for name in force_columns(new) if name not in columns]
-    if without:
-        raise BadInput(
-            f"forces: the ledger of this run has no column for {', '.join(without)}; give the force at the start, such "
-            "as with a strength of 0, and change it then"
-        )
-    grains.arrays.material[...] = same.arrays.material  # materials are numbered anew
-    rebuilt = regroups or any(len(set(shapes)) > 1 for shapes in _long_range_shapes(state, new.state))
-    if rebuilt or change.box != state.box:
-        for each in extra:
-            errors.problems += each.problems_of_arrays()
-        errors.done()
-    if rebuilt:
-        arrays = regrouped_arrays(state, change._kept, grains, new.state)
-    else:
-        arrays = {name: array.copy() for name, array in state.to_arrays().items()}
-        arrays |= {f"grains/{name}": array for name, array in grains.arrays._asdict().items()}
-    count, clock = arrays["count"], arrays["clock"]
-    for each in extra:
-        each.changed(arrays, regroups=regroups)
-    # the next step is chosen anew, as after a start
-    count[CHECKED] = count[STEP_INCREASES] = count[NEEDED] = count[STEPS] - INCREASE_INTERVAL
-    clock[FLIGHT] = 0.0
-    for each in extra:
-        if each.last_action is not None and each.name not in {own.name for own in engine.components}:
-            clock[each.last_action] = clock[TIME]
-    new.load_state(arrays)
-    new.refresh_loads()
-    if regroups:
-        _as_initial(new.regular_state, int(arrays["count"][MADE]), float(arrays["lost"][FORMING]))
-    return new, forces, given
-
-
-def _long_range_shapes(*states: State) -> list[tuple[tuple[int, ...], ...]]:
-    """Shapes of each saved long-range array in these states; they differ if a force begins or ceases to act."""
-    return [tuple(getattr(state.long_range, name).shape for state in states) for name in SAVED_LONG_RANGE]
-
-
-def _as_initial(state: State, made: int, lost: float) -> None:
-    """Contacts that the change formed are initial ones: they are not counted as formed, and nothing is lost by them."""
-    formed = int(state.count[MADE]) - made
-    if formed == 0:
-        return
-    used = int(state.count[CONTACTS])
-    state.contacts.lost[:, used - formed : used] = 0.0
-    state.lost[FORMING], state.count[MADE] = lost, made
-    if state.count[COMPARED] >= 0:
-        state.count[COMPARED] = made + state.count[BROKEN]

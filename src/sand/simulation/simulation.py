@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,10 +35,11 @@ from ..limits.solid_limits import grain_warnings
 from ..limits.truncation import truncation_warnings
 from ..neighbours.search import Neighbours
 from .cadence import Chosen, chosen_cadence
-from .change import Change, as_chosen, changed_engine
+from .change import Change
+from .changed_engine import as_chosen, changed_engine
 from .condition import GIVEN, Condition
 from .contact_table import ContactTable
-from .cost.cost import StepTimer
+from .cost.cost import Cost, StepTimer, expected_cost
 from .displays import DISPLAYS
 from .exclusive import Exclusive, exclusive
 from .ledger import Ledger, kinetic_energies
@@ -539,6 +541,18 @@ class Simulation(ReadOnlySettings):
         if (seconds := self.wall_times["stepping"]) > 0.0 and self.steps:
             parts.append(f"{self.steps / seconds:.2g} steps/s")
         return ", ".join(parts)
+
+    def expected_cost(self, end: float = math.inf, last_step: float = math.inf, condition: str | None = None) -> Cost:
+        """Expected steps, wall time, memory and disk space of a run that has not begun, as `sand info` says.
+
+        Parameters
+        ----------
+        end, last_step : float, optional
+            Planned end: time [s] and step, infinite where not set.
+        condition : str or None, optional
+            Condition that may end it earlier.
+        """
+        return expected_cost(self, end, last_step, condition)
 
     def __repr__(self) -> str:
         names = ", ".join(force.name for force in self.forces) or "no forces"

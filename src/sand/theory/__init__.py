@@ -28,11 +28,13 @@ from .magnetic import (
     thermal_speed,
 )
 from .magnetic_limits import MagneticLimits, magnetic_limits
+from .papers import PaperRow, paper_table
 
 __all__ = [
     "ContactNumbers",
     "Exponents",
     "MagneticLimits",
+    "PaperRow",
     "aggregate_moment",
     "alignment_exponent",
     "alignment_time",
@@ -52,6 +54,7 @@ __all__ = [
     "lowest_energy",
     "magnetic_limits",
     "mean_size",
+    "paper_table",
     "potential_parameter",
     "reduced_mass",
     "smoluchowski",

@@ -10,7 +10,7 @@ from sand.cli.main import main
 from sand.cli.program import COMMANDS, sand
 
 NAMES = sorted(sand.commands)
-WITHOUT_RESULTS = {"cite", "completion"}
+WITHOUT_RESULTS = {"cite", "completion", "methods"}
 """Commands that print what they are asked for and nothing else."""
 
 

@@ -19,7 +19,7 @@ from sand.config.case import (
     check_case,
     read_case,
 )
-from sand.config.key_errors import _keys_at
+from sand.config.key_errors import keys_at
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
@@ -126,15 +126,15 @@ def test_each_command_has_a_case_with_all_its_keys(command):
         found.setdefault(head.strip("[]"), set()).update(line.lstrip("#").split(" =")[0] for line in lines)
     if command == "grow":
         assert found.pop("grow") == set(GrowSection.model_fields)
-    tables = set(_keys_at(model, ())) - {"materials", "forces", "stepping"}
-    expected = {name: set(_keys_at(model, (name,))) - ignored.get(name, set()) for name in tables}
+    tables = set(keys_at(model, ())) - {"materials", "forces", "stepping"}
+    expected = {name: set(keys_at(model, (name,))) - ignored.get(name, set()) for name in tables}
     if "grains" in expected:
         expected["grains"] -= {"classes"}
-        expected["grains.classes"] = set(_keys_at(model, ("grains", "classes")))
+        expected["grains.classes"] = set(keys_at(model, ("grains", "classes")))
         expected["walls"], expected["driven"] = set(WallSection.model_fields), {key.name for key in keys_of(Driven)}
     expected["materials.NAME"] = set(MaterialSection.model_fields)
     if "forces" in model.model_fields:
-        expected |= {f"forces.{name}": set(_keys_at(model, ("forces", name))) for name in FORCES}
+        expected |= {f"forces.{name}": set(keys_at(model, ("forces", name))) for name in FORCES}
         expected["stepping"] = {"method"}.union(*({key.name for key in keys_of(kind)} for kind in INTEGRATORS.values()))
     assert found == expected
     before = ""

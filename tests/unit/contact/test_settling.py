@@ -119,7 +119,7 @@ def test_symmetric_equations():
         s = rng.normal(size=(20, 3)) * [1.0, 1.0 / slender, 1.0 / slender] @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
         a = sum((one @ one) * np.eye(3) - np.outer(one, one) for one in s)
         b = rng.normal(size=3)
-        x = np.array(solve_symmetric(a[0, 0], a[1, 1], a[2, 2], a[0, 1], a[0, 2], a[1, 2], tuple(b)))
+        x = np.array(solve_symmetric((a[0, 0], a[1, 1], a[2, 2], a[0, 1], a[0, 2], a[1, 2]), tuple(b)))
         scale = np.linalg.norm(a) * np.linalg.norm(x)
         assert np.abs(a @ x - b).max() < 1e-15 * scale
         if slender == 1.0:

@@ -162,5 +162,6 @@ def test_columns_of_the_ledger():
 
 def test_tables_that_follow_the_source():
     """Quantities of a grain, preset materials and outcomes are tables and members made from the source itself."""
-    assert "{records} sand.basics.schema.FIELDS" in text() and "{records} sand.basics.material.PRESETS" in text()
+    assert "{records} sand.basics.schema.FIELDS" in text() and "{records} sand.basics.material.COMMON" in text()
+    assert "{records} sand.theory.paper_table" in text()
     assert re.search(r"autoclass:: sand\.Outcome\n   :undoc-members:", text())

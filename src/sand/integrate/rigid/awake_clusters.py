@@ -13,7 +13,7 @@ from ...contact.constants_table import column_loops
 from ...contact.law import ContactLaw
 from ...contact.mechanics import displacements_of
 from ...contact.poses import pose_at
-from ...contact.settling import list_cluster, rigid_motion, solve_symmetric
+from ...contact.settling import list_cluster, rigid_motion, solve_symmetric, with_grain
 from ...forces.pair.dipole_formulas import pair_load
 from ...numerics.quaternion import turned_back
 from ...numerics.vec import accrue, across, add, cross, dot, load, load4, nearest_image, norm, put, scale, sub
@@ -56,7 +56,7 @@ def kick_clusters(grains, contacts, clusters, span, scratch, parameters):
         size = list_cluster(grains, contacts, clusters, span, first, math.inf)
         rigid_motion(grains, clusters, size)
         mass, force, torque = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        xx = yy = zz = xy = xz = yz = 0.0
+        tensor = (0.0,) * 6
         for k in range(size):
             i = clusters.member[k]
             m, inertia, s = grains.mass[i], grains.inertia[i], load(clusters.offset, i)
@@ -64,14 +64,9 @@ def kick_clusters(grains, contacts, clusters, span, scratch, parameters):
             f = (loads[0, 0, i], loads[0, 1, i], loads[0, 2, i])
             force = add(force, f)
             torque = add(torque, add((loads[1, 0, i], loads[1, 1, i], loads[1, 2, i]), cross(s, f)))
-            xx += m * (s[1] * s[1] + s[2] * s[2]) + inertia
-            yy += m * (s[0] * s[0] + s[2] * s[2]) + inertia
-            zz += m * (s[0] * s[0] + s[1] * s[1]) + inertia
-            xy -= m * s[0] * s[1]
-            xz -= m * s[0] * s[2]
-            yz -= m * s[1] * s[2]
+            tensor = with_grain(tensor, m, inertia, s)
         velocity = scale(dt / mass, force)
-        rotation = solve_symmetric(xx, yy, zz, xy, xz, yz, scale(dt, torque))
+        rotation = solve_symmetric(tensor, scale(dt, torque))
         for k in range(size):
             i = clusters.member[k]
             accrue(grains.velocity, i, add(velocity, cross(rotation, load(clusters.offset, i))))

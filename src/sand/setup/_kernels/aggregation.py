@@ -232,7 +232,7 @@ def pull_to_rest(position, grain_set, x, offset, b, j):
 
 
 @kernel
-def grow_diffusing(grid, position, bound, grain_set, seed):
+def grow_diffusing(grid, position, grain_set, seed, bound):
     """Grow an aggregate by diffusion, as `grow_ballistic`; `bound` is a work array (N,)."""
     insert_grain(grid, 0, (0.0, 0.0, 0.0))
     extent = grain_set.radius[0]

@@ -54,6 +54,10 @@ UNITS = [value for name, value in sorted(globals().items()) if name.startswith("
 """What measured costs are ratios to: the table holds these numbers, and counts as empty if they were others."""
 PROCESS_BYTES = 3.5e8
 """Memory of Python, libraries, compiled code and the figure, measured on Linux."""
+FRAME_BYTES, FRAME_GRAIN_BYTES = 1500.0, 150.0
+"""Disk space [bytes] of a frame and its row, and of each grain in it with the contacts of an aggregate."""
+CHECKPOINT_BYTES, CHECKPOINT_GRAIN_BYTES, KEPT = 20e3, 570.0, 2
+"""Disk space [bytes] of a checkpoint, and of each grain in it; checkpoints that a run keeps."""
 COPIES = 3
 """Copies of the arrays of a state: the present state, one at the time of an output, and what is written."""
 MODES = ("free", "contact", "bodies", "awake")
@@ -74,6 +78,7 @@ class Cost(NamedTuple):
     seconds: float | None  # wall time, without compilation [s]
     parts: dict[str, float]  # of it: stepping, output, start and figure [s]
     memory: float  # [bytes]
+    disk: float | None  # of all files of the run [bytes]
     measured: str  # the runs of this machine from which the speed is known; "" for a rough estimate
     bound: str  # "at most" where the run may need less
 
@@ -109,7 +114,7 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
     memory = PROCESS_BYTES + _bytes(simulation, _pairs_per_grain(simulation))
     if math.isinf(end) and math.isinf(last_step):
         step = expected_steps(simulation, math.inf, 1.0)
-        return Cost(step.span, None, None, None, {}, memory, "", "")
+        return Cost(step.span, None, None, None, {}, memory, None, "", "")
     found = expected_steps(simulation, end, last_step, may_end_earlier=condition is not None)
     speeds, measured = _speeds(kind_of(simulation))
     sums = long_range_seconds(simulation)
@@ -117,7 +122,8 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
         getattr(found, mode) * step_seconds(simulation, mode, found.contacts, sums) * speeds[mode] for mode in MODES
     )
     span = min(end, found.span)
-    output = outputs(simulation, span, found.total) * output_seconds(simulation) * speeds[OUTPUT]
+    number = outputs(simulation, span, found.total)
+    output = number * output_seconds(simulation) * speeds[OUTPUT]
     parts = {"stepping": stepping, "output": output, "start": (START + FIGURE) * speeds[DRAWING]}
     bodies = moves_bodies(simulation.stepping)
     return Cost(
@@ -127,6 +133,8 @@ def expected_cost(simulation: Simulation, end: float, last_step: float, conditio
         math.fsum(parts.values()),
         parts,
         memory,
+        number * (FRAME_BYTES + FRAME_GRAIN_BYTES * len(simulation.start))
+        + KEPT * (CHECKPOINT_BYTES + CHECKPOINT_GRAIN_BYTES * len(simulation.start)),
         measured,
         found.bound,
     )

@@ -1,0 +1,219 @@
+"""`sand methods DIR`: a paragraph on the method of a run or job, with all numbers and references."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..basics.errors import BadInput
+from ..basics.material import PRESETS
+from ..io import run_folder as files
+from . import options, parsing, report
+from .references import ARTICLES, bibtex, software
+
+Sentences = Iterable[str]
+
+
+def _one_form(values: parsing.OptionValues) -> Iterable[str]:
+    if values["as_latex"] and values["as_bibtex"]:
+        yield "--latex and --bibtex exclude each other: print one, then the other"
+
+
+@parsing.command("methods", short_help="Describe the method of a run or job for a paper.", check=_one_form)
+@click.argument("folder", metavar="DIR", type=options.RUN)
+@click.option("--latex", "as_latex", is_flag=True, help="Print LaTeX; its citations are those of --bibtex.")
+@click.option("--bibtex", "as_bibtex", is_flag=True, help="Print what the paragraph cites as a file of BibTeX.")
+@options.imports
+@options.as_json
+@options.debug
+def command(folder: str, as_latex: bool, as_bibtex: bool, as_json: bool) -> None:
+    """Describe the method of a run, of collisions, of boxes of `sand grow` or of a job of `sand scatter`.
+
+    Prints one paragraph with all numbers, made of what is stored in the folder DIR: materials, forces, integrator,
+    steps, grains, seeds and version. References that are named in full are not in the file of --bibtex.
+
+    \b
+    sand methods run1 --latex > method.tex
+    sand methods run1 --bibtex > method.bib
+    """
+    from .method_text import keys_in, latex, plain
+
+    results, sentences = described(Path(folder))
+    text, version = " ".join(sentences), results.get("sand")
+    cited = [one for one in ARTICLES if one.key in keys_in(text)]
+    if as_json:
+        references = [{"reference": one.text(), "bibtex": one.bibtex()} for one in cited]
+        content = {"text": plain(text), "latex": latex(text), "references": references}
+        report.emit({"folder": folder, "version": version, **content, "bibtex": bibtex(cited, version)})
+    elif as_bibtex:
+        click.echo(bibtex(cited, version))
+    else:
+        report.write_line(latex(text) if as_latex else plain(text))
+        if not as_latex:
+            for one in cited:
+                report.write_line(f"  {one.text()}")
+
+
+def described(folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """Results in the folder of a run or job that name the version, and sentences on its method.
+
+    Raises
+    ------
+    BadInput
+        If it has neither run nor job.
+    """
+    if not folder.is_dir():
+        raise BadInput(f"there is no folder {folder}")
+    kind, case, begun = report.job_in(folder)
+    if kind not in KINDS or not begun:
+        known = ", ".join(map(str, KINDS))
+        raise BadInput(f"{folder} holds nothing that was computed by sand {known}; give the folder of a run or job")
+    names = (files.SUMMARY, files.COLLISION, files.SCATTERING)
+    places = [*(folder / name for name in names), *sorted(folder.glob(f"seed-*/{files.SUMMARY}"))]
+    results = next((found for place in places if "sand" in (found := _content(place))), {})
+    return results, [_software(results), *KINDS[kind](folder, case)]
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """Content of a file of results; empty if there is none yet.  Raises BadInput if it is damaged."""
+    return files.read_json(path) if path.exists() else {}
+
+
+def _software(results: dict[str, Any]) -> str:
+    """The version that computed, as the results in the folder say."""
+    from .method_text import cite
+
+    version = results.get("sand")
+    name = software(version) if version else f"{software(None)}, of a version that the folder does not name"
+    others = ", ".join(f"{package} {number}" for package, number in results.get("versions", {}).items())
+    with_others = f", with {others}" if others else ""
+    return f"The simulations were done with {name} {cite('SAND', 'DominikNuebold2002')}{with_others}."
+
+
+def _common(case: Any, names: Iterable[str], results: dict[str, Any], forces: Any) -> Sentences:
+    """Materials of these names, forces and integrator of a case."""
+    from .method_text import of_forces, of_materials, of_steps
+
+    library = {**PRESETS, **{name: table.build(name) for name, table in case.materials.items()}}
+    yield from of_materials(library[name] for name in dict.fromkeys(names))
+    yield from of_forces(forces)
+    yield of_steps(case.stepping, results)
+
+
+def _names(given: Any) -> list[str]:
+    """Names of materials: one, several, or fractions."""
+    return [given] if isinstance(given, str) else list(given or [])
+
+
+def _of_run(folder: Path, path: Path) -> Sentences:
+    from ..config.case import read_case
+
+    results, case = _content(folder / files.SUMMARY), read_case(path)
+    yield from _of_case(case, results, "" if case.grains.kind == "gas" else _radii(folder))
+    yield f"Random numbers have the seed {case.run.seed}."
+    if results:
+        yield f"The error of the energy balance was {results['drift']:.2g} of the dissipated and kinetic energy."
+    else:
+        yield "The run has not ended."
+
+
+def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
+    """Sentences on a case of `sand run`: grains, box, materials, forces, components, integrator and end."""
+    from .method_text import section, settings
+
+    grains, number = case.grains, case.grains.number or results.get("grains")
+    origin = {"gas": "a gas", "file": "of a file", "given": "placed by a script"}[grains.kind]
+    count = f"{number} grains{radii}" if number else f"grains{radii}"
+    yield f"The initial state was {count}, {origin}: {section(grains, 'kind', 'number', 'classes')}."
+    for one in grains.classes:
+        yield f"A class of its members had: {settings(one)}."
+    where = (
+        "open space" if case.box.periodic is None else f"a box, {case.box.periodic.describe().replace(' um', ' µm')}"
+    )
+    yield f"They moved in {where}."
+    used = _names(grains.material) + [name for one in grains.classes for name in _names(one.material)]
+    yield from _common(case, [*used, *case.materials], results, case.forces.build())
+    for name, components in case.components().items():
+        for one in components:
+            yield f"A part of the simulation, {name}, had: {settings(one)}."
+    yield f"The end was {section(case.run, 'out', 'seed', 'frame_every', 'row_every', 'checkpoint_every')}."
+
+
+def _radii(folder: Path) -> str:
+    """Radii in the first frame of a run; nothing if it has none."""
+    from ..basics.units import format_quantity
+    from ..io.trajectory import Frames
+
+    path = folder / files.TRAJECTORY
+    if not path.exists() or not len(frames := Frames(path)):
+        return ""
+    ends = [format_quantity(float(one), "m") for one in (frames[0].radius.min(), frames[0].radius.max())]
+    return f" of radius {' to '.join(dict.fromkeys(ends))}"
+
+
+def _of_growth(folder: Path, path: Path) -> Sentences:
+    from ..config.case import check_case
+    from ..experiments.growth_case import DEFAULT_SEEDS, read_growth
+
+    content, seeds = read_growth(path)
+    boxes = [files.read_json(one) for one in sorted(folder.glob(f"seed-*/{files.SUMMARY}"))]
+    yield f"Growth was followed in boxes that differ by the seed alone: seeds {_seeds(seeds or DEFAULT_SEEDS)}."
+    yield from _of_case(check_case(content, str(path)), {})
+    if boxes:
+        drift = max(box["drift"] for box in boxes)
+        yield (
+            f"{len(boxes)} boxes have run; the largest error of the energy balance was {drift:.2g} of the dissipated "
+            "and kinetic energy."
+        )
+
+
+def _seeds(seeds: list[int]) -> str:
+    """Seeds as text; three or more in a row as a range."""
+    in_a_row = len(seeds) > 2 and seeds == list(range(seeds[0], seeds[-1] + 1))
+    return f"{seeds[0]} to {seeds[-1]}" if in_a_row else ", ".join(map(str, seeds))
+
+
+def _of_collisions(folder: Path, path: Path) -> Sentences:
+    from ..experiments.collision_case import read_collision
+    from .method_text import section
+
+    case, outcomes = read_collision(path), _content(folder / files.COLLISION)
+    summary = _content(folder / files.SUMMARY)
+    for name, body in (("target", case.target), ("projectile", case.projectile)):
+        yield f"The {name} was: {section(body)}."
+    yield (
+        f"They collided with {section(case.impact, 'seeds', 'out')}, b being the sum of the outer radii. Aggregates "
+        f"and orientations have the seeds {_seeds(case.impact.seeds)}; collisions that were simulated: "
+        f"{len(outcomes.get('collisions', []))}."
+    )
+    used = [case.target.material, case.projectile.material, *case.materials]
+    yield from _common(case, used, summary, case.physics()[0])
+
+
+def _of_scattering(folder: Path, path: Path) -> Sentences:
+    from ..basics.units import format_quantity
+    from ..experiments.scattering.scatter_case import read_scattering
+    from .method_text import of_materials, section
+
+    case, flights = read_scattering(path)
+    yield f"The projectile was: {section(case.projectile)}."
+    yield f"The target was: {section(case.target)}." if case.target else "The target was like the projectile."
+    ends = [format_quantity(one, "m") for one in (f(each.distance for each in flights) for f in (min, max))]
+    yield f"Flights of the projectile had: {section(case.flight)}; they began at {' to '.join(dict.fromkeys(ends))}."
+    unused = {"cross-section": ("cells", "per_cell"), "trajectories": ("cells", "per_cell", "relative_error")}
+    yield f"What was computed: {section(case.measure, 'out', *unused.get(case.measure.job, ('relative_error',)))}."
+    yield "The integrator was the Runge-Kutta scheme 8(5,3) with a step chosen from its error (Hairer et al. 1993)."
+    bodies = [body for one in flights[:1] for body in (one.projectile, one.target)]
+    yield from of_materials({m.name: m for body in bodies for m in body.materials}.values())
+
+
+KINDS: dict[str | None, Callable[[Path, Path], Sentences]] = {
+    "run": _of_run,
+    "collide": _of_collisions,
+    "grow": _of_growth,
+    "scatter": _of_scattering,
+}
+"""What describes the folder of each command; the arguments are the folder and its case file."""

@@ -1,0 +1,216 @@
+"""When fragments hold together: the energy left in their motion, and the times in which this motion ends.
+
+`docs/physics/collisions.md` derives the criterion.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.body_motion import motion_of
+from ..analysis.internal_motion import rigid_motion
+from ..basics.arguments import checked
+from ..basics.state import CHANGED
+from ..contact.constants_table import FASTEST_MODE
+from ..contact.law import Strength, contact_strength
+from ..contact.measure import ENERGIES
+from ..contact.model import Contact
+from ..simulation.simulation import Simulation
+
+HORIZON = 10.0
+"""A collision is decided if no contact is expected to break until this multiple of its time."""
+MOST_BREAKS = 1e-4
+"""Expected number of contacts that break until then; small, because the energy is not quite shared at random."""
+
+
+@checked
+def expected_breaks(energy: Any, breaking: Any, modes: Any, attempts: Any) -> np.ndarray:
+    """Expected number of contacts that break in isolated bodies whose vibrations share their energy at random.
+
+    n = A (1 − E_b/E)^(s−1) for E > E_b, otherwise 0: the probability that one of s harmonic modes has at least E_b of
+    the energy E (Kassel 1928), times the number of vibrations of the contacts.
+
+    Parameters
+    ----------
+    energy, breaking : ndarray
+        E ≥ 0, the energy of the vibrations of each body, and E_b > 0, to break its weakest contact [J], (K,).
+    modes : ndarray
+        s, number of modes: 6N − 6 for N grains, (K,).
+    attempts : ndarray
+        A, number of vibrations of all its contacts in the time that is asked for, (K,).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(energy > breaking, 1.0 - np.asarray(breaking) / energy, 0.0)
+    return np.where(share > 0.0, attempts * share ** (np.maximum(modes, 1) - 1.0), 0.0)
+
+
+@checked
+def swing_time(inertia: Any, energy: Any, moment: Any) -> np.ndarray:
+    """Time [s] in which two parts of a body that turn about the contact between them stop, or turn by a radian.
+
+    With the speed Ω = √(2E/J), the shorter one of 1/Ω = √(J/2E) and JΩ/M = √(2EJ)/M, after which the constant moment M
+    of a contact that slips has stopped them: at most √(J/M).
+
+    Parameters
+    ----------
+    inertia, energy, moment : ndarray
+        J > 0 [kg m²], 1/J = 1/J₁ + 1/J₂ of the two parts; E ≥ 0, their relative kinetic energy [J]; M ≥ 0 [N m].
+    """
+    inertia, energy, moment = (np.asarray(each, float) for each in (inertia, energy, moment))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        stop = np.where(energy > 0.0, np.sqrt(2.0 * energy * inertia) / moment, 0.0)
+        return np.minimum(stop, np.sqrt(0.5 * inertia / energy))
+
+
+class Swings(NamedTuple):
+    """Relative motion of the two parts of a body on both sides of each bridge, a contact that alone joins them."""
+
+    contact: np.ndarray  # (B,) index of the bridge
+    inertia: np.ndarray  # (B,) largest J of the two parts about the contact, 1/J = 1/J₁ + 1/J₂ [kg m²]
+    energy: np.ndarray  # (B,) kinetic energy of both as rigid bodies, relative to the rigid motion of the body [J]
+
+
+@checked
+def swings(grains: Any, pairs: np.ndarray, box: Any) -> Swings:
+    """Relative motion of the parts of bodies on both sides of their bridges.
+
+    Parameters
+    ----------
+    grains : Grains
+        Grains of a simulation.
+    pairs : ndarray
+        Contacts (C, 2).
+    box : Box
+        An open box.
+    """
+    motion = rigid_motion(grains, pairs, box)
+    label, x = motion.label, motion.offset.T
+    mass, inertia, radius = (
+        np.asarray(grains.mass)[:, None],
+        np.asarray(grains.inertia)[:, None],
+        grains.radius[:, None],
+    )
+    first, spin = np.unique(label, return_index=True)[1], motion.spin.T[label]
+    total = np.column_stack([np.bincount(label, each) for each in np.hstack((mass, mass * grains.velocity)).T])
+    u, w = grains.velocity - (total[:, 1:] / total[:, :1])[label] - np.cross(spin, x), grains.spin - spin
+    second = (x[:, :, None] * x[:, None, :]).reshape(-1, 9)
+    rows = np.hstack((mass, mass * x, mass * u, mass * np.cross(x, u) + inertia * w, mass * second, inertia))
+    tree = _spanning_tree(len(label), pairs, first)
+    sums = np.vstack((rows, np.zeros(rows.shape[1])))
+    for i in tree.order[:0:-1]:
+        sums[tree.parent[i]] += sums[i]
+    here, contact = tree.bridges, tree.contact[tree.bridges]
+    one, (i, j) = sums[here], np.asarray(pairs)[contact].T
+    other = sums[first[label[here]]] - one
+    at = x[i] + radius[i] / (radius[i] + radius[j]) * (x[j] - x[i])
+    parts = _inertia_about(one, at), _inertia_about(other, at)
+    return Swings(contact, parts[0] * parts[1] / (parts[0] + parts[1]), _kinetic(one) + _kinetic(other))
+
+
+def _kinetic(part: np.ndarray) -> np.ndarray:
+    """Kinetic energy [J] of parts that move as rigid bodies, from their sums in `swings`."""
+    mass, momentum = part[:, :1], part[:, 4:7]
+    centre = part[:, 1:4] / mass
+    angular = part[:, 7:10] - np.cross(centre, momentum)
+    second = part[:, 10:19].reshape(-1, 3, 3) - mass[:, :, None] * centre[:, :, None] * centre[:, None, :]
+    tensor = (np.trace(second, axis1=1, axis2=2) + part[:, 19])[:, None, None] * np.eye(3) - second
+    spin = np.linalg.solve(tensor, angular[:, :, None])[:, :, 0]
+    return 0.5 * ((momentum**2).sum(axis=1) / mass[:, 0] + (angular * spin).sum(axis=1))
+
+
+def _inertia_about(part: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Σ [m |x − c|² + I] [kg m²] about points c (B, 3), which no moment of inertia about an axis exceeds."""
+    square = np.trace(part[:, 10:19].reshape(-1, 3, 3), axis1=1, axis2=2)
+    return square - 2.0 * (part[:, 1:4] * at).sum(axis=1) + part[:, 0] * (at * at).sum(axis=1) + part[:, 19]
+
+
+class _Tree(NamedTuple):
+    """Spanning trees of all bodies, joined at one further node, N."""
+
+    order: np.ndarray  # nodes (N + 1,), each after its parent
+    parent: np.ndarray  # (N + 1,)
+    contact: np.ndarray  # (N + 1,) contact of each grain with its parent
+    bridges: np.ndarray  # grains whose contact with the parent is a bridge
+
+
+def _spanning_tree(count: int, pairs: np.ndarray, first: np.ndarray) -> _Tree:
+    """Spanning trees of bodies with N grains, from the first grain of each (K,), and their bridges."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    ends = np.vstack((np.asarray(pairs, np.int64), np.column_stack((first, np.full(len(first), count)))))
+    numbers = np.arange(1, len(ends) + 1)
+    graph = coo_array((numbers, (ends[:, 0], ends[:, 1])), shape=(count + 1, count + 1)).tocsr()
+    graph = graph + graph.T
+    order, parent = breadth_first_order(graph, count)
+    contact, rank = np.full(count + 1, -1), np.empty(count + 1, np.int64)
+    rank[order] = np.arange(count + 1)
+    contact[order[1:]] = np.asarray(graph[order[1:], parent[order[1:]]]).ravel() - 1
+    in_ring = np.zeros(count + 1, bool)
+    in_ring[first] = in_ring[count] = True
+    up, above = parent.tolist(), rank.tolist()
+    for one, other in ends[np.setdiff1d(np.arange(len(pairs)), contact)].tolist():
+        while one != other:  # the path between both ends along the tree closes a ring
+            one, other = (one, other) if above[one] > above[other] else (other, one)
+            in_ring[one] = True
+            one = up[one]
+    return _Tree(order, parent, contact, np.flatnonzero(~in_ring))
+
+
+def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
+    """Whether no contact of the fragments of a collision is expected to break any more.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Simulation in open space, whose only forces are those of contacts.
+    labels : ndarray
+        Fragment of each grain (N,).
+    """
+    table, grains, state = simulation.contacts, simulation.grains, simulation.regular_state
+    pairs = table["pair"].astype(np.int64)
+    if not len(pairs):
+        return True
+    strength: Any = _strength(simulation, pairs)
+    of_contact, count = labels[pairs[:, 0]], int(labels.max()) + 1
+    stored = np.sum([table[f"energy_{mode}"] for mode in ENERGIES], axis=0) - strength.rest
+    motion = motion_of(grains, pairs, simulation.box, labels)
+    weakest, softest = np.full(count, np.inf), np.full(count, np.inf)
+    np.minimum.at(weakest, of_contact, strength.breaking)
+    np.minimum.at(softest, of_contact, strength.turning)
+    energy = np.maximum(motion.internal + np.bincount(of_contact, stored, count), 0.0)
+    lonely = motion.grains[of_contact] == 2
+    energy[of_contact[lonely]] = _energy_along(grains, pairs[lonely]) + (table["energy_normal"] - strength.rest)[lonely]
+    frequency = np.sqrt(state.contacts.constants[FASTEST_MODE].max()) / (2.0 * np.pi)
+    attempts = (HORIZON - 1.0) * simulation.time * frequency * np.bincount(of_contact, minlength=count)
+    modes = np.where(motion.grains == 2, 1, 6 * motion.grains - 6)
+    if expected_breaks(energy, weakest, modes, attempts).sum() > MOST_BREAKS:
+        return False
+    found = swings(grains, pairs, simulation.box)
+    turns = np.sqrt((rigid_motion(grains, pairs, simulation.box).spin ** 2).sum(axis=0))
+    fast = (motion.rotation > np.minimum(weakest, softest)) & (turns > 0.0)
+    times = [*(1.0 / turns[fast]), *swing_time(found.inertia, found.energy, strength.turning[found.contact])]
+    return simulation.time - float(state.clock[CHANGED]) >= max(times, default=0.0)
+
+
+def _energy_along(grains: Any, pairs: np.ndarray) -> np.ndarray:
+    """Kinetic energy ½ m̄ w² [J] of the motion of two grains along the line of their centres, (C,)."""
+    one, other = pairs.T
+    apart, mass = grains.position[one] - grains.position[other], np.asarray(grains.mass)
+    opening = ((grains.velocity[one] - grains.velocity[other]) * apart).sum(axis=1) / np.linalg.norm(apart, axis=1)
+    return 0.5 * mass[one] * mass[other] / (mass[one] + mass[other]) * opening**2
+
+
+def _strength(simulation: Simulation, pairs: np.ndarray) -> Strength:
+    """`Strength` of each contact, (C,) each."""
+    grains = simulation.grains
+    model = next(force for force in simulation.forces if isinstance(force, Contact))
+    kinds, radii, material = grains.materials, np.asarray(grains.radius).tolist(), np.asarray(grains.material).tolist()
+    between = [[model.pairing(a, b) for b in kinds] for a in kinds]
+    of = [
+        contact_strength(model.contact_law, between[material[i]][material[j]], radii[i], radii[j])
+        for i, j in pairs.tolist()
+    ]
+    return Strength(*np.array(of).T)

@@ -1,0 +1,243 @@
+"""Cases that a sweep can vary: how the case of each command is checked and run, and what a row of the table holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+from ..basics.errors import BadInput
+from ..config.build import resume, simulation_of
+from ..config.case import Case, check_case, material_errors
+from ..config.key_errors import validate
+from ..config.sections import with_integrator
+from ..io.checkpoint_files import checkpoint_files
+from ..io.run_folder import FLIGHTS
+from ..io.table import GrowingTable
+from ..simulation.outcome import Outcome
+from ..simulation.run_writer import summary_of
+from .collision import expected_end, prepare, resume_collision, run_to_end
+from .collision_case import CollisionCase
+
+
+class Expected(NamedTuple):
+    """Expected cost of a run; None where the case does not determine it."""
+
+    seconds: float | None  # wall time [s]
+    memory: float  # [bytes]
+    disk: float | None  # of all its files [bytes]
+
+
+class SweptCase:
+    """The case of a command, as a sweep uses it.
+
+    Parameters
+    ----------
+    content : dict
+        Content of a case file, without [sweep].
+    name : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    BadInput
+        All errors of the case.
+
+    Attributes
+    ----------
+    case : Section
+        The case, checked.
+    seeds : list of int
+        Its seeds.
+    GIVEN : tuple of str
+        Keys of seeds and of the folder, which the sweep gives itself.
+    """
+
+    GIVEN: ClassVar[tuple[str, ...]]
+    case: Any
+    seeds: list[int]
+
+    def __init__(self, content: dict[str, Any], name: str):
+        raise NotImplementedError
+
+    @staticmethod
+    def model(content: dict[str, Any]) -> type:
+        """Model of the case file."""
+        raise NotImplementedError
+
+    def expected(self, seed: int) -> Expected:
+        """Set up a run in memory, which finds all further errors, and estimate its cost.  Raises BadInput."""
+        raise NotImplementedError
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Compute a run, or continue the one in the folder.
+
+        Parameters
+        ----------
+        folder : Path or None
+            Folder for its files; None for no files.
+
+        Returns
+        -------
+        dict
+            Results, which must not depend on the machine or on interruptions.
+
+        Raises
+        ------
+        BadInput
+            If it failed, also for physical reasons.
+        """
+        raise NotImplementedError
+
+
+NO_RESULTS = (
+    *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices", "wall_seconds"),
+    *("ns_per_grain_step", "versions", "source_digest", "sand"),
+)
+"""Entries of the summary of a run that are no results, and those that begin with "wall_"."""
+
+
+class SweptRun(SweptCase):
+    """A case of `sand run`, or of `sand grow`, each box of which is such a run; see `SweptCase`."""
+
+    GIVEN = ("run.seed", "run.out", "grow")
+
+    def __init__(self, content: dict[str, Any], name: str):
+        own = {key: table for key, table in content.items() if key != "grow"}
+        self.case = check_case(own, name)
+        boxes = content.get("grow")
+        self.seeds = list(boxes["seeds"]) if isinstance(boxes, dict) and "seeds" in boxes else [self.case.run.seed]
+
+    @staticmethod
+    def model(content: dict[str, Any]) -> type:
+        """Model of the case file."""
+        return with_integrator(Case, content)
+
+    def expected(self, seed: int) -> Expected:
+        """Set up the run, and estimate its cost."""
+        self.case.run.seed = seed
+        run, simulation = self.case.run, simulation_of(self.case, None)
+        cost = simulation.expected_cost(_or_never(run.until), _or_never(run.steps), run.stop)
+        return Expected(_without_figure(cost), cost.memory, cost.disk)
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Take the run to its end; the results are those of its summary."""
+        self.case.run.seed = seed
+        run, met = self.case.run, None
+        ends = {"until": run.until, "steps": run.steps, "stop": run.stop}
+        if folder is not None and checkpoint_files(folder):
+            simulation = resume(folder, observers=list(observers))
+            end, last, stop = simulation.planned
+            met = simulation.met_condition if stop is not None and simulation.met_condition == stop else None
+            if met or simulation.time >= end or simulation.steps >= last:  # killed before its row was written
+                ends = {"until": simulation.time, "steps": None, "stop": None}
+            elif run.steps is not None:
+                ends["steps"] = run.steps - simulation.steps
+        else:
+            simulation = simulation_of(self.case, folder, overwrite=True, observers=list(observers))
+        result = simulation.run(ends.pop("until"), **ends)
+        if result.outcome.is_physics:
+            raise BadInput(f"stopped by physics: {result}")
+        if result.outcome is Outcome.WALL_TIME:
+            raise BadInput(f"the wall time of its condition, {run.stop}, is used up")
+        ledger = simulation.ledger.with_row(simulation._log_row())
+        summary = summary_of(simulation, result, ledger)
+        kept = {k: v for k, v in summary.items() if k not in NO_RESULTS and not k.startswith("wall_")}
+        return kept | ({"outcome": Outcome.CONDITION_MET.name.lower()} if met else {})
+
+
+class SweptCollision(SweptCase):
+    """A case of `sand collide`; see `SweptCase`."""
+
+    GIVEN = ("impact.seeds", "impact.out")
+
+    def __init__(self, content: dict[str, Any], name: str):
+        problems = material_errors(content, ("target", "projectile"), "silica")
+        self.case: CollisionCase = validate(self.model(content), content, name, problems)
+        self.seeds = list(self.case.impact.seeds)
+
+    @staticmethod
+    def model(content: dict[str, Any]) -> type:
+        """Model of the case file."""
+        return with_integrator(CollisionCase, content)
+
+    def expected(self, seed: int) -> Expected:
+        """Set up the collision, and estimate its cost."""
+        start = self.case.approach(seed)
+        cost = prepare(start, *self.case.physics()).expected_cost(expected_end(start))
+        return Expected(_without_figure(cost), cost.memory, cost.disk)
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Simulate the collision."""
+        start, physics, own = self.case.approach(seed), self.case.physics(), list(observers)
+        if folder is not None and checkpoint_files(folder):
+            simulation = resume_collision(start, folder, *physics, observers=own)
+        else:
+            simulation = prepare(start, *physics, out=folder, overwrite=True, observers=own)
+        found = run_to_end(start, simulation).to_dict()
+        return {key: value for key, value in found.items() if key not in ("seed", "speed")}
+
+
+class SweptScattering(SweptCase):
+    """A case of `sand scatter` with one cross-section; see `SweptCase`."""
+
+    GIVEN = ("measure.seed", "measure.out")
+    NO_RESULTS = ("profile", "interval", "seconds", "seed", "speed")
+
+    def __init__(self, content: dict[str, Any], name: str):
+        from .scattering.scatter_case import ScatterCase
+
+        problems = material_errors(content, ("target", "projectile"), "silica")
+        self.case: Any = validate(ScatterCase, content, name, problems)
+        if self.case.measure.job != "cross-section":
+            raise BadInput(f"{name}: measure.job = {self.case.measure.job!r}; a sweep computes cross-sections")
+        if isinstance(self.case.flight.speed, list):
+            raise BadInput(f"{name}: flight.speed: a run of a sweep has one speed; give them as --vary flight.speed=…")
+        self.seeds = [self.case.measure.seed]
+
+    @staticmethod
+    def model(content: dict[str, Any]) -> type:
+        """Model of the case file."""
+        from .scattering.scatter_case import ScatterCase
+
+        return ScatterCase
+
+    def expected(self, seed: int) -> Expected:
+        """Set up the flights, and estimate their cost."""
+        from .scattering.flight_cost import expected_flights
+
+        number, seconds, _ = expected_flights(self.case, self.case.flights())
+        return Expected(seconds, 0.0, 100.0 * number)
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Measure the cross-section; the flights that are in the folder are not computed again."""
+        from .scattering.cross_sections import measure
+        from .scattering.flights import COLUMNS
+
+        self.case.measure.seed = seed
+        (flight,), goal = self.case.flights(), self.case.measure.relative_error
+        how: dict[str, Any] = {}
+        if folder is not None:
+            table = GrowingTable(folder / FLIGHTS, COLUMNS, resume=True)
+            how = {"known": table.rows, "keep": lambda rows: table.add(rows.tolist())}
+        found = measure(flight, relative_error=goal, seed=seed, **how).to_dict()
+        return {key: value for key, value in found.items() if key not in self.NO_RESULTS}
+
+
+def _or_never(end: float | None) -> float:
+    return math.inf if end is None else end
+
+
+def _without_figure(cost: Any) -> float | None:
+    """Wall time [s] of a run in a worker process that has started, and that draws nothing."""
+    return None if cost.seconds is None else cost.seconds - cost.parts.get("start", 0.0)
+
+
+CASES: dict[str, type[SweptCase]] = {
+    "run": SweptRun,
+    "grow": SweptRun,
+    "collide": SweptCollision,
+    "scatter": SweptScattering,
+}
+"""The cases that a sweep can vary, by the command that reads them: one line for each."""

@@ -1,0 +1,119 @@
+"""Files of a sweep: the row of each run in a folder of its own, and the table of all rows as CSV or Parquet."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..basics.errors import BadInput, import_optional, warn
+from .damage import sealed
+from .run_folder import SWEEP_CSV, plain, read_json, read_text, replace_file, replacing, write_json
+
+RUNS, ROW, CLAIM = "runs", "row.json", ".claim"
+"""Folder of the runs of a sweep; in the folder of one, its row, and the file that is locked by who computes it."""
+PARQUET = "sweep.parquet"
+"""The table for programs that read Apache Parquet."""
+STATE, DONE, FAILED = "state", "done", "failed"
+"""Column of the table that says how a run ended, and its values."""
+LAST = ("message", "seconds", "cpu_seconds", "version", "run")
+"""Columns after the results; `COST` of them depend on the machine and on interruptions."""
+COST = ("seconds", "cpu_seconds")
+
+
+def write_row(place: Path, row: dict[str, Any]) -> None:
+    """Write the row of a run to its folder.  Raises FilesFailed."""
+    write_json(place / ROW, sealed(plain(row)))
+
+
+def read_row(place: Path) -> dict[str, Any] | None:
+    """The row in the folder of a run; None if there is none, or if it is damaged, which is noted."""
+    path = place / ROW
+    if not path.exists():
+        return None
+    try:
+        row = read_json(path)
+        if {"case", "seed", STATE, "results", *LAST} <= row.keys():
+            return row
+        reason = f"{path} is not the row of a run"
+    except BadInput as error:
+        reason = str(error)
+    warn(f"{reason}; this run is computed again")
+    return None
+
+
+def read_rows(folder: Path, without: Container[str] = ()) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Names and rows of all runs of a sweep that have ended, without those of some names."""
+    for place in sorted((folder / RUNS).glob("*")):
+        if place.name not in without and (row := read_row(place)) is not None:
+            yield place.name, row
+
+
+def flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """A dictionary of results as cells of a table: entries of dictionaries as `outer_inner`, lists as text."""
+    cells: dict[str, Any] = {}
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            cells |= flat(value, f"{prefix}{key}_")
+        else:
+            cells[f"{prefix}{key}"] = " ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
+    return cells
+
+
+def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Names of the columns of rows that may have different ones, the last of which are `LAST`."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return [*(name for name in names if name not in LAST), *LAST]
+
+
+def write_sweep(folder: Path, rows: Sequence[Mapping[str, Any]], parquet: bool = False) -> None:
+    """Write the table of a sweep, numbers to full precision; with `parquet` also `PARQUET`.  Raises FilesFailed."""
+    names, out = columns_of(rows), io.StringIO()
+    writer = csv.DictWriter(out, names, lineterminator="\n", restval="")
+    writer.writeheader()
+    writer.writerows(rows)
+    replace_file(folder / SWEEP_CSV, out.getvalue().encode())
+    if parquet:
+        pyarrow = import_optional("pyarrow", "--parquet")
+        import_optional("pyarrow.parquet", "--parquet")
+        columns = {name: _of_one_type([row.get(name) for row in rows]) for name in names}
+        with replacing(folder / PARQUET) as file:
+            pyarrow.parquet.write_table(pyarrow.table(columns), file)
+
+
+def _of_one_type(values: list[Any]) -> list[Any]:
+    """Values of a column as they are, or as text if they are of several types."""
+    types = {type(value) for value in values if value is not None}
+    if types <= {int, float}:
+        return [None if value is None else float(value) for value in values] if float in types else values
+    return values if len(types) < 2 else [None if value is None else str(value) for value in values]
+
+
+def read_sweep(folder: Path) -> dict[str, np.ndarray]:
+    """Columns of the table of a sweep: numbers, flags, or text; empty cells of numbers are NaN.  Raises BadInput."""
+    lines = list(csv.reader(read_text(folder / SWEEP_CSV).splitlines()))
+    if not lines or not {STATE, *LAST} <= set(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
+        raise BadInput(f"{folder / SWEEP_CSV} is not the table of a sweep, or it is damaged")
+    return {name: _column([line[k] for line in lines[1:]]) for k, name in enumerate(lines[0])}
+
+
+def _column(texts: Iterable[str]) -> np.ndarray:
+    """A column of numbers if all cells are numbers or empty, of flags, or of text."""
+    cells = list(texts)
+    filled = [cell for cell in cells if cell]
+    if filled and set(filled) <= {"True", "False"} and len(filled) == len(cells):
+        return np.array([cell == "True" for cell in cells])
+    for kind in (int, float):
+        try:
+            numbers = [kind(cell) for cell in filled]
+        except ValueError:
+            continue
+        if filled and len(filled) == len(cells):
+            return np.array(numbers)
+        if filled:
+            return np.array([float(cell) if cell else np.nan for cell in cells])
+    return np.array(cells, dtype=str)
