@@ -16,7 +16,8 @@ from .sources import SOURCES, UNIT_TESTS, identifiers, nodes_of, text_of
 
 CAPABILITIES = {
     "rigid clusters with walls, driven grains and ramps, settling with driven grains": 242,
-    "loops over contacts by what they did in the last step, with displacements that these keep": 198,
+    "loops over contacts by what they did in the last step, with displacements that these keep; cells of neighbour "
+    "lists that are shifted across a periodic wall as a whole": 254,
     "end of a collision when its outcome is decided": 220,
     "presets of papers": 160,
 }
