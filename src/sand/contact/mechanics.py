@@ -36,7 +36,8 @@ def direction_of(separation):
 @formula
 def pose_of(separation, n1, n2, twist):
     """Pose of two grains with x1 − x2 [m], contact pointers n1, n2 in the laboratory frame and twist φ [rad]."""
-    return Pose(*direction_of(separation), n1, n2, twist)
+    n, distance, inverse = direction_of(separation)
+    return Pose(n, distance, inverse, n1, n2, twist)
 
 
 class Displacements(NamedTuple):
