@@ -33,6 +33,8 @@ PLATFORMS = {
 BUNDLE = ("grainview.js", "grainview.css", "licences.txt")
 MISSING = "missing.txt"
 PAGE = Path("src", "sand", "viewer", "page")
+PAPERS = Path("examples", "papers")
+"""Cases and tables of `sand reproduce`."""
 INSTALL = (
     "ci", "--omit=dev", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier",
     "--fetch-retry-maxtimeout=10000",  # ms: who has no network waits half a minute, not two
@@ -214,6 +216,11 @@ class PageHook(BuildHookInterface):
         if version != "editable":
             for path in out.iterdir():
                 build_data["force_include"][str(path)] = str(Path(*PAGE.parts[1:], path.name).as_posix())
+            papers = root / PAPERS  # an editable install reads them where they are
+            for path in papers.rglob("*"):
+                if path.is_file():
+                    inside = path.relative_to(papers).as_posix()
+                    build_data["force_include"][str(path)] = f"sand/experiments/papers/{inside}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Called by hatchling when the wheel is written."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -23,6 +23,7 @@ from .io import run_folder as files
 from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
+from .io.optics import Optics
 from .io.sweep_files import DONE, LAST, RUNS, STATE, read_sweep
 from .io.trajectory import Frame, Frames
 from .simulation.contact_table import Columns
@@ -163,17 +164,29 @@ class Run:
         return still_picture(one, **({"field": self.flux_density(one.time)} | how))
 
     @checked
-    def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
+    def export(
+        self,
+        form: str,
+        stem: str | Path | None = None,
+        frames: slice = slice(None),
+        *,
+        spacing: Any = None,
+        indices: Mapping[str, complex] | None = None,
+    ) -> list[Path]:
         """Write frames for another program.
 
         Parameters
         ----------
         form : str
-            "xyz", "lammps-dump", "lammps-data" or "vtk".
+            "xyz", "lammps-dump", "lammps-data", "vtk"; for optics "adda", "ddscat" or "mstm".
         stem : str or Path or None, optional
             Path without suffix; by default "trajectory" in the run's folder.
         frames : slice, optional
             Frames to write, by default all.
+        spacing : float or str, optional
+            Spacing of dipoles [m], for "adda" and "ddscat"; by default a tenth of the smallest diameter.
+        indices : mapping of str to complex, optional
+            Refractive indices n + ik of materials, for "mstm".
 
         Returns
         -------
@@ -186,7 +199,8 @@ class Run:
             If the format is unknown, there is no frame, or the folder does not exist.
         """
         place = self.folder / "trajectory" if stem is None else Path(stem)
-        return export_frames(self.frames, place, form, cluster_labels, frames)
+        length = None if spacing is None else si(spacing, "m", "spacing", above=0.0)
+        return export_frames(self.frames, place, form, cluster_labels, frames, Optics(length, indices or {}))
 
     def to_xarray(self) -> Any:
         """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray.

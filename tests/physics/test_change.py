@@ -8,6 +8,7 @@ import pytest
 import sand
 from sand.basics.errors import BadInput
 from sand.basics.state import CONTACTS
+from sand.engine import assemble
 
 from .setups import struck_chain
 
@@ -289,8 +290,12 @@ def test_a_box_that_cuts_a_contact_is_refused():
 
 
 @pytest.mark.compiled("dipoles")
-def test_charges_sum_all_images_after_a_change_to_a_periodic_box():
-    """From an open box and from a slab: forces are those of a new simulation, bit by bit; a slab is warned of."""
+def test_charges_sum_all_images_after_a_change_to_a_periodic_box(monkeypatch):
+    """From an open box and from a slab: forces are those of a new simulation, bit by bit; a slab is warned of.
+
+    The loops are those of many grains, which tests of the sums compile, too.
+    """
+    monkeypatch.setattr(assemble, "WIDE_FROM", 1)
     grains = sand.setup.gas(8, None, extent=1e-6, radius=1e-8, material="silica", temperature="300 K", seed=1)
     charge = 8e-19 * np.where(np.arange(8) % 2, 1.0, -1.0)
     given = {"velocity": grains.velocity, "charge": charge}

@@ -70,9 +70,15 @@ def test_sticking_speed_of_equal_grains(name, r):
 
 @pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
-@pytest.mark.parametrize("factor", [1.05, 1.5, 4.0, 20.0])
-@pytest.mark.parametrize("name", list(MATERIALS))
-@pytest.mark.parametrize(("r1", "r2"), [(1e-8, 1e-8), (1e-6, 1e-6), (1e-7, 4e-7)])
+@pytest.mark.parametrize(
+    ("name", "r1", "r2", "factor"),
+    [
+        pytest.param(name, r1, r2, factor, marks=() if (k + n + m) % 3 == 0 else pytest.mark.validate)
+        for k, name in enumerate(MATERIALS)
+        for n, (r1, r2) in enumerate([(1e-8, 1e-8), (1e-6, 1e-6), (1e-7, 4e-7)])
+        for m, factor in enumerate((1.05, 1.5, 4.0, 20.0))
+    ],
+)
 def test_rebound_speed(record_bound, name, factor, r1, r2):
     """Rebound √(v² − v_s²) to 1 %, with v_s of unequal radii from the same energy balance."""
     m = MATERIALS[name]

@@ -8,7 +8,6 @@ import pytest
 import sand
 from sand.basics.errors import BadInput
 
-from ..plugins import ForestRuth
 from .test_ramps import BOTH, RADIUS, REST, normal_energy
 
 
@@ -191,28 +190,6 @@ def test_changes_keep_the_prescribed_motion():
         sim.change() as change,
     ):
         change.velocity[:], change.spin[2] = 0.0, 1.0
-
-
-WRONG = {
-    "run(sand.Driven([0, 9]), sand.Driven([0]))": ["there is no grain 9", "grain 0 is given more than once"],
-    "run(sand.Driven([0, 1, 2]))": ["all 3 grains are driven"],
-    "run('all')": ["driven = 'a'"],
-    "run(sand.Driven([0]), stepping=ForestRuth(), neighbours=sand.Neighbours(order='curve'))": ["forest-ruth", "curve"],
-}
-
-
-@pytest.mark.parametrize("wrong", WRONG)
-def test_each_mistake_is_one_line(wrong):
-    def run(*driven, **options):
-        given = driven[0] if isinstance(driven[0], str) else driven
-        sand.Simulation(row_of_grains(3, 1e-8), [sand.Contact()], driven=given, **options)
-
-    with pytest.raises(BadInput) as error:
-        eval(wrong, {"run": run, "sand": sand, "ForestRuth": ForestRuth})
-    assert len(error.value.problems) == len(WRONG[wrong])
-    assert all(text in line for text, line in zip(WRONG[wrong], error.value.problems, strict=True)), (
-        error.value.problems
-    )
 
 
 @pytest.mark.compiled("contacts")

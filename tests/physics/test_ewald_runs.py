@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.engine import assemble
 
 from .setups import random_aggregate
 
@@ -14,8 +15,9 @@ BOX = (0.3e-6, 0.4e-6, 0.35e-6)
 
 
 @pytest.fixture(autouse=True)
-def default_threads():
-    """Restore the default number of threads."""
+def default_threads(monkeypatch):
+    """Restore the default number of threads; loops are those of many grains, which tests of the sums compile, too."""
+    monkeypatch.setattr(assemble, "WIDE_FROM", 1)
     yield
     sand.set_threads(None)
 

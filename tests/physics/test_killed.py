@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sand.cli.exits import DONE, INTERRUPTED
+from sand.cli.main import main
 from sand.io.checkpoint import newest_checkpoint
 from sand.io.trajectory import read_frames
 
@@ -223,12 +224,22 @@ def assert_same_as_undisturbed(undisturbed_run, folder):
 
 
 @pytest.mark.compiled("listed")
-def test_killed_once(undisturbed_run, tmp_path):
-    """Contacts, list, r-RESPA cycles and gas; killed once: same bits in checkpoint, ledger and frames."""
-    arrays, _ = newest_checkpoint(undisturbed_run[1])
+def test_killed_once(tmp_path):
+    """Contacts, list, r-RESPA cycles and gas; killed in its middle: same bits in checkpoint, ledger and frames."""
+    case, whole, folder = tmp_path / "case.toml", tmp_path / "whole", tmp_path / "run"
+    case.write_text(CASE)
+    assert main(["run", str(case), "--out", str(whole), "--quiet"]) == DONE
+    arrays, _ = newest_checkpoint(whole)
     assert arrays["contacts/pair"].shape[1] > 5  # the run has contacts that could be lost
     assert np.isfinite(arrays["long_range/anchor"]).all()
-    assert_same_as_undisturbed(undisturbed_run, killed_and_resumed(undisturbed_run, tmp_path, random.Random(1), 1))
+    job = sand_command("run", str(case), "--out", str(folder), "--quiet")
+    while job.poll() is None and not any(not one.stem.endswith("0" * 15) for one in folder.glob("checkpoint-*.npz")):
+        time.sleep(0.002)
+    job.send_signal(KILL)
+    job.communicate()
+    assert job.returncode not in (DONE, INTERRUPTED)
+    assert main(["resume", str(folder), "--quiet"]) == DONE
+    assert_same_as_undisturbed((None, whole), folder)
 
 
 @stops_others

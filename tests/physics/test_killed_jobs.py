@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import sand
 from sand.cli.exits import BAD_INPUT, DONE, INTERRUPTED
 from sand.cli.main import main
 from sand.io.checkpoint import newest_checkpoint
+from sand.io.sweep_files import COST
 from sand.io.trajectory import read_frames
 
 from ..systems import KILL
@@ -70,7 +72,8 @@ relative_error = 0.01
 seed = 3
 """,
 }
-RESULTS = {"grow": "growth.json", "collide": "collision.json", "scatter": "results.csv"}
+CASES["sweep"] = f"{CASES['collide']}[sweep]\nseeds = 2\n[sweep.vary]\nimpact.speed = [2, 3, 4]\n"
+RESULTS = {"grow": "growth.json", "collide": "collision.json", "scatter": "results.csv", "sweep": "sweep.csv"}
 WAYS = ("Ctrl-C", "SIGTERM", "parent killed", "worker killed")
 
 
@@ -122,6 +125,8 @@ def wait_until(condition, seconds=120.0):
 
 def begun(command, folder, rows=0):
     """Whether the first results of a job are in its folder, and so many rows of them."""
+    if command == "sweep":
+        return len(list(folder.glob("runs/*/row.json"))) >= max(rows, 1)
     name = {"grow": "seed-2/ledger.csv", "collide": "collisions.jsonl", "scatter": "flights.csv"}[command]
     path = folder / name
     return path.exists() and len(path.read_text().splitlines()) >= rows
@@ -129,6 +134,9 @@ def begun(command, folder, rows=0):
 
 def results(command, folder):
     """The numbers of a finished job, without wall times."""
+    if command == "sweep":
+        table = sand.open(folder).table
+        return {name: column.tolist() for name, column in table.items() if name not in COST}
     if command == "scatter":
         return [(folder / name).read_text() for name in ("results.csv", "flights.csv")]
     found = json.loads((folder / RESULTS[command]).read_text())
@@ -191,10 +199,16 @@ def stop_and_check(job, folder, way):
 
 @pytest.mark.parametrize(
     ("command", "way"),
-    [("grow", "Ctrl-C"), ("grow", "worker killed"), ("collide", "parent killed"), ("scatter", "Ctrl-C")],
+    [
+        ("grow", "Ctrl-C"),
+        ("collide", "worker killed"),
+        ("collide", "parent killed"),
+        ("scatter", "SIGTERM"),
+        ("sweep", "parent killed"),
+    ],
 )
 def test_stopped_once(tmp_path, command, way):
-    """In its middle; the resumed job, of two processes where it grows, has the results of an undisturbed one in one."""
+    """In its middle, with two workers; the job resumed in this process has the results of an undisturbed one here."""
     case, folder, undisturbed = (tmp_path / name for name in ("case.toml", "job", "undisturbed"))
     case.write_text(CASES[command])
     assert main([command, str(case), "--out", str(undisturbed), "--workers", "1", "--quiet"]) == DONE
@@ -206,13 +220,24 @@ def test_stopped_once(tmp_path, command, way):
     if command == "grow":
         saved = [newest_checkpoint(box) for box in folder.glob("seed-*") if list(box.glob("checkpoint-*"))]
         assert way == "worker killed" or any(meta["steps"] > 0 for _, meta in saved)
-    if way == "Ctrl-C" and command == "grow":
-        again = start("resume", folder, folder)
-        said = again.communicate(timeout=300)[0]
-        assert again.returncode == DONE, said
-    else:
-        assert main(["resume", str(folder), "--workers", "1", "--quiet"]) == DONE
+    assert main(["resume", str(folder), "--workers", "1", "--quiet"]) == DONE
     assert results(command, folder) == results(command, undisturbed)
+
+
+def test_a_sweep_that_loses_two_workers(tmp_path):
+    """New processes go on with the sweep, which ends by itself, with the results of an undisturbed one."""
+    case, folder, undisturbed = (tmp_path / name for name in ("case.toml", "job", "undisturbed"))
+    case.write_text(CASES["sweep"])
+    assert main(["sweep", str(case), "--out", str(undisturbed), "--workers", "1", "--quiet"]) == DONE
+    job = start("sweep", case, folder)
+    for rows in (1, 3):
+        wait_until(lambda rows=rows: begun("sweep", folder, rows=rows) and workers(job))
+        assert job.poll() is None
+        os.kill(workers(job)[0], KILL)
+    said = job.communicate(timeout=300)[0]
+    assert job.returncode == DONE, said
+    assert said.count("a worker process died (by SIGKILL); the sweep goes on with new ones") == 1  # each note once
+    assert results("sweep", folder) == results("sweep", undisturbed)
 
 
 @pytest.mark.validate

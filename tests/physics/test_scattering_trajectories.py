@@ -353,10 +353,9 @@ def test_moving_target():
     assert np.isnan(path.exchanged)
 
 
+@pytest.mark.validate
 @pytest.mark.compiled("scattering", "contacts")
-@pytest.mark.parametrize(
-    ("radius", "part"), [(1e-4, 0.98), (1e-4, 1.03), pytest.param(1e-6, 1.5, marks=pytest.mark.validate)]
-)
+@pytest.mark.parametrize(("radius", "part"), [(1e-4, 0.98), (1e-4, 1.03), (1e-6, 1.5)])
 def test_sticking_of_large_grains(radius, part):
     """Silica of 100 µm sticks at 0.98 v_s and bounces at 1.03 v_s; of 1 µm it bounces at 1.5 v_s.
 

@@ -226,11 +226,10 @@ def at_walls(sim):
 def bouncing(order="as given", **options):
     """Grains that fly between two walls in a box that is periodic along x and y, with a damped contact model."""
     rng, box = np.random.default_rng(5), sand.Box.periodic("8 um", "8 um", None)
-    position = np.stack(np.meshgrid(*3 * [np.arange(5.0)], indexing="ij"), -1).reshape(-1, 3) * 1.3e-6
-    position -= position.mean(axis=0)
-    grains = sand.Grains(
-        position, R, "silica", velocity=0.3 * rng.normal(size=(125, 3)), spin=1e5 * rng.normal(size=(125, 3))
-    )
+    layers = np.meshgrid(np.arange(-2.0, 3.0), np.arange(-2.0, 3.0), [-2.0, 2.0], indexing="ij")
+    position = 1.3e-6 * np.concatenate([np.stack(layers, -1).reshape(-1, 3), [[x, 0.0, 0.0] for x in range(-2, 3)]])
+    given = {"velocity": 0.3 * rng.normal(size=position.shape), "spin": 1e5 * rng.normal(size=position.shape)}
+    grains = sand.Grains(position, R, "silica", **given)
     walls = [
         sand.Wall([0, 0, -3.2e-6], [0, 0, 1], "silica"),
         sand.Wall([0, 0, 3.2e-6], [0, 0, -1], "silica", velocity=[0.1, 0, -0.05]),

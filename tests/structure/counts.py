@@ -16,10 +16,11 @@ from .sources import SOURCES, UNIT_TESTS, identifiers, nodes_of, text_of
 
 CAPABILITIES = {
     "rigid clusters with walls, driven grains and ramps, settling with driven grains": 242,
-    "loops over contacts by what they did in the last step, with displacements that these keep; cells of neighbour "
-    "lists that are shifted across a periodic wall as a whole": 254,
-    "end of a collision when its outcome is decided": 220,
-    "presets of papers": 160,
+    "loops over contacts by what they did in the last step, with displacements that these keep; sums of dense packings "
+    "side by side; cells of neighbour lists that are shifted across a periodic wall as a whole": 273,
+    "end of a collision when its outcome is decided, kinds of outcomes, averages over impact parameters": 445,
+    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 0,
+    "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8

@@ -11,8 +11,8 @@ from typing import Any
 from ..basics.errors import NoSuchAttribute, did_you_mean
 
 MODULES = (
-    "body_motion", "clusters", "fits", "fractal", "frame_statistics", "internal_motion", "ledger_columns", "network",
-    "quantities", "shape", "tracking",
+    "body_motion", "clusters", "collision_model", "fits", "fractal", "frame_statistics", "internal_motion",
+    "ledger_columns", "network", "quantities", "shape", "tracking",
 )  # fmt: skip
 """Public submodules."""
 

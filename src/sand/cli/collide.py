@@ -67,6 +67,10 @@ def _collision(r: dict[str, Any]) -> str:
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
     unfinished = "" if r["quiet"] else " (stopped before it was decided)"
+    if "kind" in r:  # results of earlier versions lack it
+        energy = r["impact_energy"] / sum(r["grains_before"])
+        scales = " and ".join(f"{energy / r[f'{name}_energy']:.2g} E_{name}" for name in ("roll", "break"))
+        pieces += f"; {r['kind']}, f = {r['growth_efficiency']:.2f}; impact energy per grain {scales}"
     if r["outcome"] == "miss" and r.get("end"):
         return f"miss{unfinished}: no contact formed; {r['end']}; drift {r['drift']:.1e}"
     return (

@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput, warn
-from ..basics.units import si
 from . import options, parsing, report
 
 SUFFIXES = {
@@ -33,6 +32,8 @@ USE = {
 
 def _check(values: parsing.OptionValues) -> Iterable[str]:
     """Options that the format does not use, and values that cannot be read."""
+    from ..basics.units import si
+
     form = values["form"]
     if values["spacing"] is not None and form in SUFFIXES:
         if form not in ("adda", "ddscat"):
@@ -87,6 +88,7 @@ def command(
     ddscat, shape.dat of FROM_FILE; mstm, x y z radius in um.
     """
     from ..analysis.clusters import cluster_labels
+    from ..basics.units import si
     from ..io.export import export_frames, stale_files
     from ..io.file_frames import open_frames
     from ..io.optics import Optics

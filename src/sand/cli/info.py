@@ -15,7 +15,6 @@ from ..config.commands import command_for
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
-from ..io.sweep_files import ROW, RUNS
 from . import options, parsing, report
 from .collide import collision_rows
 from .scatter import result_rows
@@ -153,6 +152,8 @@ def _describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: r
         start = ("run it with", f"sand {job_command} {shlex.quote(str(case))}")
         return name, [("state", "not started"), *rows, start], content
     if job_command == "sweep":
+        from ..io.sweep_files import ROW, RUNS
+
         rows.append(("ended", f"{sum(1 for _ in path.glob(f'{RUNS}/*/{ROW}'))} runs"))
         if (path / files.SWEEP).exists():
             found = files.read_json(path / files.SWEEP)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
-from ..basics.material import PRESETS
+from ..config.commands import command_for
 from ..io import run_folder as files
 from . import options, parsing, report
 from .references import ARTICLES, bibtex, software
@@ -30,7 +30,7 @@ def _one_form(values: parsing.OptionValues) -> Iterable[str]:
 @options.as_json
 @options.debug
 def command(folder: str, as_latex: bool, as_bibtex: bool, as_json: bool) -> None:
-    """Describe the method of a run, of collisions, of boxes of `sand grow` or of a job of `sand scatter`.
+    """Describe the method of a run, of collisions, of boxes of `sand grow`, of a job of `sand scatter` or of a sweep.
 
     Prints one paragraph with all numbers, made of what is stored in the folder DIR: materials, forces, integrator,
     steps, grains, seeds and version. References that are named in full are not in the file of --bibtex.
@@ -74,6 +74,10 @@ def described(folder: Path) -> tuple[dict[str, Any], list[str]]:
     names = (files.SUMMARY, files.COLLISION, files.SCATTERING)
     places = [*(folder / name for name in names), *sorted(folder.glob(f"seed-*/{files.SUMMARY}"))]
     results = next((found for place in places if "sand" in (found := _content(place))), {})
+    if (folder / files.SWEEP_CSV).exists():
+        from ..io.sweep_files import read_sweep
+
+        results = {"sand": " and ".join(sorted(set(read_sweep(folder)["version"].tolist())))}
     return results, [_software(results), *KINDS[kind](folder, case)]
 
 
@@ -95,6 +99,7 @@ def _software(results: dict[str, Any]) -> str:
 
 def _common(case: Any, names: Iterable[str], results: dict[str, Any], forces: Any) -> Sentences:
     """Materials of these names, forces and integrator of a case."""
+    from ..basics.material import PRESETS
     from .method_text import of_forces, of_materials, of_steps
 
     library = {**PRESETS, **{name: table.build(name) for name, table in case.materials.items()}}
@@ -111,7 +116,7 @@ def _names(given: Any) -> list[str]:
 def _of_run(folder: Path, path: Path) -> Sentences:
     from ..config.case import read_case
 
-    results, case = _content(folder / files.SUMMARY), read_case(path)
+    case, results = read_case(path), _content(folder / files.SUMMARY)
     yield from _of_case(case, results, "" if case.grains.kind == "gas" else _radii(folder))
     yield f"Random numbers have the seed {case.run.seed}."
     if results:
@@ -178,27 +183,38 @@ def _seeds(seeds: list[int]) -> str:
 
 def _of_collisions(folder: Path, path: Path) -> Sentences:
     from ..experiments.collision_case import read_collision
-    from .method_text import section
 
     case, outcomes = read_collision(path), _content(folder / files.COLLISION)
-    summary = _content(folder / files.SUMMARY)
+    yield (
+        f"Collisions of two bodies were simulated for the seeds {_seeds(case.impact.seeds)} of aggregates and "
+        f"orientations; {len(outcomes.get('collisions', []))} are finished."
+    )
+    yield from _collision(case, _content(folder / files.SUMMARY))
+
+
+def _collision(case: Any, summary: dict[str, Any]) -> Sentences:
+    """Sentences on a case of `sand collide`."""
+    from .method_text import section
+
     for name, body in (("target", case.target), ("projectile", case.projectile)):
         yield f"The {name} was: {section(body)}."
-    yield (
-        f"They collided with {section(case.impact, 'seeds', 'out')}, b being the sum of the outer radii. Aggregates "
-        f"and orientations have the seeds {_seeds(case.impact.seeds)}; collisions that were simulated: "
-        f"{len(outcomes.get('collisions', []))}."
-    )
+    yield f"They collided with {section(case.impact, 'seeds', 'out')}; b is the sum of the outer radii."
     used = [case.target.material, case.projectile.material, *case.materials]
     yield from _common(case, used, summary, case.physics()[0])
 
 
 def _of_scattering(folder: Path, path: Path) -> Sentences:
-    from ..basics.units import format_quantity
     from ..experiments.scattering.scatter_case import read_scattering
-    from .method_text import of_materials, section
 
     case, flights = read_scattering(path)
+    return _scattering(case, flights)
+
+
+def _scattering(case: Any, flights: list[Any]) -> Sentences:
+    """Sentences on a case of `sand scatter`."""
+    from ..basics.units import format_quantity
+    from .method_text import of_materials, section
+
     yield f"The projectile was: {section(case.projectile)}."
     yield f"The target was: {section(case.target)}." if case.target else "The target was like the projectile."
     ends = [format_quantity(one, "m") for one in (f(each.distance for each in flights) for f in (min, max))]
@@ -210,10 +226,47 @@ def _of_scattering(folder: Path, path: Path) -> Sentences:
     yield from of_materials({m.name: m for body in bodies for m in body.materials}.values())
 
 
+MOST_VALUES = 12
+"""Values of a key of a sweep that are listed."""
+
+
+def _of_sweep(folder: Path, path: Path) -> Sentences:
+    from ..experiments.sweep_cases import CASES
+    from ..io.sweep_files import DONE, STATE, read_sweep
+    from .method_text import value_text
+
+    content = files.read_toml(path)
+    del content["sweep"]
+    command = command_for(content) or ""
+    if command not in CASES:
+        raise BadInput(f"{path} is no case that a sweep can vary")
+    swept = CASES[command](content, str(path))
+    if (folder / files.SWEEP_CSV).exists():
+        table = read_sweep(folder)
+        names = list(table)
+        varied = {name: list(dict.fromkeys(table[name].tolist())) for name in names[: names.index("seed") + 1]}
+        texts = [
+            f"{name} = {value_text(values)}" if len(values) <= MOST_VALUES else f"{name} of {len(values)} values"
+            for name, values in varied.items()
+        ]
+        done = f"{int((table[STATE] == DONE).sum())} of {len(table[STATE])} runs"
+        yield f"A sweep of sand {command} varied {', '.join(texts)} (SI units); {done} were done."
+    else:
+        yield f"No run of a sweep of sand {command} has ended."
+    yield "All else, and values that are not varied, are those of this case:"
+    if command == "collide":
+        yield from _collision(swept.case, {})
+    elif command == "scatter":
+        yield from _scattering(swept.case, swept.case.flights())
+    else:
+        yield from _of_case(swept.case, {})
+
+
 KINDS: dict[str | None, Callable[[Path, Path], Sentences]] = {
     "run": _of_run,
     "collide": _of_collisions,
     "grow": _of_growth,
     "scatter": _of_scattering,
+    "sweep": _of_sweep,
 }
 """What describes the folder of each command; the arguments are the folder and its case file."""

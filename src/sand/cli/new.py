@@ -10,7 +10,7 @@ import click
 from ..basics.errors import BadInput
 from . import options, parsing, report
 
-COMMANDS = ("run", "collide", "scatter", "grow")
+COMMANDS = ("run", "collide", "scatter", "grow", "sweep")
 """Commands that read a case file; as `experiments.templates.TEMPLATES`, which takes long to import."""
 
 
@@ -34,6 +34,7 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
     collide  two fluffy aggregates of silica
     scatter  cross-sections of two magnetic grains of iron
     grow     the gas, for several seeds
+    sweep    the aggregates, for several speeds, impact parameters and seeds
 
     It can be run as it is; keys that are not in use are comments.
     """

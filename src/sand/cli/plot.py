@@ -13,6 +13,8 @@ from ..basics.errors import BadInput, did_you_mean
 from . import options, parsing, report
 
 STILL = "still"
+GROWTH, OF_GROWTH = "growth", {"speed", "impact_parameter", "reach", "growth_efficiency", "kind", "seed"}
+"""The figure of the growth efficiency, and the columns that it needs."""
 FORMATS = ("png", "pdf", "svg")
 FOLDER, SWEEP_TABLE = "plots", "sweep.csv"  # as `PLOTS` and `SWEEP_CSV` of `io.run_folder`, whose import is slow
 
@@ -152,7 +154,8 @@ def command(
     """Draw the run in DIR: figures over time, a still picture of a frame, histograms over grains.
 
     DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD; or a sweep, of which
-    WHAT are columns of results, such as largest_remnant or outcome.
+    WHAT are columns of results, such as largest_remnant or outcome, or growth: growth efficiency and kinds of outcomes
+    over speed and impact parameter.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
     QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
@@ -184,7 +187,12 @@ def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
     sweep = Sweep(folder)
     if what is None:
         return sweep.shown
-    allowed = sweep.results
+    allowed = [*sweep.results, *([GROWTH] if OF_GROWTH.issubset(sweep.table) else [])]
+    mixed = [key for key in sweep.keys if key not in ("impact.speed", "impact.impact_parameter")]
+    if GROWTH in what and mixed:
+        raise BadInput(
+            f"--what {GROWTH} would average over {', '.join(mixed)}; give columns, such as growth_efficiency"
+        )
     if wrong := [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in what if name not in allowed]:
         raise BadInput(wrong)
     return what
@@ -270,10 +278,18 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
 
 def _draw_sweep(sweep: Any, names: list[str], form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw columns of a sweep."""
+    from ..plotting.collisions import growth_figure
     from ..plotting.run_figure import figure_bytes
     from ..plotting.sweeps import sweep_figure
 
-    figures = (sweep_figure(sweep.done, sweep.keys, name) for name in names)
+    def draw(name: str) -> Any:
+        if name != GROWTH:
+            return sweep_figure(sweep.done, sweep.keys, name)
+        columns = {name: sweep.done[name].tolist() for name in OF_GROWTH}
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        return growth_figure(rows, f"{len(rows)} collisions")
+
+    figures = map(draw, names)
     return [figure_bytes(figure, form, how["transparent"], how["dpi"]) for figure in figures]
 
 

@@ -26,6 +26,7 @@ from . import (
     parsing,
     plot,
     report,
+    reproduce,
     resume,
     run,
     scatter,
@@ -35,7 +36,7 @@ from . import (
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 COMMANDS = (
-    *(new, run, resume, build, collide, scatter, grow, sweep),
+    *(new, run, resume, build, collide, scatter, grow, sweep, reproduce),
     *(analyse, plot, view, export, info, methods, cite, completion),
 )
 """One module per command, with a click command named `command`."""

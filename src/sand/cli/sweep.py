@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import click
@@ -100,8 +100,23 @@ def command(
     return sweep(job, dry_run=dry_run, threads=threads, **how)
 
 
-def sweep(job: Any, *, dry_run: bool = False, quiet: bool, as_json: bool, **execution: Any) -> int | None:
-    """Run or continue a `SweepJob`, and print the results; `execution` as for `job.run_job`.
+def sweep(
+    job: Any,
+    *,
+    dry_run: bool = False,
+    more: Callable[[dict[str, Any]], report.Rows] = lambda content: [],
+    quiet: bool,
+    as_json: bool,
+    **execution: Any,
+) -> int | None:
+    """Run or continue a `SweepJob`, and print the results.
+
+    Parameters
+    ----------
+    more : callable, optional
+        Further rows of results.
+    **execution
+        As for `job.run_job`.
 
     Returns
     -------
@@ -133,7 +148,8 @@ def sweep(job: Any, *, dry_run: bool = False, quiet: bool, as_json: bool, **exec
     if not (quiet or as_json):
         report.show(f"sweep {job.path}", [*opening, ("folder", str(job.folder))])
     content = run_job(job, quiet=quiet, as_json=as_json, **execution)
-    report.answer(content, "done" if not content["left"] else "so far", _rows(content), as_json=as_json, quiet=quiet)
+    rows = [*_rows(content), *more(content)]
+    report.answer(content, "done" if not content["left"] else "so far", rows, as_json=as_json, quiet=quiet)
     if content["left"]:
         report.note(f"{content['left']} runs are computed by other processes")
     return PHYSICS if content["failed"] else None

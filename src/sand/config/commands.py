@@ -9,6 +9,7 @@ from ..basics.errors import BadInput
 
 OWN_TABLES = {
     "sweep": {"sweep"},
+    "sequence": {"sequence"},  # of sequential collisions, which only a sweep reads
     "grow": {"grow"},
     "scatter": {"flight", "measure"},
     "collide": {"impact"},
@@ -34,4 +35,5 @@ def refuse_other_command(content: dict[str, Any], path: str | Path, command: str
     own = OWN_TABLES[command] | (OWN_TABLES["run"] if command == "grow" else set())
     if intended in (None, command) or (own & content.keys() and intended not in ("grow", "sweep")):
         return
-    raise BadInput(f"{path}: this is a case for `sand {intended}`; use: sand {intended} {path}")
+    reader = "sweep" if intended == "sequence" else intended
+    raise BadInput(f"{path}: this is a case for `sand {reader}`; use: sand {reader} {path}")

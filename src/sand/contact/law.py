@@ -245,7 +245,8 @@ class Strength(NamedTuple):
 
     rest: float  # energy U(δ₀) at equilibrium [J]
     breaking: float  # energy U(−δ_c) − U(δ₀) to break it [J], 1.542585 F_c δ_c for JKR
-    turning: float  # moment that turns it, the smaller of R k_r ξ_c = 4 F_c ξ_c for JKR and k_t φ_c [N m]
+    rolling: float  # moment that rolls it, R k_r ξ_c, 4 F_c ξ_c for JKR [N m]
+    turning: float  # the smaller of this and the one that twists it, k_t φ_c [N m]
 
 
 @functools.cache
@@ -253,7 +254,7 @@ def contact_strength(law: ContactLaw, pairing: Pairing, r1: float, r2: float) ->
     """Strength of the contact of two grains; radii [m]."""
     c = contact_constants(law)(pairing, r1, r2, 1.0, 1.0)
     rest, roll = rest_energy(law, c, pairing), c.reduced_radius * c.roll_stiffness * c.roll_limit
-    return Strength(rest, float(law.at_break(c)[0]) - rest, min(roll, c.twist_stiffness * c.twist_limit))
+    return Strength(rest, float(law.at_break(c)[0]) - rest, roll, min(roll, c.twist_stiffness * c.twist_limit))
 
 
 def contact_periods(law: ContactLaw, pairing: Pairing, r1: float, r2: float, m1: float, m2: float) -> dict[str, float]:

@@ -86,7 +86,7 @@ class BodySection(Section):
 
 def _offset(value: Any, name: str) -> Any:
     """Check an impact parameter.  Raises BadInput."""
-    offset_of(value, 1.0)
+    offset_of(value, 1.0, 1.0)
     return value
 
 
@@ -96,7 +96,8 @@ class ImpactSection(Section):
     speed: Annotated[Any, Number("m/s", above=0.0)]
     """Relative speed of the centres of mass [m/s]."""
     impact_parameter: Annotated[Any, Reading(_offset)] = 0.0
-    """Impact parameter [m], or a fraction of the sum of the outer radii, "0.5 b"."""
+    """Impact parameter [m], or a fraction of the sum of the outer radii, "0.5 b", or of the characteristic radii
+    √(5/3) r_g, "0.5 c"."""
     along: Literal["x", "y", "z"] = "x"
     """Direction of flight of the projectile."""
     turn: bool = True
@@ -123,9 +124,13 @@ class CollisionCase(Section):
     forces: ForcesSection = ForcesSection()
     stepping: Stepping = Verlet()
 
+    def materials_by_name(self) -> dict[str, Material]:
+        """Presets and the materials of the case, by name."""
+        return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+
     def approach(self, seed: int) -> Approach:
         """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""
-        materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        materials = self.materials_by_name()
         return approach(
             self.target.build(materials, 2 * seed),
             self.projectile.build(materials, 2 * seed + 1),

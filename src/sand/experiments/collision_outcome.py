@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
+from ..analysis.collision_kinds import collision_kind, growth_efficiency
 from ..analysis.quantities import material_names
-from ..analysis.shape import gyration_radius
+from ..analysis.shape import coordination, filling_factor, gyration_radius
+from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.state import LOST
 from ..basics.units import format_quantity
 from ..simulation.simulation import Simulation
+from .settled import strength_of
 
 ENDS = {"stick": "they stick", "bounce": "they bounce", "fragment": "they break up", "miss": "they miss"}
 """Outcomes in words."""
@@ -44,6 +47,11 @@ class Approach(NamedTuple):
         flight = flight / np.linalg.norm(flight)
         return float(np.linalg.norm(offset - (offset @ flight) * flight))
 
+    @property
+    def reach(self) -> float:
+        """Sum of the outer radii of both bodies [m], beyond which no impact parameter can hit."""
+        return sum(_outer_radius(body) for body in (self.target, self.projectile))
+
     def bodies(self) -> str:
         """The bodies in words, such as '64 + 3 grains of silica'."""
         names = [", ".join(material_names(body)) for body in (self.target, self.projectile)]
@@ -63,6 +71,11 @@ class Approach(NamedTuple):
         return max(0.1 * smallest / self.speed, 30.0 * smallest * sound)
 
 
+def _outer_radius(body: Grains) -> float:
+    centre = np.average(body.position, axis=0, weights=body.mass)
+    return float((np.linalg.norm(body.position - centre, axis=1) + body.radius).max())
+
+
 @dataclass(frozen=True)
 class Collision:
     """Outcome of one collision; SI.
@@ -71,14 +84,22 @@ class Collision:
     ----------
     outcome : str
         "stick" (one body), "bounce" (two bodies of the same grains as before), "miss", or "fragment".
+    kind : str
+        One of `analysis.collision_kinds.KINDS`, by the masses of the fragments.
     speed, impact_parameter : float
         Initial values [m/s], [m].
     seed : int or None
         Seed of the orientations; None: as given.
     fragments : tuple of int
         Numbers of grains of the final bodies, by decreasing mass.
-    largest_remnant : float
-        Mass of the largest body over the total mass.
+    largest_remnant, second_remnant : float
+        Masses of the largest and the second body over the total mass.
+    growth_efficiency : float
+        f = (M_largest − M_target)/M_projectile, see `analysis.collision_kinds.growth_efficiency`.
+    reach : float
+        Sum of the outer radii of both bodies [m].
+    grains_before : tuple of int
+        Numbers of grains of target and projectile.
     made, moved, broken : int
         Contacts formed, slipped (steps in which a limit was exceeded), and broken.
     contacts_before, contacts_after : int
@@ -87,10 +108,15 @@ class Collision:
         Energy of the relative motion m̄v²/2 [J].
     lost : dict of str to float
         Energy dissipated per mechanism [J].
+    break_energy, roll_energy : float
+        E_break, and E_roll = 12π²γRξ_c, of a contact [J]: means over the initial contacts, or of one between the
+        bodies where there are none.
     gyration_before : tuple of float
         Radii of gyration of target and projectile [m].
     gyration_after : float
         Radius of gyration of the largest remnant [m].
+    filling_before, filling_after, coordination_before, coordination_after : tuple of float, float
+        Filling factors and mean numbers of contacts of a grain, of the same bodies.
     rebound : float
         Final relative speed of the two largest bodies [m/s], 0 for a single body.
     time : float
@@ -126,6 +152,17 @@ class Collision:
     drift: float = 0.0
     quiet: bool = True
     end: str = ""
+    kind: str = ""
+    second_remnant: float = 0.0
+    growth_efficiency: float = 0.0
+    reach: float = 0.0
+    grains_before: tuple[int, int] = (0, 0)
+    break_energy: float = 0.0
+    roll_energy: float = 0.0
+    filling_before: tuple[float, float] = (0.0, 0.0)
+    filling_after: float = 0.0
+    coordination_before: tuple[float, float] = (0.0, 0.0)
+    coordination_after: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Dictionary for JSON."""
@@ -166,32 +203,45 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
         Why the simulation ended; "" if it was stopped before its outcome was decided.
     """
     target, projectile, speed = start.target, start.projectile, start.speed
-    grains, row = simulation.grains, simulation.ledger.rows[-1]
-    labels = cluster_labels(len(grains), simulation.contacts["pair"])
+    grains, row, pairs = simulation.grains, simulation.ledger.rows[-1], simulation.contacts["pair"].astype(np.int64)
+    labels = cluster_labels(len(grains), pairs)
     masses = np.bincount(labels, weights=grains.mass)
     order = np.argsort(-masses, kind="stable")
     counts = np.bincount(labels)
-    largest = labels == order[0]
+    largest, heaviest = labels == order[0], masses[order[:2]].tolist()
     m1, m2 = float(target.mass.sum()), float(projectile.mass.sum())
+    made, broken, bodies = int(row["made"]), int(row["broken"]), (target, projectile)
+    touching = [body.touching(Box.open())[0] for body in bodies]
+    joined = np.vstack((touching[0], touching[1] + len(target)))
+    strength: Any = strength_of(simulation, joined if len(joined) else np.array([[0, len(target)]]))
+    per_grain = coordination(len(grains), pairs)
     return Collision(
-        outcome=_outcome(labels, len(target), int(row["made"])),
+        outcome=_outcome(labels, len(target), made),
+        kind=collision_kind(m1, m2, masses.tolist(), max(made - 1 + broken, 0) / max(before, 1), touched=made > 0),
         speed=speed,
         impact_parameter=start.impact_parameter,
+        reach=start.reach,
         seed=start.seed,
         fragments=tuple(int(counts[k]) for k in order),
+        grains_before=(len(target), len(projectile)),
         largest_remnant=float(masses[order[0]] / masses.sum()),
-        made=int(row["made"]),
+        second_remnant=float([*heaviest, 0.0][1] / masses.sum()),
+        growth_efficiency=growth_efficiency(m1, m2, heaviest[0]),
+        made=made,
         moved=int(row["moved"]),
-        broken=int(row["broken"]),
+        broken=broken,
         contacts_before=before,
         contacts_after=int(row["contacts"]),
         impact_energy=0.5 * m1 * m2 / (m1 + m2) * speed**2,
+        break_energy=float(strength.breaking.mean()),
+        roll_energy=math.pi * float(strength.rolling.mean()),
         lost={name: row[f"lost_{name}"] for name in LOST},
-        gyration_before=(
-            gyration_radius(target.position, target.mass),
-            gyration_radius(projectile.position, projectile.mass),
-        ),
+        gyration_before=_pair(gyration_radius(body.position, body.mass) for body in bodies),
         gyration_after=gyration_radius(grains.position[largest], grains.mass[largest]),
+        filling_before=_pair(filling_factor(body.position, body.radius, body.mass) for body in bodies),
+        filling_after=filling_factor(grains.position[largest], grains.radius[largest], grains.mass[largest]),
+        coordination_before=_pair(2.0 * len(own) / len(body) for own, body in zip(touching, bodies, strict=True)),
+        coordination_after=float(per_grain[largest].mean()),
         rebound=_rebound(grains, labels, order),
         time=simulation.time,
         steps=simulation.steps,
@@ -199,6 +249,11 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
         quiet=bool(end),
         end=end or "stopped before the outcome was decided",
     )
+
+
+def _pair(values: Iterable[float]) -> tuple[float, float]:
+    one, other = values
+    return one, other
 
 
 def _outcome(labels: np.ndarray, first: int, made: int) -> str:

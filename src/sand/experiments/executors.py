@@ -18,6 +18,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from ..basics.errors import BadInput, import_optional, warn
+from ..basics.version import __version__
 from ..compiler.program import before_first_calls
 from ..forces.own import IMPORTED
 from ..simulation.signals import STOPS
@@ -90,6 +91,11 @@ def results_of(
     ----------
     executor : Executor or None
         Any `concurrent.futures.Executor`; None works through the items in this process, in their order.
+
+    Raises
+    ------
+    BadInput
+        If a worker lacks the package.
     """
     if executor is None:
         for item in items:
@@ -103,13 +109,29 @@ def results_of(
             future.add_done_callback(done.put)
         for _ in waiting:
             future = _next(done)
-            result, warnings = future.result()
+            try:
+                result, warnings = future.result()
+            except Exception as error:
+                if problem := _without_package(error):
+                    raise BadInput(problem) from None
+                raise
             for text in warnings:
                 warn(text)
             yield waiting[future], result
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _without_package(error: BaseException) -> str:
+    """The message for a worker, or a scheduler, that cannot read a task because it lacks SAND; "" for other errors."""
+    each: BaseException | None = error
+    while each is not None:
+        is_missing = isinstance(each, ModuleNotFoundError) and str(each.name).partition(".")[0] == "sand"
+        if is_missing or "deserialization of the task graph" in str(each):
+            return f"a worker or the scheduler lacks the package sand; install sand-dust {__version__} there"
+        each = each.__cause__ or each.__context__
+    return ""
 
 
 def _next(done: SimpleQueue[Future[Any]]) -> Future[Any]:

@@ -173,7 +173,7 @@ def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
     pairs = table["pair"].astype(np.int64)
     if not len(pairs):
         return True
-    strength: Any = _strength(simulation, pairs)
+    strength: Any = strength_of(simulation, pairs)
     of_contact, count = labels[pairs[:, 0]], int(labels.max()) + 1
     stored = np.sum([table[f"energy_{mode}"] for mode in ENERGIES], axis=0) - strength.rest
     motion = motion_of(grains, pairs, simulation.box, labels)
@@ -203,7 +203,7 @@ def _energy_along(grains: Any, pairs: np.ndarray) -> np.ndarray:
     return 0.5 * mass[one] * mass[other] / (mass[one] + mass[other]) * opening**2
 
 
-def _strength(simulation: Simulation, pairs: np.ndarray) -> Strength:
+def strength_of(simulation: Simulation, pairs: np.ndarray) -> Strength:
     """`Strength` of each contact, (C,) each."""
     grains = simulation.grains
     model = next(force for force in simulation.forces if isinstance(force, Contact))

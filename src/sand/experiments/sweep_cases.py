@@ -15,10 +15,15 @@ from ..config.sections import with_integrator
 from ..io.checkpoint_files import checkpoint_files
 from ..io.run_folder import FLIGHTS
 from ..io.table import GrowingTable
+from ..setup.aggregates import chain
 from ..simulation.outcome import Outcome
 from ..simulation.run_writer import summary_of
-from .collision import expected_end, prepare, resume_collision, run_to_end
+from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
+from .sequential import SequenceCase
+
+SEQUENCE = ("outcome", "impact_energy", "contacts_before", "contacts_after", "gyration_after", "time", "steps", "drift")
+"""Results of each collision of a sequence."""
 
 
 class Expected(NamedTuple):
@@ -165,7 +170,9 @@ class SweptCollision(SweptCase):
     def expected(self, seed: int) -> Expected:
         """Set up the collision, and estimate its cost."""
         start = self.case.approach(seed)
-        cost = prepare(start, *self.case.physics()).expected_cost(expected_end(start))
+        end = expected_end(start, self.case.ending())
+        simulation = prepare(start, *self.case.physics(), frame_every=end / self.case.impact.frames)
+        cost = simulation.expected_cost(end)
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
@@ -175,8 +182,42 @@ class SweptCollision(SweptCase):
             simulation = resume_collision(start, folder, *physics, observers=own)
         else:
             simulation = prepare(start, *physics, out=folder, overwrite=True, observers=own)
-        found = run_to_end(start, simulation).to_dict()
+        found = run_to_end(start, simulation, self.case.ending()).to_dict()
         return {key: value for key, value in found.items() if key not in ("seed", "speed")}
+
+
+class SweptSequence(SweptCollision):
+    """A case of sequential collisions, which only a sweep reads; its results are lists over the collisions."""
+
+    SHOWN = ()
+
+    def __init__(self, content: dict[str, Any], name: str):
+        problems = material_errors(content, ("target",), "silica")
+        self.case: SequenceCase = validate(self.model(content), content, name, problems)
+        self.seeds = list(self.case.impact.seeds)
+
+    @staticmethod
+    def model(content: dict[str, Any]) -> type:
+        """Model of the case file."""
+        return with_integrator(SequenceCase, content)
+
+    def expected(self, seed: int) -> Expected:
+        """Twice the cost of the last collision, estimated for chains: each one before it costs half as much."""
+        case, body = self.case, self.case.body(seed)
+        count = len(body) * 2 ** (case.sequence.collisions - 1)
+        long = chain(count, radius=float(body.radius.mean()), material=body.materials[0])
+        start = approach(long, long, speed=case.impact.speed, impact_parameter=0.0, along="x", seed=seed)
+        cost = prepare(start, *case.physics()).expected_cost(expected_end(start, case.ending()))
+        seconds = _without_figure(cost)
+        return Expected(None if seconds is None else 2.0 * seconds, cost.memory, cost.disk)
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Simulate all collisions; nothing is kept of an interrupted run."""
+        found = [one.to_dict() for one in self.case.collide(seed, observers)]
+        return {key: [one[key] for one in found] for key in SEQUENCE} | {
+            "largest": [one["fragments"][0] for one in found],
+            "fragments": [len(one["fragments"]) for one in found],
+        }
 
 
 class SweptScattering(SweptCase):
@@ -238,6 +279,7 @@ CASES: dict[str, type[SweptCase]] = {
     "run": SweptRun,
     "grow": SweptRun,
     "collide": SweptCollision,
+    "sequence": SweptSequence,
     "scatter": SweptScattering,
 }
 """The cases that a sweep can vary, by the command that reads them: one line for each."""

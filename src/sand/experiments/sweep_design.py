@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..basics.errors import BadInput, ErrorCollector, did_you_mean, shown
+from ..basics.errors import BadInput, ErrorCollector, shown
 from ..basics.settings import For, Reading, Whole, Word
 from ..basics.unit_factors import factor
 from ..config.key_errors import keys_at, setting_at
@@ -118,7 +118,7 @@ def flat_keys(table: Any, name: str = "vary") -> dict[str, Any]:
     return found
 
 
-def _several(value: Any, name: str) -> list[dict[str, Any]]:
+def several(value: Any, name: str) -> list[dict[str, Any]]:
     """A list of tables of keys.  Raises BadInput."""
     if not isinstance(value, list):
         raise BadInput(f"{name} must be a list of tables, [[sweep.{name}]]")
@@ -131,7 +131,7 @@ class SweepSection(Section):
     vary: Annotated[dict[str, Any], Reading(flat_keys)] = Field(default_factory=dict)
     """Keys with their values: a list, one value, or a range with so many values: `lin(1 um, 3 um, 5)`, evenly spaced,
     `log(10 m/s, 200 m/s, 10)`, by their logarithm, `square(0 b, 1 b, 6)`, by their square."""
-    together: Annotated[list[Any], Reading(_several)] = Field(default_factory=list)
+    together: Annotated[list[Any], Reading(several)] = Field(default_factory=list)
     """Tables of keys that change together, each with equally many values: [[sweep.together]]."""
     seeds: Annotated[Any, Reading(_seeds)] = None
     """Seeds of each combination: how many, from 1, or a list; none: those of the case."""
@@ -262,19 +262,13 @@ def key_error(model: type, content: Mapping[str, Any], key: str) -> str | None:
         else:
             return f"{key}: {place} is no table"
         if name not in names:
-            near = f"did you mean '{place}.{close}'? " if (close := _nearest(name, names)) else ""
             where = f"[{place}] has" if place else "there are the tables"
-            return f"{key}: there is no such key; {near}{where}: {', '.join(names)}"
+            return f"{key}: there is no such key; {where}: {', '.join(names)}"
         inside = node[int(name)] if isinstance(node, list) else node.get(name, {} if k == 0 else None)
         if inside is None and k + 1 < len(parts):
             return f"{key}: the case has no table [{place}.{name}]; add it to the case file"
         node = inside
     return None if len(parts) > 1 else f"{key} is a table; give one of its keys: {', '.join(keys_at(model, (key,)))}"
-
-
-def _nearest(name: str, names: list[str]) -> str | None:
-    found = did_you_mean(name, names)
-    return found.split("'")[1] if found.startswith("did you mean") else None
 
 
 def takes_whole_numbers(model: type, key: str) -> bool:

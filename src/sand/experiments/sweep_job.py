@@ -17,6 +17,7 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.errors import BadInput, ErrorCollector, FilesFailed, shown, warn
+from ..basics.paths import user_path
 from ..basics.version import __version__
 from ..compiler.jit import cache_folder
 from ..config.case import with_absolute_files
@@ -25,19 +26,7 @@ from ..config.key_errors import validate
 from ..io import run_folder as files
 from ..io.damage import digest_of
 from ..io.lock import FolderLock, holder, writing
-from ..io.sweep_files import (
-    CLAIM,
-    DONE,
-    FAILED,
-    ROW,
-    RUNS,
-    STATE,
-    flat,
-    read_row,
-    read_rows,
-    write_row,
-    write_sweep,
-)
+from ..io.sweep_files import CLAIM, DONE, FAILED, ROW, RUNS, STATE, flat, read_row, read_rows, write_row, write_sweep
 from ..results import Sweep
 from ..simulation.displays import DISPLAYS
 from .executors import results_of
@@ -50,6 +39,7 @@ from .sweep_design import (
     changed_content,
     flat_keys,
     key_error,
+    several,
     takes_whole_numbers,
     value_read,
     without_keys,
@@ -63,7 +53,7 @@ MOST_LOSSES = 3
 """Times that the process of a run may die before the run counts as failed."""
 SET_UP, MOST_SET_UP = 8, 64
 """Runs that are set up before the first one is computed: at least, and at most."""
-ROW_BYTES = 8e3
+ROW_BYTES = 12e3
 """Disk space of a run of which only the row is kept [bytes]."""
 NOTES = 5
 """Warnings of runs that are shown, the most frequent ones."""
@@ -129,7 +119,7 @@ class SweepJob(Job):
         if not isinstance(own, dict):
             raise BadInput(f"{path}: sweep = {shown(own)} must be a table, [sweep]")
         self.section = validate(SweepSection, _replaced(own, settings or {}), str(path), table="sweep")
-        self.folder = Path(folder or self.section.out or f"{self.path.stem}-sweep")
+        self.folder = user_path(folder or self.section.out or f"{self.path.stem}-sweep", "folder")
         self.retry, self.parquet = retry, parquet
         self.command = command_for(self.content) or ""
         if self.command not in CASES:
@@ -343,9 +333,7 @@ class SweepJob(Job):
         begun = [row.name for row in rows if (self.folder / RUNS / row.name / CLAIM).exists()]
         lost = [name for name in begun if holder(self.folder / RUNS / name, CLAIM) in dead]
         how = ", ".join(dict.fromkeys(dead.values())) or "for an unknown reason"
-        warn(
-            f"a worker process died ({how}); the sweep goes on with new ones{f', run {lost[0]} again' if lost else ''}"
-        )
+        warn(f"a worker process died ({how}); the sweep goes on with new ones")
         return lost
 
     def _given_up(self, row: Row) -> dict[str, Any]:
@@ -368,10 +356,16 @@ class _Table:
         self._place = {row.name: k for k, row in enumerate(job.rows)}
         self._states: Counter[str] = Counter()  # of the runs of the design
         self._take_all()
-        versions = Counter(cells["version"] for cells in self.known.values())
-        if others := [f"{number} by {name}" for name, number in versions.items() if name != version()]:
-            warn(f"{job.folder} has runs of other versions of SAND: {', '.join(others)}; this one is {version()}")
+        self._named_versions: set[str] = {version()}
+        self._name_versions()
         self._show()
+
+    def _name_versions(self) -> None:
+        """Warn of rows that other versions have made, once of each version."""
+        number = Counter(cells["version"] for cells in self.known.values())
+        if others := [f"{number[name]} by {name}" for name in number if name not in self._named_versions]:
+            warn(f"{self.job.folder} has runs of other versions of SAND: {', '.join(others)}; this one is {version()}")
+        self._named_versions |= number.keys()
 
     def _take_all(self) -> None:
         """Take the rows of all runs that have ended, also those of other processes."""
@@ -433,6 +427,7 @@ class _Table:
         """
         with writing(self.job.folder, patience=PATIENCE):
             self._take_all()
+            self._name_versions()
             self.write()
             count = self.counts()
             failed = {row.name: self._message(row) for row in self.job.rows if self._state(row) == FAILED}
@@ -553,7 +548,7 @@ def run_row(
 def _tables_of(section: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Tables of keys that change together, of [sweep]; each key of `vary` is one."""
     vary = [{key: value} for key, value in flat_keys(section.get("vary", {})).items()]
-    return [*vary, *(flat_keys(one, "together") for one in section.get("together", []))]
+    return [*vary, *several(section.get("together", []), "together")]
 
 
 def _replaced(own: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:

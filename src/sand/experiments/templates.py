@@ -21,6 +21,7 @@ from ..config.template import (
 from .collision_case import BodySection, ImpactSection
 from .growth_case import GrowSection
 from .scattering.scatter_case import FlightSection, MeasureSection, ScatterBody
+from .sweep_design import SweepSection
 
 BODY = {"kind": "bpca", "grains": 16, "radius": "0.1 um", "material": "silica"}
 COLLISION: Values = {
@@ -38,11 +39,23 @@ SCATTERING: Values = {
 """Keys in use of `sand scatter`: cross-sections of two magnetic grains of iron at two speeds."""
 GROWTH: Values = {**EXAMPLES, "grow": {"seeds": [1, 2, 3, 4]}, "run": {"until": "20 us", "frame_every": "0.1 us"}}
 """Keys in use of `sand grow`: the gas of the case of `sand run`, for four seeds."""
+SWEEP = {"vary": {"impact.speed": "log(0.3 m/s, 3 m/s, 4)", "impact.impact_parameter": ["0 b", "0.5 b"]}, "seeds": 2}
+"""Keys in use of [sweep], for the collisions above."""
 
 
 def _collision(name: str) -> str:
+    return template(name, "collide", _collision_tables(), COLLISION)
+
+
+def _sweep(name: str) -> str:
+    note = summary(SweepSection).removeprefix("Section [sweep]: ").capitalize()
+    sweep = Table("[sweep]", note, keys_of(SweepSection))
+    return template(name, "sweep", [sweep, *_collision_tables()], {"sweep": SWEEP, **COLLISION})
+
+
+def _collision_tables() -> list[Table]:
     note = "A grain or an aggregate; a different one for each seed if it is random, or a file."
-    tables = [
+    return [
         Table("[target]", note, keys_of(BodySection)),
         Table("[projectile]", note, keys_of(BodySection)),
         Table(
@@ -52,7 +65,6 @@ def _collision(name: str) -> str:
         *force_tables(),
         *stepping_tables(),
     ]
-    return template(name, "collide", tables, COLLISION)
 
 
 def _scattering(name: str) -> str:
@@ -84,5 +96,6 @@ TEMPLATES: dict[str, Callable[[str], str]] = {
     "collide": _collision,
     "scatter": _scattering,
     "grow": _growth,
+    "sweep": _sweep,
 }
 """Text of a case file, from its name, by command."""

@@ -169,7 +169,7 @@ def to_ddscat(one: Any) -> str:
     _, made, names, about = _dipoles(one)
     zero = made.origin / made.spacing
     lines = [
-        f"{about}, materials {' '.join(names)}"[:250],
+        f"{about}, materials {', '.join(names)}"[:250],
         f"{len(made.cell)} = NAT",
         "1 0 0 = A_1 vector",
         "0 1 0 = A_2 vector",

@@ -25,7 +25,7 @@ from .lock import LOCK, refuse_locked, writing
 
 OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS_CSV, FLIGHTS,
-    GROWTH, VIEW, SWEEP, SWEEP_CSV,
+    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON,
 ) = (
     "case.toml",
     "trajectory.gsd",
@@ -42,13 +42,29 @@ OWN_FILES = (
     "view.html",
     "sweep.json",
     "sweep.csv",
+    "comparison.csv",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
 CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
 """Names of checkpoints, with the number of steps; other names are those of copies that the user keeps."""
 PLOTS = "plots"
 """Subfolder of figures."""
-DERIVED = (".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json")
+DERIVED = (
+    ".xyz",
+    ".dump",
+    ".data",
+    ".vtp",
+    ".pvd",
+    ".png",
+    ".pdf",
+    ".svg",
+    ".html",
+    ".csv",
+    ".json",
+    ".geom",
+    ".dat",
+    ".pos",
+)
 """Ends of the names of exports, figures and tables that are made from a run."""
 NAMED = 5
 """Files that are named one by one in a message."""

@@ -1,4 +1,4 @@
-"""Figure of a series of collisions: largest remnants, and energy losses by channel."""
+"""Figures of collisions: largest remnants, energy losses by channel, growth efficiency, and kinds of outcomes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..analysis.collision_kinds import KINDS
+from ..analysis.impact_average import impact_average
 from .panels import CHANNEL_LABELS, LOSS_CHANNELS
 from .run_figure import DPI, RunFigure
-from .style import legend_above, plot_style
+from .style import BLUE, GREEN, MUTED, ORANGE, PURPLE, RED, SKY, TEXT_COLOUR, legend_above, plot_style
 
 COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00", "miss": "#999999"}
+LOOKS = dict(
+    zip(
+        KINDS,
+        ((MUTED, "x"), (ORANGE, "s"), (BLUE, "o"), (SKY, "o"), (GREEN, "^"), (PURPLE, "v"), (RED, "D")),
+        strict=True,
+    )
+)
+"""Colour and marker of each kind."""
+ASIDE = 0.03
+"""Shift of the marks of one seed beside those of the one before, in units of the speed."""
 NEGLIGIBLE = 1e-3
 """Mean share of the impact energy below which a loss is only named."""
 
@@ -64,3 +76,66 @@ def _draw_shares(axes: Axes, results: list[dict[str, Any]]) -> None:
     axes.invert_yaxis()
     below = f"\nbelow {NEGLIGIBLE:.1%}: {', '.join(small)}" if small else ""
     axes.set_xlabel(f"energy loss / impact energy (mean and standard deviation){below}")
+
+
+def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
+    """Figure of collisions at several speeds: growth efficiency (left), kinds of outcomes against speed and b (right).
+
+    The line is the average over impact parameters at each speed, with its 95 % interval over seeds where there is one;
+    without different impact parameters, the mean over seeds.
+
+    Parameters
+    ----------
+    collisions : list[dict[str, Any]]
+        Of each collision `speed` [m/s], `impact_parameter` and `reach` [m], `growth_efficiency`, `kind` and `seed`.
+    title : str
+        Title.
+    """
+    speed, growth, share = (
+        np.array([row["speed"] for row in collisions], float),
+        np.array([row["growth_efficiency"] for row in collisions], float),
+        np.array([row["impact_parameter"] / row["reach"] for row in collisions], float),
+    )
+    kinds, seeds = np.array([row["kind"] for row in collisions]), np.array([row["seed"] or 0 for row in collisions])
+    number = np.unique(seeds, return_inverse=True)[1]
+    beside = speed * (1.0 + ASIDE * (number - 0.5 * number.max()))
+    with plot_style():
+        figure = RunFigure(figsize=(9.0, 3.8), dpi=DPI, layout="constrained")
+        left, right = figure.subplots(1, 2)
+        left.axhline(0.0, color=MUTED, linewidth=0.7)
+        for name, (colour, marker) in LOOKS.items():
+            of = kinds == name
+            for axes, x, y in ((left, speed, growth), (right, beside, share)) if of.any() else ():
+                axes.plot(x[of], y[of], marker, color=colour, markersize=4, alpha=0.8, label=name)
+        averages = [_average(growth[speed == v], share[speed == v], seeds[speed == v]) for v in np.unique(speed)]
+        mean, low, high = (np.array([getattr(one, name) for one in averages]) for name in ("mean", "low", "high"))
+        left.plot(np.unique(speed), mean, color=TEXT_COLOUR, linewidth=1.2)
+        left.errorbar(
+            np.unique(speed), mean, np.nan_to_num([mean - low, high - mean]), color=TEXT_COLOUR, fmt="none", capsize=2
+        )
+        left.set(xlabel="speed [m/s]", ylabel="growth efficiency $f$; line: average over $b$", ylim=(None, 1.1))
+        right.set(xlabel="speed [m/s]", ylabel="impact parameter / sum of outer radii", ylim=(-0.05, None))
+        for axes in (left, right) if speed.max() > 3.0 * speed.min() else ():
+            axes.set_xscale("log")
+        legend_above(right)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=9.0, weight="bold")
+    return figure
+
+
+def _average(growth: np.ndarray, share: np.ndarray, seeds: np.ndarray) -> Any:
+    """Average of the growth efficiency at one speed.
+
+    Outer radii differ between seeds, and so do shares of one length: the shares of a seed are numbered by their order,
+    if all seeds have equally many, and each is that of the mean over seeds. The last one stands for as much beyond it
+    as before it, up to the sum of the outer radii.
+    """
+    order = np.lexsort((share, seeds))
+    numbers = np.unique(seeds, return_counts=True)[1]
+    if len(set(numbers.tolist())) == 1:
+        means = share[order].reshape(len(numbers), -1).mean(axis=0)
+        if (np.diff(means) > 0.0).all():
+            share = np.empty_like(share)
+            share[order] = np.tile(means, len(numbers))
+    squares = np.unique(share**2)
+    beyond = 0.5 * float(squares[-1] - squares[-2]) if len(squares) > 1 else 0.0
+    return impact_average(growth, share, seeds, max(min(squares[-1] + beyond, 1.0), squares[-1]) ** 0.5 or 1.0)

@@ -80,7 +80,7 @@ def history_figure(ledger: LedgerColumns, name: str, grains: int, temperature: f
                 axes.set_xlabel(f"{axes.get_xlabel()}\n{unit.value}")
             _apply_dark(figure, dark)
     except KeyError as error:
-        raise BadInput(f"the ledger has no column {error}; it was written by another version of SAND") from None
+        raise BadInput(f"the ledger was written by another version of SAND: {error.args[0]}") from None
     return figure
 
 

@@ -70,8 +70,8 @@ def encounter(
     speed : float or str
         Relative speed of the centres of mass [m/s] > 0.
     impact_parameter : float or str, optional
-        Distance of the lines of flight of the two centres of mass [m], or a fraction of the sum of the bodies' outer
-        radii as text, "0.5 b" (b is that sum).
+        Distance of the lines of flight of the two centres of mass [m]; or as text a fraction of the sum of the bodies'
+        outer radii, "0.5 b", or of their characteristic radii √(5/3) r_g, "0.5 c", as in the literature on aggregates.
     along : str or array_like, optional
         Direction of flight of the projectile, "x", "y", "z" or a vector. The offset is perpendicular to it, along the
         next axis.
@@ -86,11 +86,12 @@ def encounter(
     side = np.cross(np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.9 else np.array([1.0, 0.0, 0.0]), direction)
     side /= np.linalg.norm(side)
     centres = [np.average(b.position, axis=0, weights=b.mass) for b in (target, projectile)]
-    reach = [
-        float((np.linalg.norm(b.position - c, axis=1) + b.radius).max())
-        for b, c in zip((target, projectile), centres, strict=True)
-    ]
-    offset = offset_of(impact_parameter, sum(reach))
+    outer, characteristic = 0.0, 0.0
+    for body, centre in zip((target, projectile), centres, strict=True):
+        distance = np.linalg.norm(body.position - centre, axis=1)
+        outer += float((distance + body.radius).max())
+        characteristic += float(np.sqrt(np.average(5.0 / 3.0 * distance**2 + body.radius**2, weights=body.mass)))
+    offset = offset_of(impact_parameter, outer, characteristic)
     back = _clearance(
         target.position - centres[0],
         target.radius,
@@ -137,30 +138,30 @@ def _direction(along: Any) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def offset_of(given: Any, total: float) -> float:
+def offset_of(given: Any, outer: float, characteristic: float) -> float:
     """Convert an impact parameter to a length [m].
 
     Parameters
     ----------
     given : float or str
-        A length, or a fraction of `total` as text, "0.5 b".
-    total : float
-        Sum of the outer radii b [m].
+        A length, or a fraction of `outer`, "0.5 b", or of `characteristic`, "0.5 c".
+    outer, characteristic : float
+        Sums of the outer radii, and of the characteristic radii √(5/3) r_g, of both bodies [m].
 
     Raises
     ------
     BadInput
         If it is neither, or negative.
     """
-    if isinstance(given, str) and given.strip().endswith("b"):
+    if isinstance(given, str) and given.strip()[-1:] in ("b", "c"):
         fraction = in_unit(given.strip()[:-1], "1")
-        offset = None if fraction is None else fraction * total
+        offset = None if fraction is None else fraction * (outer if given.strip().endswith("b") else characteristic)
     else:
         offset = in_unit(given, "m")
     if offset is None or np.ndim(offset) != 0 or not 0.0 <= offset < MOST:
         raise BadInput(
             f"impact_parameter = {shown(given)} must be a length ≥ 0 such as '10 nm', or a fraction of the sum of the "
-            "outer radii, such as '0.5 b'"
+            "outer radii, such as '0.5 b', or of the characteristic radii, such as '0.5 c'"
         )
     return float(offset)
 

@@ -54,7 +54,8 @@ class ContactNumbers:
         Critical moments k_r R ξ_c = 4F_c ξ_c and k_t φ_c [N m].
     roll_energy_clamped, roll_energy_released : float
         Energy to roll by πR (equal spheres: one rolls by 90° around the other) with clamped or reset displacements,
-        12π²γRξ_c and 6π²γRξ_c [J]. The latter is E_roll of the literature.
+        12π²γRξ_c and 6π²γRξ_c [J]. The former is E_roll of Wada et al. (2007) and of models of porosity, 6π²γr₀ξ_c for
+        equal grains of radius r₀ = 2R.
     normal_period, slide_period, roll_period, twist_period : float
         Oscillation periods of the free pair [s].
     sticking_speed : float

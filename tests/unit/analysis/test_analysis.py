@@ -310,26 +310,6 @@ def test_cluster_table_across_periodic_faces():
     assert aggregate_statistics(frame, least=5)["grains"].size == 0
 
 
-@pytest.mark.parametrize(
-    ("call", "part"),
-    [
-        (lambda: gyration_radius(np.zeros((0, 3))), "N ≥ 1"),
-        (lambda: correlation_dimension(np.zeros((10, 3))), "at least 32 grains"),
-        (lambda: box_dimension(ROD.repeat(9, axis=0) + RNG.normal(size=(81, 3)), (2.0, 1.0)), "is empty"),
-        (lambda: box_dimension(RNG.normal(size=(81, 3)), seed=-1), "seed = -1"),
-        (lambda: ensemble_dimension([8, 8], [1, 1], 1.0), "at least 3 times"),
-        (lambda: ensemble_dimension([5, 20], [1, 1], 1.0), "do not grow"),
-        (lambda: power_law([1, 2], [1, -2]), "above 0"),
-        (lambda: power_law([2, 2], [1, 2]), "two different x"),
-        (lambda: power_law([], []), "two different x"),  # a run without aggregates
-    ],
-)
-def test_wrong_arguments_are_refused(call, part):
-    """One line each."""
-    with pytest.raises(BadInput, match=part):
-        call()
-
-
 def percolates_in_a_supercell(position, pairs, lengths, copies=9):
     """Whether each grain is connected with another copy of itself in an open supercell of copies in x and y."""
     count, tiles = len(position), list(itertools.product(range(copies), repeat=2))

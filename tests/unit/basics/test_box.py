@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sand.basics.box import Box, as_box
-from sand.basics.errors import BadInput
 
 coordinate = st.floats(-30, 30)
 triple = st.tuples(coordinate, coordinate, coordinate)
@@ -51,10 +50,3 @@ def test_box_arguments():
     assert Box.periodic("1 um", None, "2 um").shortest == 1e-6
     assert Box.open().describe() == "open"
     assert Box.periodic("1.2 um").volume == pytest.approx(1.728e-18, rel=1e-6, abs=0.0)
-
-
-@pytest.mark.parametrize("bad", ["-1 um", "3 kg", 0.0, float("nan"), ["1 um", "2 um"]])
-def test_bad_boxes_are_refused(bad):
-    """One line that names the length."""
-    with pytest.raises(BadInput, match="box"):
-        as_box(bad)

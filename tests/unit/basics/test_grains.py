@@ -54,39 +54,6 @@ def test_a_copy_is_independent():
     assert deep.position[0, 0] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"radius": -1e-8}, r"radius of grain 0 is -1e-08 m: it must be above 0"),
-        ({"radius": "10 kg"}, r"radius = '10 kg' is not a quantity in m; .*'10 nm'"),
-        ({"radius": [1e-8, 1e-8, 1e-8]}, r"radius has shape \(3,\) but must be \(2,\)"),
-        ({"velocity": [[0, 0, 0]]}, r"velocity has shape \(1, 3\) but must be \(2, 3\).*m/s"),
-        ({"velocity": [[0, 0, math.nan], [0, 0, 0]]}, r"velocity of grain 0 .*finite.*m/s"),
-        ({"position": [[0, 0], [1, 1]]}, r"position must be .*\(N, 3\).*\(2, 2\)"),
-        ({"position": "1 nm"}, r"position must be"),
-        ({"material": "irom"}, r"unknown material 'irom'; did you mean 'iron'"),
-        ({"material": [sand.IRON]}, r"material has 1 entries but there are 2 grains"),
-        ({"material": [1, 2]}, r"material of grain 0 = 1"),
-        ({"material": [sand.IRON, sand.IRON.but(density=1.0)]}, r"two different materials are called 'iron'"),
-        ({"moment": "200 K"}, r"moment = '200 K' must be"),
-        ({"moment": -1.0}, r"moment = -1.0 must be"),
-        ({"charge": math.inf}, r"charge of grain 0 .*C"),
-        ({"mass": 0.0}, r"mass of grain 0 is 0 kg"),
-    ],
-)
-def test_bad_input_says_what_where_and_which_unit(changes, message):
-    """One line each."""
-    with pytest.raises(sand.BadInput, match=message):
-        two(**changes)
-
-
-def test_all_errors_are_reported_together():
-    """Three wrong quantities, three lines."""
-    with pytest.raises(sand.BadInput) as caught:
-        two(radius=-1.0, velocity=[[0, 0, 0]], charge=math.nan)
-    assert len(caught.value.problems) == 3
-
-
 def test_materials_are_checked():
     """All errors at once; a modified copy is checked, too; unknown keys get a suggestion."""
     with pytest.raises(sand.BadInput) as caught:

@@ -5,7 +5,6 @@ import math
 import pytest
 
 import sand
-from sand.basics.errors import BadInput
 from sand.basics.ramps import force_at, ramps_of
 from sand.config.case import ForcesSection
 
@@ -61,26 +60,3 @@ def test_case_files_have_the_same_ramps():
     assert forces[4].automatic(sand.Grains([[0, 0, 0]], 1e-8, sand.SILICA), 1.0).radius == pytest.approx(
         2e-5, rel=1e-6, abs=0.0
     )
-
-
-WRONG = {
-    "sand.Ramp([1, 2], ['2 us', '1 us'])": "ramp: times[1] = 1e-06 s is before times[0] = 2e-06 s",
-    "sand.Ramp([1], ['2 us'])": "ramp: a ramp has at least two points",
-    "sand.Ramp([1, 2], [0, 1, 2])": "ramp: there are 2 values and 3 times",
-    "sand.Ramp([1, 2], [0, 'inf s'], steps=0)": "times[1] = 'inf s' is not finite|ramp: steps = 0",
-    "sand.Field(sand.Ramp(['1 T', '2 K'], [0, 1]))": "field: flux_density z = '2 K' is not a quantity in T",
-    "sand.Contact(surface_energy_factor=sand.Ramp([1, -1], [0, 1]))": "surface_energy_factor = -1 must be at least 0",
-    "sand.Gas(sand.Ramp([1, 'nan K'], [0, 1]), pressure=-1)": "pressure = -1|temperature = 'nan K' is not finite",
-    "sand.Dipoles(cutoff=sand.Ramp([1, 2], [0, 1]))": "dipoles: cutoff cannot be a ramp; no parameter of dipoles",
-    "sand.ScreenedCharges(1e-7, cutoff=sand.Ramp([1, 2], [0, 1]))": "parameters with ramps: screening_length",
-    "sand.Gravity({'values': [1, 2], 'time': [0, 1]})": "there is no key 'time'; did you mean 'times'|times is missing",
-}
-
-
-@pytest.mark.parametrize("wrong", WRONG)
-def test_each_mistake_is_one_line(wrong):
-    with pytest.raises(BadInput) as error:
-        eval(wrong)
-    expected = WRONG[wrong].split("|")
-    assert len(error.value.problems) == len(expected)
-    assert all(text in line for text, line in zip(expected, error.value.problems, strict=True)), error.value.problems

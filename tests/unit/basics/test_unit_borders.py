@@ -16,8 +16,8 @@ from sand.basics.units import in_unit, si
 from sand.config.case import check_case
 from sand.experiments import kernel_table
 from sand.io.run_folder import read_text
+from tests.unit.pint_units import UNIT
 
-UNIT = pint.UnitRegistry()
 PAIR = [[0, 0, 0], [1e-6, 0, 0]]
 MASKED = np.ma.masked_array([1.0, 2.0], [False, True])
 
@@ -79,17 +79,6 @@ def test_own_quantities_of_other_packages(package):
     for given in (kelvin, list(kelvin), [kelvin[0], 1e-3, "2 mK"]):
         own = sand.Grains([*PAIR, [2e-6, 0, 0]], 1e-7, "silica", own={"heat": given}).own
         assert own["heat"] == pytest.approx([0.0, 1e-3, 2e-3], rel=1e-14, abs=0.0) and own.units == {"heat": "K"}
-
-
-@pytest.mark.parametrize("value", [["300 K", "310 m"], ["300 K", "20 degC"], MASKED, [1.0, np.ma.masked]], ids=str)
-def test_what_is_no_own_quantity(value):
-    with pytest.raises(sand.BadInput, match=r"own: heat = .* is no quantity"):
-        sand.Grains(PAIR, 1e-7, "silica", own={"heat": value})
-
-
-def test_masked_entries_are_named():
-    with pytest.raises(sand.BadInput, match="radius has masked entries, 1 of 2; fill them"):
-        sand.Grains(PAIR, MASKED, "silica")
 
 
 @pytest.mark.parametrize(
@@ -161,22 +150,6 @@ def test_parameters_of_own_forces_have_any_size():
     assert (found.values["c"], found.values["wave"][0]) == (299792458.0, 3e9)
     with pytest.raises(sand.BadInput, match="pull: c = '1 m' is not a quantity in m/s"):
         pull(c="1 m", wave=(0.0, 0.0, 0.0))
-
-
-@pytest.mark.parametrize(
-    ("make", "expected"),
-    [
-        (lambda: sand.Grains(PAIR, 1e-7, "silica", moment="1e30 A m^2/kg"), "moments of all electrons"),
-        (lambda: sand.IRON.but(specific_moment=1e30), "moments of all electrons"),
-        (lambda: sand.Field("1e50 T"), "fields of neutron stars"),
-        (lambda: sand.Simulation(sand.Grains(PAIR, 1e-7, "silica")).run(until=1e50), "age of the universe"),
-        (lambda: sand.Simulation(sand.Grains(PAIR, 1e-7, "silica")).run(steps=10**18), "must not exceed 1e\\+15"),
-        (lambda: sand.Grains(np.array(PAIR) * 1e40, 1e-7, "silica"), "position of grain 1 .*observable universe"),
-    ],
-)
-def test_nonsense_values_are_refused(make, expected):
-    with pytest.raises(sand.BadInput, match=expected):
-        make()
 
 
 def test_the_home_folder_in_paths(tmp_path, monkeypatch):

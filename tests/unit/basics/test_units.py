@@ -4,11 +4,11 @@ import math
 import re
 import sys
 
-import pint
 import pytest
 
 from sand.basics.errors import BadInput
 from sand.basics.units import format_quantity, in_unit, si
+from tests.unit.pint_units import UNIT
 
 
 @pytest.mark.parametrize(
@@ -56,10 +56,9 @@ FORMS = ("{}", "{}/m^2", "J {}^-1*A", "A m²/{}", "kg·{}**3 / s", "rad/{}", "{}
 @pytest.fixture(scope="module")
 def samples():
     """Three of each common unit, alone and as a factor, as quantities of pint from SAND's text."""
-    registry = pint.UnitRegistry()
     texts = [form.format(name) for form in FORMS for name in USUAL]
     spelled = [re.sub(r"(?<=[A-Za-zµμÅ])(-?\d)", r"**\1", t.replace("²", "**2").replace("·", "*")) for t in texts]
-    return {text: registry.Quantity(3.0, other) for text, other in zip(texts, spelled, strict=True)}
+    return {text: UNIT.Quantity(3.0, other) for text, other in zip(texts, spelled, strict=True)}
 
 
 @pytest.mark.slow
@@ -117,9 +116,8 @@ def test_ranges_and_malformed_numbers():
 @pytest.mark.slow
 def test_quantities_of_pint():
     """From any registry."""
-    registry = pint.UnitRegistry()
-    assert in_unit(3 * registry.micrometer, "m") == pytest.approx(3e-6, rel=1e-6, abs=0.0)
-    assert in_unit(3 * registry.second, "m") is None
+    assert in_unit(3 * UNIT.micrometer, "m") == pytest.approx(3e-6, rel=1e-6, abs=0.0)
+    assert in_unit(3 * UNIT.second, "m") is None
 
 
 def test_quantities_with_to_value():

@@ -148,49 +148,6 @@ def test_a_case_may_end_at_a_number_of_steps(workdir, capsys):
 # --- wrong input ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "part"),
-    [
-        (["run", "nowhere.toml"], "there is no file nowhere.toml"),
-        (["run"], "give a case file"),
-        (["rum"], "No such command 'rum'"),
-        (["run", "small.toml", "--untl", "3"], "No such option"),
-        (["run", "small.toml", "--until", "1 kg"], "--until = '1 kg' is not a quantity in s"),
-        (["run", "small.toml", "--until", "-1 us"], "--until = '-1 us' must be above 0 s"),
-        (["run", "small.toml", "--until", "nan"], "--until = nan is not finite"),
-        (["run", "small.toml", "--until", "soon"], "such as '5 us'"),
-        (["run", "small.toml", "--seed", "-1"], "--seed"),
-        (["run", "small.toml", "--seed", "1.5"], "--seed"),
-        (["run", "small.toml", "--out", "small.toml"], "small.toml is a file"),
-        (["run", "small.toml", "--out", "small.toml/deeper"], "small.toml is a file"),
-        (["run", "."], ". is a folder"),
-        (["resume", "nowhere"], "there is no folder nowhere"),
-        (["resume", "."], "no checkpoint"),
-        (["info", "nowhere"], "there is no file or folder nowhere"),
-        (["info", "."], "not the folder of a run"),
-        (["info", "picture.png"], "give a run's folder"),
-        (["--json"], "No such option"),
-    ],
-)
-def test_wrong_input_gives_lines_and_exit_code_2(workdir, capsys, words, part):
-    """One line on stderr names the error; with --json on stdout as well; no traceback."""
-    (workdir / "picture.png").write_bytes(b"\x89PNG")
-    before = sorted(workdir.rglob("*"))
-    assert main(words) == 2
-    out, err = capsys.readouterr()
-    assert part in err
-    assert all(line.startswith("sand: ") for line in err.splitlines())
-    assert len(err.splitlines()) == 1
-    if "--json" not in words:
-        assert out == ""
-        assert main([*words, "--json"]) == 2
-        out, err = capsys.readouterr()
-    message = json.loads(out)
-    assert message["exit_code"] == 2
-    assert [f"sand: {line}" for line in message["error"]] == err.splitlines()
-    assert sorted(workdir.rglob("*")) == before
-
-
 def test_every_mistake_of_a_case_is_a_line(workdir, capsys):
     """Two errors, two lines, each with the name of the file; no folder is created."""
     (workdir / "small.toml").write_text(CASE.replace("10 nm", "10 ns").replace("seed", "sead"))

@@ -45,30 +45,6 @@ def test_a_large_file_gives_a_warning(finished_run, tmp_path, capsys, monkeypatc
 
 
 @pytest.mark.compiled("fields")
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["/nowhere/at/all"], "no such folder"),
-        (["RUN", "--html", "/nowhere/at/all.html"], "no folder"),
-        (["RUN", "--html", "."], "is a folder"),
-        (["RUN", "--html", "page.txt"], "must end in .html or .htm"),
-        (["RUN", "--frames", "a"], "--frames"),
-        (["RUN", "--frames", "70:"], "contains none of them"),
-        (["RUN", "--frames", "::-1"], "plays frames forwards"),
-        (["RUN", "--frames", "::0"], "plays frames forwards"),
-        (["RUN", "--every", "0"], "--every"),
-        (["RUN", "--port", "70000"], "--port"),
-        ([], "DIR"),
-    ],
-)
-def test_wrong_arguments_are_refused(finished_run, capsys, words, message):
-    """One line, exit code 2."""
-    assert main(["view", *(str(finished_run[0]) if word == "RUN" else word for word in words)]) == 2
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and message in lines[0]
-
-
-@pytest.mark.compiled("fields")
 def test_without_the_page(finished_run, bundle, capsys):
     """An installation without the bundle says so in one line."""
     (bundle / "grainview.js").unlink()

@@ -38,7 +38,7 @@ def folder_of(place, case, results, comment="the complete case"):
     for name, content in results.items():
         (place / name).parent.mkdir(exist_ok=True)
         written = sealed(content) if name.endswith("summary.json") and isinstance(content, dict) else content
-        (place / name).write_text(json.dumps(written), "utf-8")
+        (place / name).write_text(written if isinstance(written, str) else json.dumps(written), "utf-8")
     return place
 
 
@@ -50,6 +50,13 @@ FOLDERS = {
     ),
     "grow": (GROW + CONTACT, {f"seed-{k}/summary.json": SUMMARY for k in (1, 2)} | {"growth.json": {}}),
     "scatter": (SCATTER, {"scattering.json": {"job": "cross-section", "sand": "0.0.7"}}),
+    "sweep": (
+        COLLIDE + '[sweep.vary]\n"impact.speed" = [2, 4]' + CONTACT,
+        {
+            "sweep.csv": "impact.speed,seed,state,f,message,seconds,cpu_seconds,version,run\n"
+            "2.0,5,done,1,,1,1,0.0.7,a\n4.0,5,failed,,no,1,1,0.0.7,b\n"
+        },
+    ),
 }
 EXPECTED = {
     "run": [
@@ -67,11 +74,16 @@ EXPECTED = {
         "The target was: kind = chain, grains = 3, radius = 100 nm, material = iron",
         "The projectile was: kind = grain, radius = 100 nm, material = silica",
         "speed = 2 m/s, impact parameter = 0 m, along = x, turn = yes",
-        "seeds 1, 2; collisions that were simulated: 2",
+        "for the seeds 1, 2 of aggregates and orientations; 2 are finished",
         "density = 7874 kg/m^3",
         "density = 2650 kg/m^3",
     ],
     "grow": ["seeds 1, 2", "8 grains, a gas", "2 boxes have run", "was 1.5e-05 of"],
+    "sweep": [
+        "A sweep of sand collide varied impact.speed = (2, 4), seed = (5) (SI units); 1 of 2 runs were done",
+        "The target was: kind = chain, grains = 3, radius = 100 nm, material = silica",
+        "speed = 2 m/s",
+    ],
     "scatter": [
         "The projectile was: kind = grain, radius = 10 nm, material = iron, moment = 200 A m^2/kg",
         "speed = 1 m/s, temperature = 100 K",
@@ -187,14 +199,17 @@ def test_settings_of_every_force():
     ("make", "line"),
     [
         (lambda place: place / "none", "there is no folder"),
-        (lambda place: place, "holds nothing that was computed by sand run, collide, grow, scatter; give the folder"),
+        (
+            lambda place: place,
+            "holds nothing that was computed by sand run, collide, grow, scatter, sweep; give the folder",
+        ),
         (
             lambda place: (place / "case.toml").write_text(RUN, "utf-8") and place,
-            "holds nothing that was computed by sand run, collide, grow, scatter; give the folder",
+            "holds nothing that was computed by sand run, collide, grow, scatter, sweep; give the folder",
         ),
         (
             lambda place: folder_of(place / "x", '[sweep]\nkey = "a"', {}),
-            "holds nothing that was computed by sand run, collide, grow, scatter; give the folder",
+            "is no case that a sweep can vary",
         ),
         (lambda place: folder_of(place / "x", RUN, {"summary.json": [1]}), "summary.json"),
     ],

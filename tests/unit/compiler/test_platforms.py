@@ -85,8 +85,7 @@ print(add_up(np.arange(10.0), (total,)), total[0])
     ("version", "jit"),
     [
         ((0, 99), True),
-        pytest.param((0, 61), True, marks=pytest.mark.validate),
-        ((0, 68), True),
+        *(pytest.param((0, number), True, marks=pytest.mark.validate) for number in (61, 68)),
         ((0, 99), False),
     ],
 )

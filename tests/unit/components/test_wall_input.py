@@ -34,14 +34,6 @@ def test_walls_must_fit_the_simulation(wall, options, message):
     assert message in problem
 
 
-def test_names_and_types_of_walls():
-    """Two walls of one name, and something else than a wall."""
-    with pytest.raises(sand.BadInput, match="two walls have the name 'floor'"):
-        sand.Simulation(ONE, sand.Contact(), walls=[FLOOR, FLOOR])
-    with pytest.raises(sand.BadInput, match=r"give a list of sand\.Wall"):
-        sand.Simulation(ONE, sand.Contact(), walls=[3])
-
-
 def test_a_condition_may_name_columns_of_walls():
     """Also of walls of a material of the case; a misspelt one is refused."""
     case = {

@@ -258,7 +258,7 @@ def read_and_build(name, path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [60, pytest.param(3400, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("count", [30, pytest.param(3400, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("name", list(KINDS))
 def test_mutated_cases_are_read_or_refused_in_lines(tmp_path, name, count):
     """Half changed as text, half as tables: a case, or lines that name the file."""

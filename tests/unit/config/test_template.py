@@ -24,6 +24,7 @@ from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
 from sand.experiments.scattering.scatter_case import ScatterCase
+from sand.experiments.sweep_design import SweepSection
 from sand.experiments.templates import TEMPLATES
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
@@ -113,7 +114,7 @@ def test_parts_of_a_class_are_documented():
     assert {key.name: key.default for key in keys_of(sand.Gas)}["temperature"] is REQUIRED
 
 
-MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case}
+MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case, "sweep": CollisionCase}
 
 
 @pytest.mark.parametrize("command", list(TEMPLATES))
@@ -126,6 +127,8 @@ def test_each_command_has_a_case_with_all_its_keys(command):
         found.setdefault(head.strip("[]"), set()).update(line.lstrip("#").split(" =")[0] for line in lines)
     if command == "grow":
         assert found.pop("grow") == set(GrowSection.model_fields)
+    if command == "sweep":
+        assert found.pop("sweep") == set(SweepSection.model_fields)
     tables = set(keys_at(model, ())) - {"materials", "forces", "stepping"}
     expected = {name: set(keys_at(model, (name,))) - ignored.get(name, set()) for name in tables}
     if "grains" in expected:

@@ -1,7 +1,6 @@
 """Contact update: the pass over all contacts against updating each flagged contact separately."""
 
 import copy
-import functools
 
 import numpy as np
 import pytest
@@ -10,8 +9,8 @@ from sand.basics.arrays import empty_contact_arrays, empty_pair_list
 from sand.basics.box import Box
 from sand.basics.grains import GrainArrays, Grains
 from sand.basics.material import SILICA
-from sand.basics.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, STEPS, TWISTING
-from sand.compiler.jit import kernel
+from sand.basics.state import BROKEN, CLOCK, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, STEPS, TWISTING
+from sand.basics.state import STEP as STEP_LENGTH
 from sand.contact.constants_table import column_loops, constant_names
 from sand.contact.damping import NONE
 from sand.contact.events import slip_and_break_loop
@@ -23,17 +22,15 @@ from sand.contact.poses import displacements_before, pose_at, twist_increment
 from sand.contact.slip_rules import ROLL, STEP_KEPT
 from sand.contact.tangential import pointers_for
 from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLID_FLAG, SLIPPED_FLAG
-from sand.contact.update import (
-    ContactStep,
-    PassVariant,
-    contact_pass_loop,
-    log_contact_sums,
-    single_contact_loop,
-)
+from sand.contact.update import ContactStep, ContactSums, PassVariant, log_contact_sums, single_contact_loop
 from sand.integrate.motion import drift_for
 from sand.integrate.parts import ContactParameters
+from sand.integrate.stages import StageNumber, contact_event_stages, contact_pass_stage
+from sand.integrate.task_queue import new_task_queue
 from sand.numerics.quaternion import turned_back
 from sand.numerics.vec import axpy, load4, put, scale
+
+from ...tables import table_of
 
 PAIRS = 403
 """Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""
@@ -45,19 +42,25 @@ update_flagged_contacts, write_loads = slip_and_break_loop(JKR, NONE), single_co
 columns = column_loops(JKR)
 
 
-@functools.cache
 def pass_and_update(variant):
-    """A pass in the given variant and the update of the contacts that it has left, compiled."""
-    contact_pass = contact_pass_loop(JKR, variant)
+    """A pass in the given variant and the update of the contacts that it has left, by the stages of runs."""
+    contact_pass = contact_pass_stage(JKR, variant, variant in (OPEN, PERIODIC))
+    update = contact_event_stages(JKR, NONE)[StageNumber.SLIP_AND_BREAK]
 
     def run(grains, contacts, near, count, lost, span, law, dt):
-        step = ContactStep(span, law, count[STEPS], dt)
-        passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), step)
-        log_contact_sums(count, lost, passed)
-        update_flagged_contacts(grains, contacts, near, count, lost, step)
-        return passed.pending
+        clock, queue, pending = np.zeros(len(CLOCK)), new_task_queue(2 * PAIRS, PAIRS), 0
+        clock[STEP_LENGTH] = dt
+        given = {"clock": clock, "count": count, "lost": lost, "span": span, "settings": law, "queue": queue}
+        table = table_of(grains=grains, contacts=contacts, pair_list=near, **given)
+        for block in range(len(queue.passed)):
+            contact_pass.run(table, (), block)
+            passed = ContactSums(*queue.passed[block, : len(ContactSums._fields)])
+            log_contact_sums(count, lost, passed)
+            pending += passed.pending
+        update.run(table)
+        return pending
 
-    return kernel(run, cached=False)
+    return run
 
 
 def update_each(grains, contacts, near, count, lost, span, law, dt):

@@ -10,23 +10,31 @@ import sand
 from sand.basics.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
 from sand.basics.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 from sand.compiler.jit import kernel
-from sand.contact.gather import DENSE_FROM, GRAINS_AT_ONCE, LARGEST_CLASS, gather, resort_contacts_by_grain
-from sand.integrate.motion import drift_for, gather_and_kick, kick
-from sand.integrate.task_queue import GRAINS_PER_BLOCK
+from sand.contact.gather import DENSE_FROM, GRAINS_AT_ONCE, LARGEST_CLASS, resort_contacts_by_grain
+from sand.integrate.motion import kick
+from sand.integrate.parts import DT, SCRATCH, ExternalWork
+from sand.integrate.stages import drift_stage, gather_and_kick_stage, gather_stage
+from sand.integrate.task_queue import GRAINS_PER_BLOCK, new_task_queue
+
+from ...tables import table_of
 
 GRAINS = GATHER_ORDER_FROM + 37
 """Enough for the block-wise order, with an incomplete last block."""
 
 
-def _gather_all(grains, contacts):
-    gather(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
+def over_all_grains(stage, grains, dt=0.0, **parts):
+    """Call a stage for each block of grains; returns its largest squares of speed and spin."""
+    queue, scratch = new_task_queue(grains.mass.size, 0), np.zeros(SCRATCH)
+    scratch[DT] = dt
+    table = table_of(grains=grains, queue=queue, scratch=scratch, **parts)
+    for block in range(len(queue.speeds)):
+        stage.run(table, (), block)
+    return queue.speeds.max(axis=0)
 
 
-def _both_at_once(grains, contacts, dt):
-    return gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
-
-
-gather_all, both_at_once, kick_all = (kernel(f, cached=False) for f in (_gather_all, _both_at_once, kick))
+def gather_all(grains, contacts):
+    """Sums of the loads of all contacts at their grains."""
+    over_all_grains(gather_stage(True), grains, contacts=contacts)
 
 
 def random_contacts(per_grain, count=GRAINS):
@@ -101,11 +109,11 @@ def test_combined_gather_and_kick():
     grains, contacts, _ = random_contacts(1.0)
     other = copy.deepcopy(grains)
     gather_all(grains, contacts)
-    fastest, quickest = kick_all(grains, 1e-9)
-    found = both_at_once(other, contacts, 1e-9)
+    fastest, quickest = kernel(kick, cached=False)(grains, 1e-9)
+    found = over_all_grains(gather_and_kick_stage(True), other, 1e-9, contacts=contacts)
     for name in ("force", "torque", "velocity", "spin"):
         assert np.allclose(getattr(other, name), getattr(grains, name), rtol=1e-14, atol=0.0), name
-    assert np.allclose(np.array(found).view(float), (fastest, quickest), rtol=1e-14)
+    assert np.allclose(found, (fastest, quickest), rtol=1e-14)
     assert fastest == pytest.approx((grains.velocity**2).sum(axis=0).max(), rel=1e-14, abs=0.0)
     assert quickest == pytest.approx((grains.spin**2).sum(axis=0).max(), rel=1e-14, abs=0.0)
 
@@ -117,11 +125,12 @@ def test_drift_with_and_without_moments():
     grains.body_moment[...] = np.random.default_rng(1).normal(size=(3, 300))
     with_moments, without = copy.deepcopy(grains), copy.deepcopy(grains)
     span = sand.Box.open().span
+    parts = {"span": span, "external_work": ExternalWork(False, False)}
     squares = [
-        kernel(drift_for(magnetic), cached=False)(one, np.uint64(0), np.uint64(300), span, 1e-9)
+        over_all_grains(drift_stage(magnetic, True), one, 1e-9, **parts)[0]
         for magnetic, one in ((True, with_moments), (False, without))
     ]
-    speeds = np.sqrt(np.array(squares).view(float))
+    speeds = np.sqrt(squares)
     assert speeds == pytest.approx(np.sqrt((without.velocity**2).sum(axis=0).max()), rel=1e-15, abs=0.0)
     for name in ("position", "velocity", "orientation", "spin"):
         assert np.allclose(getattr(with_moments, name), getattr(without, name), rtol=1e-15, atol=0.0), name

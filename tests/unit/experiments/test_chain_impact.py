@@ -74,11 +74,3 @@ def test_the_figure():
     axes = [a for sub in figure.subfigs for a in sub.axes]
     assert len(axes[0].patches) == 5
     assert axes[1].collections[0].get_array().reshape(2, 2).tolist() == [[0, 2], [5, 3]]
-
-
-def test_bad_input():
-    """One line each."""
-    with pytest.raises(sand.BadInput, match="speed = 0"):
-        chain_impact.strike(sand.IRON, 1e-8, speed=0, place=0.0)
-    with pytest.raises(sand.BadInput, match="grains of a chain"):
-        chain_impact.strike(sand.IRON, 1e-8, speed=1.0, place=0.0, grains=0)

@@ -11,7 +11,6 @@ import sand
 from sand.analysis.body_motion import BodyMotion
 from sand.basics.constants import BOLTZMANN
 from sand.cli.main import main
-from sand.experiments.executors import executor_for
 from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 from sand.experiments.growth_boxes import shared_settings
 from sand.experiments.growth_report import temperatures_over_time
@@ -53,10 +52,9 @@ def ensembles(tmp_path_factory):
 
 @pytest.mark.compiled("dipoles", "contacts")
 def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
-    """The bits of a simulation with that seed, also from a process of its own."""
+    """The bits of a simulation with that seed, whatever the seed of the case and the other boxes are."""
     alone = tmp_path / "alone"
-    with executor_for(2) as executor:
-        grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2], alone, executor)
+    grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2], alone)
     ours, theirs = (sand.open(top / "seed-2") for top in (alone, ensembles / "magnetic"))
     assert (ours.frames[-1].position == theirs.frames[-1].position).all()
     assert ours.case["run"]["seed"] == 2
@@ -193,33 +191,6 @@ def test_odd_forces_of_a_case_are_refused(forces):
     """[forces] of a case.toml that was edited holds something else than tables."""
     with pytest.raises(sand.BadInput, match="must be tables"):
         shared_settings({"run": {}, "forces": forces})
-
-
-@pytest.mark.compiled("dipoles")
-@pytest.mark.parametrize(
-    ("words", "part"),
-    [
-        (["analyse", "nowhere"], "no run"),
-        (["analyse", "."], "no run"),
-        (["analyse"], "Missing argument"),
-        (["analyse", "RUN", "--window", "3", "2"], "--window"),
-        (["analyse", "RUN", "--out", "no/where"], "--out no/where"),
-        (["grow", "nowhere.toml"], "there is no file"),
-        (["grow", "box.toml", "--seeds", "x"], "--seeds"),
-        (["grow", "box.toml", "--out", "box.toml"], "is a file"),
-        (["grow", "wrong.toml"], "wrong.toml: grains.radius"),
-    ],
-)
-def test_wrong_arguments_are_refused(ensembles, tmp_path, monkeypatch, capsys, words, part):
-    """One line, exit code 2, nothing written."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "box.toml").write_text(tomli_w.dumps(CASE))
-    (tmp_path / "wrong.toml").write_text(tomli_w.dumps(CASE | {"grains": CASE["grains"] | {"radius": "1 s"}}))
-    before = sorted(tmp_path.iterdir())
-    assert main([str(ensembles / "magnetic") if word == "RUN" else word for word in words]) == 2
-    err = capsys.readouterr().err
-    assert part in err and err.count("\n") == 1
-    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_temperatures_are_pooled_at_equal_times():

@@ -341,7 +341,7 @@ def test_a_job_keeps_what_is_finished(workdir):
     with pytest.raises(sand.BadInput, match="exists and is not empty"):
         Squares(path).run()
     again = Squares(folder / "case.toml", folder, resume=True)
-    assert again.run() == (found := {"squares": [18, 2, 8, 18]})
+    assert again.run() == (found := {"squares": [18, 2, 8, 18], "sand": sand.__version__})
     assert json.loads((folder / "squares.json").read_text()) == found
     assert job.computed == (3, 1) and again.computed == (2,)
     assert {one.name for one in folder.iterdir()} == {"case.toml", "squares.json", LOCK}
@@ -431,7 +431,13 @@ def test_a_stream_without_a_reader():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "redirect", "code"),
-    [("info box.toml", ">/dev/full", 2), ("info box.toml", "2>&-", 0), ("info nowhere", "2>/dev/full", 2)],
+    [
+        ("cite", ">/dev/full", 2),
+        ("cite", "2>&-", 0),
+        ("info nowhere", "2>/dev/full", 2),
+        pytest.param("info box.toml", ">/dev/full", 2, marks=pytest.mark.validate),
+        pytest.param("info box.toml", "2>&-", 0, marks=pytest.mark.validate),
+    ],
 )
 def test_full_and_closed_streams(workdir, words, redirect, code):
     """Lost results are an error of files, lost messages are not; no internal error."""

@@ -120,8 +120,8 @@ def test_changed_content():
 @pytest.mark.parametrize(
     ("key", "message"),
     [
-        ("projectile.grain", "there is no such key; did you mean 'projectile.grains'? [projectile] has: kind, file, "),
-        ("impact.q", "there is no such key; [impact] has: speed, impact_parameter, along, turn, seeds, out"),
+        ("projectile.grain", "there is no such key; [projectile] has: kind, file, "),
+        ("impact.q", "there is no such key; [impact] has: speed, impact_parameter, along, turn, seeds, end, "),
         ("angle.of", "there is no such key; there are the tables: target, projectile, impact, materials, forces, "),
         ("impact", "is a table; give one of its keys: speed, "),
         ("forces.dipoles.cutoff", "the case has no table [forces.dipoles]; add it to the case file"),

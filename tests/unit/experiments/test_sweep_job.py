@@ -355,7 +355,7 @@ def test_parquet(case):
             ["--vary", "impact.speed=-1,fast"],
             ("impact.speed = -1 must be above 0 m/s", "impact.speed = 'fast' is not a"),
         ),
-        (["--vary", "impact.speeed=1"], ("there is no such key; did you mean 'impact.speed'? [impact] has: speed, ",)),
+        (["--vary", "impact.speeed=1"], ("there is no such key; [impact] has: speed, ",)),
         (["--vary", "impact.seeds=1"], ("impact.seeds: give seeds as --seeds, the folder as --out, or in [sweep]",)),
         (["--vary", "impact.speed=1", "--vary", "impact.speed=2"], ("--vary impact.speed is given twice; give all",)),
         (["--vary", "impact.speed"], ("--vary 'impact.speed' must be KEY=VALUES",)),
@@ -389,3 +389,20 @@ def test_wrong_input(case, words, message, capsys):
     assert main(["sweep", str(path), *words]) == 2
     said = capsys.readouterr().err
     assert all(text in said for text in message) and len(said.splitlines()) == len(message) and computed == []
+
+
+class Without(Executor):
+    """An executor whose worker lacks SAND."""
+
+    def submit(self, work, *given):
+        future = Future()
+        future.set_exception(ModuleNotFoundError("No module named 'sand'", name="sand"))
+        return future
+
+
+def test_a_worker_without_the_package(case):
+    """One line says so; the sweep can be continued."""
+    path, computed = case
+    with pytest.raises(BadInput, match="a worker or the scheduler lacks the package sand; install sand-dust"):
+        swept(path, executor=Without())
+    assert swept(path)["done"] == len(computed) == 12

@@ -10,7 +10,6 @@ from scipy.special import erfc
 
 import sand
 from sand.basics.constants import MAGNETIC
-from sand.basics.errors import BadInput
 from sand.forces.pair.dipole_formulas import pair_load
 from sand.forces.pair.ewald import DEGREES, half_of_vectors
 from sand.forces.pair.ewald_fit import fitted, screened, smeared
@@ -347,39 +346,3 @@ def test_the_choice_is_stated():
     kept |= {"reciprocal": "auto", "open": "auto"}
     assert force.parameters() == force.resolved(grains, sim.box) == kept
     assert dataclasses.asdict(force) == kept
-
-
-GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
-
-
-@pytest.mark.parametrize(
-    ("make", "line"),
-    [
-        (
-            lambda: sand.Simulation(GRAINS, [sand.Dipoles(periodic="ewald")]),
-            "dipoles: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is open",
-        ),
-        (
-            lambda: sand.Simulation(GRAINS, [sand.Dipoles(periodic="ewald")], box=(1e-6, 1e-6, None)),
-            "dipoles: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is periodic 1 um x",
-        ),
-        (
-            lambda: sand.Simulation(
-                GRAINS,
-                [sand.Contact(), sand.Dipoles(periodic="ewald")],
-                box=1e-6,
-                stepping=sand.Verlet(far="taylor"),
-            ),
-            "stepping: far = 'taylor' needs the rate of change of every pair force, which dipoles lacks",
-        ),
-        (
-            lambda: sand.Simulation(GRAINS, [sand.Dipoles(periodic="ewald", accuracy=1e-8)], box=(1e-4, 1e-4, 1e-7)),
-            "dipoles: periodic = 'ewald' with accuracy = 1e-08 needs more than 1000000 wave vectors",
-        ),
-    ],
-)
-def test_mistakes_with_the_ewald_sum(make, line):
-    """One clear line each."""
-    with pytest.raises(BadInput) as error:
-        make()
-    assert str(error.value).startswith(line) and len(error.value.problems) == 1

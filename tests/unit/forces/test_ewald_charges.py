@@ -332,25 +332,3 @@ def test_the_choice_and_a_net_charge_are_stated():
     kept = {"cutoff": "auto", "cut": "smooth", "periodic": "ewald", "accuracy": 1e-4, "boundary": "tin-foil"}
     kept |= {"reciprocal": "auto"}
     assert force.parameters() == force.resolved(grains, box) == dataclasses.asdict(force) == kept
-
-
-@pytest.mark.parametrize(
-    ("make", "lines"),
-    [
-        (
-            lambda: simulation([[0, 0, 0]], Q, (1e-6, 1e-6, None), periodic="auto", accuracy=1e-4),
-            ["charges: accuracy is used only by an Ewald sum, and there is none: the box is periodic 1 um x 1 um x"],
-        ),
-        (
-            lambda: simulation([[0, 0, 0]], Q, (1e-6, 1e-6, None)),
-            ["charges: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is periodic 1 um"],
-        ),
-    ],
-)
-def test_mistakes_with_the_ewald_sum_of_charges(make, lines):
-    """One clear line each, all at once."""
-    with pytest.raises(BadInput) as error:
-        make()
-    assert len(error.value.problems) == len(lines)
-    for found, line in zip(error.value.problems, lines, strict=True):
-        assert found.startswith(line)

@@ -9,7 +9,6 @@ from scipy.interpolate import BSpline
 
 import sand
 from sand.basics.constants import COULOMB, MAGNETIC
-from sand.basics.errors import BadInput
 from sand.compiler.program import Program
 from sand.compiler.stage import PythonStage, stage
 from sand.forces.pair import ewald
@@ -18,6 +17,7 @@ from sand.forces.pair.long_range_loops import all_blocks
 from sand.forces.pair.mesh import MeshSums, lattice_sum, mesh_errors, mesh_sums, new_mesh, nodes_for
 from sand.forces.pair.mesh_loops import MESH_CHARGES, ORDERS, add_mesh_forces, fill_spline, mesh_rounds
 from tests.tables import table_of
+from tests.tiers import combinations
 
 from .test_ewald import CUBE, MOMENT, SIDES, clusters, gas, loads
 from .test_ewald_charges import CORNERS, Q, ions, simulation
@@ -117,11 +117,18 @@ def test_influence_function_and_errors_for_charges():
 
 
 @pytest.mark.compiled("dipoles")
-@pytest.mark.parametrize("boundary", ["tin-foil", "vacuum"])
 @pytest.mark.parametrize(
-    "accuracy", [1e-3, 1e-6, *(pytest.param(a, marks=pytest.mark.validate) for a in (1e-2, 1e-4, 1e-5))]
+    ("kind", "accuracy", "boundary"),
+    combinations(
+        ("gas", "clusters"),
+        (1e-3, 1e-6, 1e-2, 1e-4, 1e-5),
+        ("tin-foil", "vacuum"),
+        default=(
+            *[("gas", 1e-3, "tin-foil"), ("gas", 1e-6, "vacuum")],
+            *[("clusters", 1e-3, "vacuum"), ("clusters", 1e-6, "tin-foil")],
+        ),
+    ),
 )
-@pytest.mark.parametrize("kind", ["gas", "clusters"])
 def test_the_mesh_against_the_direct_sum(kind, accuracy, boundary):
     """Rms errors of forces and torques, relative to the median (gas) or rms (clusters) load, ≤ accuracy; three sides.
 
@@ -184,8 +191,9 @@ def test_loads_are_gradients_of_the_energy_of_the_mesh():
 
 @pytest.mark.compiled("small")
 @pytest.mark.filterwarnings("ignore:charges. the net charge")
-@pytest.mark.parametrize("net", [0, 30])
-@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, *(pytest.param(a, marks=pytest.mark.validate) for a in (1e-2, 1e-4))])
+@pytest.mark.parametrize(
+    ("net", "accuracy"), combinations((0, 30), (1e-3, 1e-6, 1e-2, 1e-4), default=((0, 1e-3), (30, 1e-6)))
+)
 def test_the_mesh_of_charges_against_the_direct_sum(net, accuracy):
     """Rms errors of forces and potentials of 150 charges are the predicted ones, at most the accuracy; three sides.
 
@@ -319,35 +327,6 @@ def test_numbers_of_nodes():
     """Even, products of 2, 3 and 5, at most the spacing, at least 2p."""
     assert nodes_for((1.0, 1.0, 0.1), 1 / 31, 5) == (32, 32, 10)
     assert nodes_for((1.0, 1.05, 2.0), 0.05, 6) == (20, 24, 40)
-
-
-GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
-
-
-@pytest.mark.parametrize(
-    ("make", "line"),
-    [
-        (lambda: sand.Dipoles(periodic="ewald", reciprocal="pme"), "dipoles: reciprocal = 'pme'; allowed: auto, dir"),
-        (lambda: sand.Dipoles(reciprocal="mesh"), "dipoles: reciprocal is used only with periodic = 'ewald'"),
-        (
-            lambda: sand.Charges(periodic="nearest image", reciprocal="mesh"),
-            "charges: reciprocal is used only with periodic = 'ewald'",
-        ),
-        (
-            lambda: sand.Simulation(
-                GRAINS,
-                [sand.Dipoles(periodic="ewald", reciprocal="mesh", accuracy=1e-6)],
-                box=(1e-4, 1e-4, 1e-7),
-            ),
-            "dipoles: periodic = 'ewald' with accuracy = 1e-06 needs a mesh of more than 33554432 nodes in a box of",
-        ),
-    ],
-)
-def test_mistakes_with_the_mesh(make, line):
-    """One clear line each."""
-    with pytest.raises(BadInput) as error:
-        make()
-    assert str(error.value).startswith(line) and len(error.value.problems) == 1
 
 
 def test_the_mesh_is_made_finer_until_the_accuracy_is_reached(monkeypatch):

@@ -4,7 +4,6 @@ import math
 import tomllib
 
 import numpy as np
-import pint
 import pytest
 import tomli_w
 from hypothesis import given
@@ -17,6 +16,7 @@ from sand.config.case import check_case
 from sand.forces import external_formulas as surroundings
 from sand.forces.base import ExternalForce
 from sand.forces.external_formulas import GrainState, field_in_time, flux_density_at, uniform_field
+from tests.unit.pint_units import UNIT
 
 EPS = np.finfo(float).eps
 component = st.integers(-100, 100).map(lambda n: n / 100)
@@ -233,8 +233,9 @@ def test_scalars_and_units():
     assert sand.Gravity([0, "1 cm/s^2", 0]).acceleration == (0.0, 0.01, 0.0)
     assert str(sand.Gravity(0).acceleration) == "(0.0, 0.0, 0.0)"
     assert sand.ElectricField("1 kV/cm").strength == (0.0, 0.0, 1e5)
-    quantity = pint.UnitRegistry().Quantity
-    assert sand.Field(quantity(2.0, "mT")) == sand.Field(quantity([0.0, 0.0, 2.0], "mT")) == sand.Field("2 mT")
+    assert (
+        sand.Field(UNIT.Quantity(2.0, "mT")) == sand.Field(UNIT.Quantity([0.0, 0.0, 2.0], "mT")) == sand.Field("2 mT")
+    )
     assert SWING.phase == pytest.approx(math.pi / 6, rel=1e-6, abs=0.0)
     assert (SWING.frequency, TURN.phase, RAMP.end) == (1e6, 0.0, 3e-6)
 

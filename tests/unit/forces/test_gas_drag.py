@@ -447,14 +447,6 @@ def test_shortest_relaxation_time(accommodation):
     assert shortest_stopping_time(grains.arrays, rules._replace(on=False)) == math.inf
 
 
-def test_all_errors_are_reported_together():
-    """Each error has its line: temperature, density, pressure, both of them, and so on."""
-    with pytest.raises(sand.BadInput) as caught:
-        Gas(-1, 0, -5, "1 m", 2, "yes", [math.nan, 0, "1 s"], cross_section=0)
-    assert len(caught.value.problems) == 10
-    assert all(line.startswith("gas: ") for line in caught.value.problems)
-
-
 def test_warnings():
     """Grains faster than half the molecules, and grains too large for a known mean free path."""
     grains, box = free_grains(5), sand.Box.open()

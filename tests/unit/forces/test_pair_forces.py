@@ -173,26 +173,6 @@ def test_coulomb_forces_over_list_and_all_pairs():
 
 
 @pytest.mark.parametrize(
-    ("make", "line"),
-    [
-        (lambda: sand.Charges(cutoff="-1 nm"), "charges: cutoff"),
-        (lambda: sand.Attraction(cut="sharpe"), "attraction: cut = 'sharpe'; did you mean 'sharp'"),
-        (lambda: sand.Dipoles(cut="hard"), "dipoles: cut = 'hard'"),
-        (lambda: sand.Dipoles(cutoff="1 s"), "dipoles: cutoff"),
-        (lambda: sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, charge=[math.nan]), "charge of grain 0 is nan"),
-        (lambda: sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[[0, math.nan, 0]]), "moment of grain 0"),
-        (lambda: sand.Gas("-3 K", density=1.0), "gas: temperature = '-3 K'"),
-        (lambda: sand.Verlet(far="impulses"), "stepping: far = 'impulses'; did you mean 'impulse'"),
-        (lambda: sand.Verlet(far_steps=0), "stepping: far_steps = 0"),
-    ],
-)
-def test_wrong_arguments_are_refused(make, line):
-    """One clear line each."""
-    with pytest.raises(sand.BadInput, match="^" + line.replace("(", r"\(")):
-        make()
-
-
-@pytest.mark.parametrize(
     ("force", "box", "line"),
     [
         (sand.Dipoles(open="pairs"), "1 um", "dipoles: open = 'pairs' is for open boxes, and the box is periodic 1 um"),
@@ -221,14 +201,6 @@ def test_settings_without_effect_in_a_box_are_refused(force, box, line):
     if force.cutoff == "auto":
         other = sand.Box.periodic("1 um") if box is None else sand.Box.open()
         assert not any("effect" in warning for warning in force.check(grains, other))
-
-
-def test_a_cutoff_beyond_half_the_box_is_refused():
-    """For charges as for dipoles."""
-    grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], 1e-8, sand.SILICA, charge=1e-19, moment="1e-18 A m^2")
-    for force in (sand.Charges(cutoff="0.6 um"), sand.Dipoles(cutoff="0.6 um"), sand.Attraction(cutoff="0.6 um")):
-        with pytest.raises(sand.BadInput, match="exceeds half the box"):
-            sand.Simulation(grains, [force], box="1 um")
 
 
 def test_charges_force_without_charges_warns():

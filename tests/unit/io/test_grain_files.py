@@ -107,73 +107,6 @@ def test_plain_xyz_has_angstroms_and_no_radii(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("0 0 0 1 2 3\n1 0 0 4 5 6\n", "6 columns without names; name them in its first line, such as '# x y z r v"),
-        ("x y z r\n0 0 0\n", "line 2: 3 columns, but 4 names"),
-        ("x y z x\n0 0 0 0\n", "is not x y z"),
-        ("x_nm,y_nm,z_nm,r\n0,0,0,1\n3,0,0,1\n", "line 1: .* nor names of columns with x, y and z once"),
-        ("x,y,z,r\n0,0,0,1\n3,0,0\n", "line 3: '3,0,0' is not 4 finite numbers, as in line 2"),
-        ("x,y,z,r\n1 000,0,0,1\n", "line 2: .* is not 4 finite numbers, one for each of x, y, z, r"),
-        ("x y z r radius\n0 0 0 1 1\n", "radius is given twice"),
-        ("x y z r d\n0 0 0 1 2\n", "both radius and diameter"),
-        ("x y z r vx\n0 0 0 1 2\n", "velocity lacks its component y, z"),
-        ("x,y [s],z,r\n0,0,0,1\n", "'s' is not a unit of position"),
-        ("4\n0 0 0 1\n5 0 0 1\n", "'4' is not the number of grains; there are 2 lines"),
-        ("0 0 0 1\n****** 0 0 1\n", "line 2"),
-        ("x y z r mass\n0 0 0 1e-7 28\n", "mass of grain 0 is 28 kg, but a sphere of silica"),
-        *(
-            (
-                f'1\nProperties=species:S:1:pos:R:3:radius:R:1:material:I:1 materials="iron;ice"\nX 0 0 0 900 {k}\n',
-                "'material' has no index into",
-            )
-            for k in (-1, 2, "ice")
-        ),
-        ("x,y,z,r,heat [parsec/x]\n0,0,0,1,2\n", "own: heat"),
-        (
-            "LAMMPS\n\n1 atoms\n\nAtoms\n\n1 1 1 1 0 0 0\n",
-            r"line 5: atoms of style \(none is stated\); write the style",
-        ),
-        ("LAMMPS\n\n2 atoms\n\nAtoms # sphere\n\n1 1 1 1 0 0 0\n", "has 1 atoms, but the head says 2"),
-        ("L\n\n1 atoms\n\nAtoms # sphere\n\n1 1 1 1 0 0 x\n", "line 7: .* is not id type diameter density x y z"),
-        (DUMP.format(0, "id x y z") + "1 0 0 0\n", "lacks some of its 3 atoms"),
-        ("L\n\n1 atoms\n\na b xlo xhi\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n", "bounds of its box"),
-        ("L\n\n1 atoms\n\nAtoms # sphere\n\n1 nan 2e-7 2650 0 0 0\n", "line 7: '1 nan 2e-7 2650 0 0 0' is not id type"),
-        (DUMP.format(0, "id x x y z") + "1 0 0 0 0\n" * 3, "a column occurs twice among id x x y z"),
-        ("1\nProperties=pos:R:3:pos:R:3\n0 0 0 1 1 1\n", "a name occurs twice in Properties"),
-        ("1\nProperties=pos:R:3:radius:S:1\n0 0 0 big\n", "has no numbers for radius"),
-        (
-            "L boundary p p p\n\n1 atoms\n1 0 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\n"
-            "Atoms # sphere\n\n1 1 2e-7 2650 0 0 0\n",
-            "a: box: lengths",
-        ),
-        ("inf\n0 0 0 1\n", "line 1: 'inf' is not x y z"),
-        ("nan\n0 0 0 1\n", "line 1: 'nan' is not x y z"),
-        ("# x y z r (nm)\n0 0 0 1\n", r"r has the unit nm, but x has none; write x \[nm\]"),
-        ("x,y,z,r,vx [cm/s],vy,vz\n0,0,0,1e-7,1,1,1\n", "vy, vz: no unit, but vx has one"),
-        (
-            '1\nLattice="1 0 0 0 1 0 0 0 1" pbc="T T" Properties=species:S:1:pos:R:3\nX 0 0 0\n',
-            "pbc='T T' must be T or",
-        ),
-        ('1\nLattice="1 0 0 0 1 0 0 0 1" pbc="yes" Properties=species:S:1:pos:R:3\nX 0 0 0\n', "must be T or F"),
-        ("1\nProperties=species:S:0:pos:R:3\n0 0 0\n", "is not made of name:type:number"),
-        (
-            "LAMMPS units = si\n\n2 atoms\n\nAtoms # sphere\n\n1 1 2e-7 2650 0 0 0\n2 1 2e-7 2650 1 0 0\n"
-            "\nVelocities\n\n1 1 0 0\n7 2 0 0\n",
-            "must have one line for each atom of section Atoms, by its number",
-        ),
-    ],
-)
-def test_mistakes_in_files_are_named(tmp_path, text, message):
-    """One line with the file, the line and what is wanted."""
-    (tmp_path / "a").write_text(text)
-    with pytest.raises(BadInput, match=message) as caught:
-        read_grains(tmp_path / "a", sand.SILICA)
-    assert all(problem.startswith(str(tmp_path / "a")) for problem in caught.value.problems)
-    assert len(caught.value.problems) == 1
-
-
-@pytest.mark.parametrize(
     "text",
     [
         "x [nm],y [nm],z [nm],r [nm]\n0,0,0,100\n",
@@ -209,13 +142,6 @@ def test_how_a_file_is_understood_is_said_also_if_it_is_refused(tmp_path):
     (tmp_path / "a").write_text("1 0 0 0 10\n2 19.95 0 0 10\n3 39.8 0 0 10\n")
     with pytest.warns(UserWarning, match="columns read as"), pytest.raises(BadInput, match="overlap by"):
         start_from_file(tmp_path / "a", None, sand.SILICA, length="1 um")
-
-
-def test_a_radius_is_given_once(tmp_path):
-    """A radius of the caller is for files without radii."""
-    (tmp_path / "a").write_text("0 0 0 1e-7\n")
-    with pytest.raises(BadInput, match=r"radius: .* has the radii of its grains; leave radius out"):
-        read_grains(tmp_path / "a", sand.SILICA, "1 um")
 
 
 @pytest.mark.parametrize("suffix", ["xyz", "gsd"])
@@ -404,21 +330,6 @@ def test_rings_are_fitted_by_least_squares(tmp_path):
     assert len(pairs) == 12 and 1e-6 * R < residue < 1e-3 * R
     assert np.abs(slope).max() < 1e-5 * residue
     assert f"overlaps differ from those of equilibrium by at most {residue:.2g} m" in notes[0]
-
-
-@pytest.mark.parametrize(
-    ("places", "message"),
-    [
-        ([0.0, 2.0015], "a gap of about 1.5e-10 m to grain"),
-        ([0.0, 1.98], "overlap by 2e-09 m, at most"),
-        ([0.0, 0.0, 2.0], "grains 0 and 1 are at the same place"),
-    ],
-)
-def test_borders_of_rounding(tmp_path, places, message):
-    """Gaps above 1e-3 r are no contact; overlaps above 2 δ0, and grains at one place, are refused."""
-    (tmp_path / "a").write_text("".join(f"{x} 0 0 1\n" for x in places))
-    with pytest.raises(BadInput, match=message):
-        body_from_file(tmp_path / "a", sand.SILICA, length="100 nm")
 
 
 @pytest.mark.compiled("small")

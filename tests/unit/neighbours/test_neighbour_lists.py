@@ -434,15 +434,6 @@ def test_fraction_of_pairs_within_reach(lengths, count):
     assert share_within(position, box, 0.4) == pytest.approx(share, abs=within + 1e-14)
 
 
-def test_wrong_settings_have_a_line_each():
-    """An unknown word, and a margin that is no length."""
-    with pytest.raises(sand.BadInput) as caught:
-        Neighbours(search="cels", margin="-1 nm")
-    assert len(caught.value.problems) == 2
-    assert "did you mean 'cells'" in caught.value.problems[0]
-    assert "margin" in caught.value.problems[1]
-
-
 @pytest.mark.validate
 @pytest.mark.parametrize("earlier", [Neighbours("all pairs"), Neighbours("cells", "150 nm")])
 @pytest.mark.parametrize("far", ["impulse", "taylor"])

@@ -171,6 +171,25 @@ def test_hook_reports_and_includes_the_bundle(hook, tmp_path, monkeypatch, versi
     assert not any(Path(source).exists() for source in data["force_include"])
 
 
+@pytest.mark.parametrize("version", ["standard", "editable"])
+def test_cases_and_tables_of_papers_are_in_a_wheel(hook, tmp_path, monkeypatch, version):
+    """Files of examples/papers are in the package of a wheel; an editable install reads them in the source tree."""
+    data = {"force_include": {}}
+    monkeypatch.setenv("SAND_NO_PAGE", "1")
+    place = tmp_path / "examples" / "papers" / "one"
+    place.mkdir(parents=True)
+    (place / "sweep.csv").write_text("")
+
+    class App:
+        display_warning = staticmethod(str)
+
+    made = hook.PageHook(str(tmp_path), {}, None, None, str(tmp_path / "dist"), "wheel", App)
+    made.initialize(version, data)
+    there = data["force_include"].get(str(place / "sweep.csv"))
+    assert there == (None if version == "editable" else "sand/experiments/papers/one/sweep.csv")
+    made.finalize(version, data, "")
+
+
 def test_unwritable_folder_does_not_fail_the_installation(hook, tmp_path, monkeypatch):
     """An editable install of a read-only tree succeeds; here a file is in place of the folder."""
     messages = []

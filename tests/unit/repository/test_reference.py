@@ -23,6 +23,7 @@ from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
 from sand.experiments.scattering import flight
 from sand.experiments.scattering.scatter_case import FlightSection, ScatterCase
+from sand.experiments.sweep_design import SweepSection
 
 PAGES = Path(__file__).parents[3] / "docs" / "reference"
 PACKAGES = ("setup", "theory", "analysis", "experiments", "io")
@@ -114,6 +115,7 @@ def test_commands():
 def sections():
     """Heading and class of every section of every case file."""
     yield "[grow]", GrowSection
+    yield "[sweep]", SweepSection
     for case in (Case, CollisionCase, ScatterCase):
         for name, field in case.model_fields.items():
             kind = field.annotation

@@ -59,24 +59,6 @@ def test_the_export_command(finished_run, tmp_path, capsys, form, files):
     assert main(["export", str(folder), "--to", form, "--out", stem, "--overwrite", "--frames", "-1"]) == 0
 
 
-@pytest.mark.compiled("fields")
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--to", "vtk", "--frames", "a:b"], "--frames"),
-        (["--to", "vtk", "--frames", "50:60"], "no frame"),
-        (["--to", "xyz", "--out", "/nowhere/at/all"], "no folder"),
-        (["--to", "pdb"], "pdb"),
-    ],
-)
-def test_wrong_arguments_of_export(finished_run, capsys, words, message):
-    """One line, exit code 2."""
-    assert main(["export", str(finished_run[0]), *words]) == 2
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1
-    assert message in lines[0]
-
-
 def test_folders_without_a_run(tmp_path):
     """A missing folder, and one without a run."""
     for path, message in ((tmp_path / "none", "no folder"), (tmp_path, "not the folder of a run")):

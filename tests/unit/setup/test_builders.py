@@ -12,7 +12,7 @@ from sand.cli.main import main
 from sand.contact.jkr import rest_overlap, rest_radius
 from sand.contact.mixing import pairing_between
 from sand.io.bodies import read_body, write_body
-from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
+from sand.setup import KINDS, bcca, bpca, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
 from sand.setup._kernels.aggregation import return_to_sphere
 from sand.setup._kernels.hash_grid import gap_to_nearest, insert_grain
 from sand.setup.aggregates import rest_distance
@@ -306,79 +306,6 @@ def test_gsd_files_of_other_programs(tmp_path):
     ) == pytest.approx(1.998e-6, rel=1e-6, abs=0.0)
 
 
-HEAD = "length_unit=um Properties=species:S:1:pos:R:3:radius:R:1"
-PLACES = ["0 0 0", "1.9995 0 0", "3.999 0 0"]
-
-
-@pytest.mark.parametrize(
-    ("lines", "message"),
-    [
-        (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "1.9 0 0", "3.8 0 0"))], "grains 0 and 1 overlap by 1e-07 m"),
-        (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "1.9995 0 0", "5 0 0"))], "grain 2 has no contact .* to grain 1"),
-        (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "nan 0 0", "3 0 0"))], "position of grain 1 is .* finite"),
-        (["3", HEAD, *(f"Si {p} -1" for p in PLACES)], "radius of grain 0 is -1.* above 0"),
-        (["3", HEAD, *(f"Si {p}" for p in PLACES)], "line 3: 4 columns, but line 2 names 5"),
-        (["4", HEAD, *(f"Si {p} 1" for p in PLACES)], "line 1: '4' is not the number of grains"),
-        (["3", HEAD, *(f"Si x{p} 1" for p in PLACES)], "line 3: .* has no numbers for pos"),
-        (["3", "Properties=species:S:1", "Si", "Si", "Si"], "has no positions"),
-        (["3", "Properties=species:S", "Si", "Si", "Si"], "is not made of name:type:number"),
-        (["1", HEAD + ":material:S:1", "Si 0 0 0 1 quarz"], "unknown material 'quarz'"),
-    ],
-)
-def test_bad_bodies(tmp_path, lines, message):
-    """One line each with file and grain or line; at most ten, then the number of others."""
-    path = tmp_path / "bad.xyz"
-    path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(sand.BadInput, match=message) as caught:
-        body_from_file(path, otherwise=M)
-    assert all(problem.startswith(str(path)) for problem in caught.value.problems)
-
-
-def test_only_ten_grains_are_named(tmp_path):
-    """Thirty separate grains: twenty-nine gaps, ten lines and the number of the others."""
-    path = tmp_path / "loose.txt"
-    path.write_text("".join(f"{3 * k} 0 0 1\n" for k in range(30)))
-    with pytest.raises(sand.BadInput, match="and 19 more") as caught:
-        body_from_file(path, M)
-    assert len(caught.value.problems) == 11
-
-
-@pytest.mark.compiled("small")
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (
-            lambda: build("chain", 10_000, dimension=3, radius=R, material=M),
-            "a chain always has a dimension of about 1",
-        ),
-        (lambda: fractal(10_000, dimension=3, radius=R, material=M), "dimension = 3 must not exceed 2.4"),
-        (lambda: fractal(100, dimension=1.1, radius=R, material=M), "at least 1.3"),
-        (lambda: fractal(100, dimension=1.3, prefactor=0.1, radius=R, material=M), "but a straight chain has only"),
-        (lambda: fractal(100, dimension=2.4, prefactor=20, radius=R, material=M), "random close packing has"),
-        (lambda: bpca(9, radius="power law(-3.5, 1 nm, 1 um)", material=M), "at most 200 is allowed"),
-        (lambda: bpca(9, radius="lognormal(1 nm)", material=M), "lacks its width"),
-        (lambda: bpca(9, radius="lognormal(9 nm, 3)", material=M), "must not exceed 2"),
-        (lambda: bpca(9, radius="gauss(1 nm, 1)", material=M), "give a length, N of them, 'lognormal"),
-        (lambda: bpca(9, radius=[R] * 8, material=M), "radius has 8 entries but there are 9 grains"),
-        (lambda: bpca(9, radius=[R, -R], material=M), "that of grain 1 is not"),
-        (lambda: bpca(9, radius="0.01 nm", material="iron"), "too small for JKR"),
-        (lambda: bpca(9, radius=R, material={"silica": -1.0}), "part of silica = -1.0"),
-        (lambda: bpca(9, radius=R, material=M, moments="relax"), "did you mean 'relaxed'"),
-        (lambda: bpca(9, radius=R, material=M, magnetic=1.5), "must not exceed 1"),
-        (lambda: bpca(9, radius=R, material=M, seed=-1), "seed = -1"),
-        (lambda: rbd(9, radius=[R] * 9, material=M), "is cut from a deposit of more grains"),
-        (lambda: hexagonal(3, radius="lognormal(9 nm, 0.1)", material=M), "only if its grains are equal"),
-        (lambda: build("lattice", 10, radius=R, material=M), "10 is not a cube number"),
-        (lambda: build("bpca", radius=R, material=M), "grains is missing"),
-        (lambda: build("bpca", 8, shape=[2, 2, 2], radius=R, material=M), "shape = .* is for lattice"),
-    ],
-)
-def test_impossible_requests(make, message):
-    """One line each with the reason, without a search."""
-    with pytest.raises(sand.BadInput, match=message):
-        make()
-
-
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - {"grain"}))
 def test_the_command(tmp_path, capsys, monkeypatch, kind):
@@ -394,28 +321,6 @@ def test_the_command(tmp_path, capsys, monkeypatch, kind):
         assert output["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)
     assert main(["build", kind, "--grains", "64", "--out", "a.xyz"]) == 2
     assert "exists" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["bpca", "--out", "a.xyz"], "grains is missing"),
-        (["bpca", "--grains", "9", "--out", "a.pdb"], "allowed: .xyz, .extxyz, .gsd"),
-        (["bpca", "--grains", "9", "--out", "no/a.xyz"], "there is no folder no"),
-        (["chain", "--grains", "10000", "--dimension", "3", "--out", "a.xyz"], "dimension of about 1"),
-        (["lattice", "--shape", "2,2", "--out", "a.xyz"], "three whole numbers"),
-        (["lattice", "--grains", "8", "--shape", "2,2,2", "--out", "a.xyz"], "leave --grains out"),
-        (["bpca", "--grains", "9", "--material", "silica:x", "--out", "a.xyz"], "--material 'silica:x'"),
-        (["bpca", "--grains", "9", "--magnetic", "x", "--out", "a.xyz"], "--magnetic 'x' is not a number"),
-        (["bcpa", "--grains", "9", "--out", "a.xyz"], "'bcpa' is not one of"),
-    ],
-)
-def test_mistakes_on_the_command_line(tmp_path, capsys, monkeypatch, words, message):
-    """Exit 2, one line on stderr, no file."""
-    monkeypatch.chdir(tmp_path)
-    assert main(["build", *words]) == 2
-    assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.compiled("contacts", "small")
@@ -454,3 +359,13 @@ def test_dimensions_of_large_aggregates(make, few, many, count, expected, bound)
     """N ∝ r_g^D over a decade, within the known finite-size ranges."""
     found, _ = dimension(make, few, many, count)
     assert found == pytest.approx(expected, abs=bound)
+
+
+@pytest.mark.compiled("small")
+@pytest.mark.parametrize(
+    ("given", "message"), [({"moments": "relax"}, "did you mean 'relaxed'"), ({"magnetic": 1.5}, "must not exceed 1")]
+)
+def test_impossible_moments_are_refused(given, message):
+    """Once the grains are placed."""
+    with pytest.raises(sand.BadInput, match=message):
+        bpca(9, radius=R, material=M, **given)

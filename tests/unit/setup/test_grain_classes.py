@@ -135,44 +135,6 @@ def test_case_file_and_script_give_the_same_grains():
         assert (getattr(again.start, name) == getattr(script, name)).all(), name
 
 
-@pytest.mark.parametrize(
-    ("given", "lines"),
-    [
-        (
-            {"classes": [{"share": 0.6}, {"share": 0.6}]},
-            ["classes: the shares 0.6, 0.6 have the sum 1.2; it must be 1"],
-        ),
-        (
-            {"classes": [{"share": 0.5, "radius": "lognormal(1 nm)"}, {"share": 0.5, "charg": 1}]},
-            [
-                "classes.0: radius = 'lognormal(1 nm)' lacks its width SIGMA",
-                "classes.1: GrainClass: there is no argument",
-            ],
-        ),
-        (
-            {"classes": [{"share": 0.5, "material": "irn"}, {"share": 0.5, "kind": "bpca", "grains": 0}]},
-            ["classes.1: grains = 0 must be a whole number"],
-        ),
-        ({"classes": [{"share": 1.0, "material": "irn"}]}, ["classes.0: unknown material 'irn'"]),
-        ({"classes": [3]}, ["classes.0 = 3; give a table"]),
-        (
-            {"classes": [{"number": 9, "moments": "aligned"}]},
-            ["classes.0: moments = 'aligned' is not used by kind = 'grain'"],
-        ),
-        ({"radius": None}, ["gas: radius is missing"]),
-        ({"material": None}, ["gas: material is missing"]),
-        ({"material": {"iron": 0.6, "ice": 0.6}}, ["material: the fractions 0.6, 0.6 have the sum 1.2"]),
-    ],
-)
-def test_bad_input(given, lines):
-    """One line for each mistake, with the class."""
-    with pytest.raises(sand.BadInput) as caught:
-        gas(9, BOX, **{"radius": "10 nm", "material": "silica", **given})
-    assert len(caught.value.problems) == len(lines)
-    for line, found in zip(lines, caught.value.problems, strict=True):
-        assert found.startswith(line)
-
-
 @pytest.mark.compiled("contacts")
 def test_members_from_a_frame_keep_strained_contacts(tmp_path):
     """Three copies of the largest cluster of a frame have three times its contact energy, and its internal shape.

@@ -126,31 +126,3 @@ def test_a_gas_between_walls(extent):
     assert abs(spread - 1.0) < 5.0 * math.sqrt(0.8 / 150)  # variance of y²/⟨y²⟩ is 9/5 − 1
     pairs = box.close_pairs(grains.position, 2.0 * grains.radius[0])
     assert len(pairs) == 0
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"number": 0}, "number = 0"),
-        ({"number": 60, "box": "80 nm"}, "the box is too full"),
-        ({"box": "40 nm"}, "too small"),
-        ({"box": None}, "open along x, y, z; give extent"),
-        ({"box": ["1 um", None, "1 um"], "extent": ["1 um", "1 um", "periodic"]}, "periodic along x; give extent"),
-        ({"box": ["1 um", None, None], "extent": ["periodic", "1 um", "periodic"]}, "open along z"),
-        ({"box": None, "extent": "1 s"}, "extent along x"),
-        ({"box": None, "extent": "-1 m"}, "extent along x"),
-        ({"box": None, "extent": ["1 um", "1 um"]}, "must be one length, or three"),
-        ({"extent": "1 um"}, "periodic along x, y, z; give extent along open axes only"),
-        ({"box": None, "extent": "40 nm"}, "too small"),
-        ({"spins": "kt"}, "spins = 'kt'"),
-        ({"temperature": "-3 K"}, "at least 0 K"),
-        ({"seed": -1}, "seed = -1"),
-        ({"exact_temperature": "yes"}, "exact_temperature = 'yes' must be True or False"),
-    ],
-)
-def test_bad_input(changes, message):
-    """One line each."""
-    given = {"number": 10, "box": "0.4 um", "seed": 1} | ARGS | changes
-    number, box = given.pop("number"), given.pop("box")
-    with pytest.raises(sand.BadInput, match=message):
-        gas(number, box, **given)

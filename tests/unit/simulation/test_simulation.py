@@ -22,31 +22,6 @@ def pair(distance=3e-8, **options):
     return sand.Grains([[0, 0, 0], [distance, 0, 0]], 1e-8, options.pop("material", sand.IRON), **options)
 
 
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: sand.Simulation([1, 2]), r"give sand.Grains"),
-        (lambda: sand.Simulation(pair(), ["contact"]), r"'contact' is not a force"),
-        (lambda: sand.Simulation(pair(), [sand.Contact(), sand.Contact()]), r"'contact' is given more than once"),
-        (lambda: sand.Simulation(pair(), [sand.Contact()], box="50 nm"), r"too small: .* at least 6e-08 m"),
-        (lambda: sand.Simulation(pair(distance=1.5e-8), [sand.Contact()]), r"grains 0 and 1 overlap|grains 1 and 0"),
-        (lambda: sand.Simulation(pair(material=sand.MAGNETITE), [sand.Contact()]), r"magnetite.*no surface energy"),
-        (
-            lambda: sand.Simulation(pair(moment="1 A m^2/kg"), [sand.Dipoles(cutoff="1 um")], box="1 um"),
-            r"exceeds half the box",
-        ),
-        (lambda: sand.Simulation(pair()).run(), r"run needs an end"),
-        (lambda: sand.Simulation(pair()).run(until="-1 s"), r"lies before"),
-        (lambda: sand.Simulation(pair()).run(steps=0), r"steps = 0"),
-        (lambda: sand.Simulation(pair()).run(until="3 m"), r"until = '3 m'"),
-    ],
-)
-def test_bad_input(build, message):
-    """One clear line each."""
-    with pytest.raises(sand.BadInput, match=message):
-        build()
-
-
 def test_overlaps_name_ten_pairs_and_count_the_rest():
     """Twenty coincident grains: 190 pairs, ten lines and the number of others."""
     grains = sand.Grains(1e-9 * np.arange(60).reshape(20, 3) * 0.01, 1e-8, sand.IRON)
@@ -78,13 +53,6 @@ def test_given_contacts_may_overlap_more():
     assert [line.split(";")[0] for line in lines_of_pairs] == named[:10]
     assert all(f"at most {limit:.3g} m is allowed: move them apart" in line for line in lines_of_pairs)
     assert rest == f"… and {len(named) - 10} more overlapping pairs"
-
-
-def test_overlap_is_measured_across_the_faces_of_the_box():
-    """Two grains that overlap through the periodic boundary are reported."""
-    grains = sand.Grains([[-9.5e-8, 0, 0], [9.5e-8, 0, 0]], 1e-8, sand.SILICA)
-    with pytest.raises(sand.BadInput, match="overlap by 1e-08"):
-        sand.Simulation(grains, [sand.Contact()], box="0.2 um")
 
 
 def test_warnings():

@@ -256,55 +256,6 @@ def test_kernel_for_dustpy():
             )
 
 
-def grow(**changed):
-    given = {"kernel": kinetics.constant(RATE), "sizes": all_sizes(9), "numbers": DENSITY, "times": [TAU], "mass": MASS}
-    given |= changed
-    return coagulate(given.pop("kernel"), given.pop("sizes"), given.pop("numbers"), given.pop("times"), **given)
-
-
-@pytest.mark.parametrize(
-    ("call", "expected"),
-    [
-        (lambda: kinetics.constant("1 m"), "rate"),
-        (lambda: kinetics.power(RATE, 0.0, 1, 0), "mass"),
-        (lambda: kinetics.brownian(R, MASS, 100.0, 3.5), "fractal_dimension"),
-        (lambda: kinetics.capture(R, MASS, MOMENT, 100.0, speed="termal"), "did you mean 'thermal'"),
-        (lambda: kinetics.capture(R, MASS, MOMENT, 100.0, reading="x"), "reading"),
-        (lambda: kinetics.capture(R, MASS, 0.0, 100.0), "moment"),
-        (lambda: kinetics.constant(RATE)(MASS, [0.0]), "above 0 kg"),
-        (lambda: all_sizes(5000), "log_sizes"),
-        (lambda: log_sizes(1e9, 3), "per_decade"),
-        (lambda: grow(sizes=[2.0, 1.0]), "rise"),
-        (lambda: grow(sizes=[0.5, 1.0]), "start at 1"),
-        (lambda: grow(numbers=[1.0, 2.0]), "one for each size"),
-        (lambda: grow(numbers="many"), "numbers = 'many' is not a quantity in 1/m"),
-        (lambda: grow(numbers=[[1.0], [1.0, 2.0]]), "numbers"),
-        (lambda: grow(times=[2.0, 1.0]), "times"),
-        (lambda: grow(times=[float("nan")]), "finite"),
-        (lambda: grow(mass="1 m"), "mass"),
-        (lambda: grow(until_size=-1.0), "until_size"),
-        (lambda: grow(may_lose=1.0), "may_lose"),
-        (lambda: grow(accuracy=1.0), "accuracy"),
-        (lambda: grow(method="bdf"), "method"),
-        (lambda: grow(kernel=lambda a, b: a + 0 * b), "symmetric"),
-        (lambda: grow(kernel=lambda a, b: -a - b), "at least 0"),
-        (lambda: grow(kernel=lambda a, b: 1.0), "one number for each pair"),
-        (lambda: grow().exponent(), "outputs"),
-        (lambda: kernel_table.measured([(1, 2, 3)]), "four"),
-        (lambda: kernel_table.measured([(1, 1, 1, 1), (2, 2, 1, 1), (4, 4, 1, 1)]), "span"),
-        (lambda: kernel_table.measured([(1, 2, 1, 1), (2, 1, 2, 1), (1, 1, 1, 1)]), "equal masses"),
-        (lambda: kernel_table.measured([(1, 2, -1, 1)]), "above 0"),
-        (lambda: kernel_table.on_grid(kinetics.constant(RATE), [2.0, 1.0]), "increasing"),
-        (lambda: kernel_table.for_dustpy(np.ones((2, 2)), np.ones((3, 3))), "scale heights"),
-    ],
-)
-def test_wrong_arguments_are_refused(call, expected):
-    """One line with the name."""
-    with pytest.raises(sand.BadInput, match=expected) as caught:
-        call()
-    assert len(caught.value.problems) == 1
-
-
 @pytest.mark.parametrize("largest", [40, 100])
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_exponential_growth_is_reported(largest, accuracy):

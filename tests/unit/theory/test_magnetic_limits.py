@@ -142,28 +142,3 @@ def test_one_domain_where_its_field_costs_less_than_a_wall():
         wall = 4.0 * math.sqrt(material.exchange_stiffness * abs(material.anisotropy)) * math.pi * r**2
         saved = 0.5 * mu_0 * limits.magnetisation**2 / 6.0 * 4.0 / 3.0 * math.pi * r**3
         assert wall == pytest.approx(saved, rel=1e-9, abs=0.0)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("silica", R), "material 'silica' lacks specific_moment, anisotropy or exchange_stiffness"),
-        ((sand.IRON.but(anisotropy=None), R), r"iron.but\(anisotropy='48 kJ/m"),
-        (("iron", "-1 nm"), "radius = '-1 nm' must be above 0 m"),
-        (("iron", R, "0 K"), "temperature = '0 K' must be above 0 K"),
-        (("iron", R, "1 K", "1 ps"), "time = '1 ps' must be above 1e-09 s"),
-    ],
-)
-def test_bad_input(arguments, message):
-    """One line each."""
-    with pytest.raises(sand.BadInput, match=message):
-        magnetic_limits(*arguments)
-
-
-def test_a_negative_constant_needs_a_cubic_crystal():
-    """One line that says what to do; a cubic crystal takes it."""
-    with pytest.raises(sand.BadInput) as caught:
-        sand.MAGNETITE.but(anisotropy_kind="uniaxial")
-    (line,) = caught.value.problems
-    assert line.startswith("magnetite: anisotropy = -11000 must be above 0 J/m^3 if it is uniaxial; K1 of a cubic")
-    assert "anisotropy_kind = 'cubic'" in line

@@ -64,13 +64,3 @@ def test_two_materials_in_either_order():
     assert one.roll_limit == 8e-10
     rules = [contact("ice", 1e-7, "silica", mixing=m).pull_off_force for m in ("smaller", "harmonic", "geometric")]
     assert rules == sorted(rules)
-
-
-def test_bad_input():
-    """One line each."""
-    with pytest.raises(sand.BadInput, match="no surface energy"):
-        contact("magnetite", 1e-7)
-    with pytest.raises(sand.BadInput, match="radius = -1"):
-        contact("ice", -1)
-    with pytest.raises(sand.BadInput, match="mixing = 'mean'"):
-        contact("ice", 1e-7, mixing="mean")

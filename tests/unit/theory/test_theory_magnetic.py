@@ -89,36 +89,6 @@ def test_sizes_and_moments():
     assert theory.alignment_time(2.0, 3.0, 5.0) == pytest.approx(math.sqrt(math.pi * 2 / 15), rel=1e-12, abs=0.0)
 
 
-@pytest.mark.parametrize(
-    ("call", "expected"),
-    [
-        (lambda: theory.capture_radius(MOMENT, MASS, 0.0), "speed"),
-        (lambda: theory.capture_radius(MOMENT, "3 m", 1.0), "mass"),
-        (lambda: theory.coupling(MOMENT, R, "-3 K"), "temperature"),
-        (lambda: theory.dipole_energy([0, 0, 1], [0, 0, 1], [0, 0, 0]), "same position"),
-        (lambda: theory.dipole_energy([0, 1], [0, 0, 1], [0, 0, 1]), "three components"),
-        (lambda: theory.dipole_energy([0, 0, "1 m"], [0, 0, 1], [0, 0, 1]), "moment1 z"),
-        (lambda: theory.effective_potential(R, R, 1.0, MASS, "x"), "alpha"),
-        (lambda: theory.capture_cross_section(MOMENT, MASS, 1.0, c="x"), "c = 'x'"),
-        (lambda: theory.growth_exponents("x"), "exponent"),
-        (lambda: theory.dynamic_exponent("a", 0), "eta"),
-        (lambda: theory.mean_size("abc"), "must be an array of numbers"),
-        (lambda: theory.barrier(1e-7, 1.0, MASS, 0.0), "alpha"),
-        (lambda: theory.dynamic_exponent(0.9, 0.2), "below 1"),
-        (lambda: theory.growth_exponents(reading="papr"), "did you mean 'paper'"),
-        (lambda: theory.mean_size([0.5]), "at least 1"),
-        (lambda: theory.mean_size([1, 2], [1, math.inf]), "finite"),
-        (lambda: theory.alignment_time(1.0, 1.0, 1.0, "3 m"), "angle"),
-        (lambda: theory.aggregate_moment(MOMENT, 0), "grains"),
-    ],
-)
-def test_wrong_arguments_are_refused(call, expected):
-    """One line with the name."""
-    with pytest.raises(sand.BadInput, match=expected) as caught:
-        call()
-    assert len(caught.value.problems) == 1
-
-
 def test_text_with_units():
     """ "20 nm" is 2e-8."""
     parts = ["1e-18 A m^2", 0, 0]

@@ -1,0 +1,194 @@
+"""Reproduction of a figure of a paper: a sweep, the comparison of its table with the paper, and the figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+from ..basics.errors import BadInput, did_you_mean
+from ..contact.model import Contact
+from ..io.run_folder import COMPARISON, FIGURE, SWEEP_CSV, read_toml
+from ..io.sweep_files import DONE, FAILED, LAST, STATE, read_sweep, write_sweep
+from ..io.table import write_table
+from ..plotting.papers import panels_figure
+from ..plotting.run_figure import save
+from ..theory import contact
+from . import paper_chain, paper_compression, paper_growth
+from .job import Progress, ignored
+from .paper_figure import Compared, PaperFigure, Row
+from .sweep_design import changed_content
+from .sweep_job import SweepJob
+
+FIGURES: dict[str, PaperFigure] = {
+    one.name: one for module in (paper_growth, paper_compression, paper_chain) for one in module.FIGURES
+}
+"""Figures by name; a further one is a `PaperFigure` in `FIGURES` of a module named here."""
+RESULTS = "results"
+"""Folder, in that of the sweep, of table, comparison and figure; those of `PAPERS` have this content."""
+KEPT = (
+    *("seed", STATE, "outcome", "largest", "second", "fragments", "impact_energy", "contacts_before", "contacts_after"),
+    *("gyration_after", "time", "steps", "drift", "end", *LAST),
+)
+"""Columns of the table besides the keys that change."""
+
+MEASURED = ("impact_energy", "contacts_after", "gyration_after")
+"""Columns that `Reproduction` converts to the units of the figures."""
+
+
+def papers_folder() -> Path:
+    """Folder of the cases and of the tables that come with SAND: in the package, or in the source tree beside it."""
+    here = Path(__file__).resolve()
+    inside = here.with_name("papers")
+    return inside if inside.is_dir() else here.parents[3] / "examples" / "papers"
+
+
+class Reproduction(SweepJob):
+    """The sweep of a figure of a paper, its comparison with the paper, and the figure.
+
+    Parameters
+    ----------
+    name : str
+        A name of `FIGURES`.
+    folder : str or Path or None, optional
+        Output folder, by default the name.
+    small : bool, optional
+        Whether the small version is computed, which shows that everything works, but no physics.
+    known : bool, optional
+        Whether rows of the table that comes with SAND are taken as they are.
+    retry : bool, optional
+        As for `SweepJob`.
+
+    Raises
+    ------
+    BadInput
+        If there is no such figure.
+
+    Attributes
+    ----------
+    figure : PaperFigure
+        What is reproduced.
+    names : list of str
+        Names of all runs.
+    known : list of dict
+        Rows of the table that comes with SAND.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        folder: str | Path | None = None,
+        *,
+        small: bool = False,
+        known: bool = False,
+        retry: bool = False,
+    ):
+        if name not in FIGURES:
+            raise BadInput(f"there is no figure '{name}'; {did_you_mean(name, list(FIGURES))}")
+        self.figure, self.small = FIGURES[name], small
+        figure = self.figure
+        path = papers_folder() / f"{name}.toml"
+        content = changed_content(read_toml(path), figure.small if small else {})
+        settings = figure.small_sweep if small else {}
+        super().__init__(path, folder or f"{name}{'-small' * small}", settings, content=content, retry=retry)
+        self.names = [row.name for row in self.rows]
+        self._offsets = len({row.values.get("impact.impact_parameter") for row in self.rows})
+        place = papers_folder() / name
+        rows = _cells(place) if known and (place / SWEEP_CSV).exists() else []
+        self.known = [cells for cells in rows if cells["run"] in self.names]
+        have = {cells["run"] for cells in self.known}
+        # cheap runs first, and all of one seed before those of the next
+        self.rows = sorted(
+            (row for row in self.rows if row.name not in have),
+            key=lambda row: (sum(n for key, n in row.values.items() if key.endswith(".grains")), row.seed),
+        )
+
+    def run(
+        self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
+    ) -> dict[str, Any]:
+        """Compute the runs that are left, and conclude, also if that is interrupted; see `SweepJob.run`."""
+        content: dict[str, Any] = {"folder": str(self.folder), **dict.fromkeys(("runs", DONE, FAILED, "left"), 0)}
+        content["failures"] = {}
+        try:
+            if self.rows:
+                content = super().run(executor, observers, progress)
+        finally:
+            found = self.conclude()
+        return content | found
+
+    def conclude(self) -> dict[str, Any]:
+        """Write table, comparison and figure of all runs that are done.
+
+        Returns
+        -------
+        dict
+            Numbers of rows and of all runs, their CPU time [s], and the comparison.
+        """
+        found = {one["run"]: one for one in (*self.known, *(_cells(self.folder) if self.rows else ()))}
+        cells = [found[name] for name in self.names if name in found and found[name][STATE] == DONE]
+        place, compared = self.folder / RESULTS, list[Compared]()
+        total = len(self.names)
+        seconds = math.fsum(float(one["cpu_seconds"]) for one in cells)
+        if cells:
+            place.mkdir(parents=True, exist_ok=True)
+            write_sweep(place, cells)
+            rows = [row for one in cells for row in self._rows_of(one)]
+            compared = self.figure.compare(rows)
+            done = Compared("runs that are done", "", f"{len(cells)} of {total}, {seconds / 3600.0:.2g} core-hours", "")
+            write_table(place / COMPARISON, [one._asdict() for one in (done, *compared)])
+            part = "" if len(cells) == total else f"; {len(cells)} of {total} runs"
+            small = "; small version, which shows no physics" if self.small else ""
+            save(panels_figure(self.figure.panels(rows), f"{self.figure.title}{small}{part}"), place / FIGURE)
+        results = [one._asdict() for one in compared]
+        return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results}
+
+    def _rows_of(self, cells: dict[str, Any]) -> list[Row]:
+        """Rows as figures take them of one row of the table, of a sequence one for each collision."""
+        values = {key: cells[key] for key in self.keys}
+        case: Any = self.kind(changed_content(self.content, values), str(self.path)).case
+        material, radius = case.materials_by_name()[case.target.material], float(case.target.radius)
+        limit = next((f.rolling_limit for f in case.forces.build() if isinstance(f, Contact)), None)
+        numbers = contact(material, radius, rolling_limit=limit)
+        shared = cells | {
+            "speed": case.impact.speed,
+            "offset": float(str(case.impact.impact_parameter).rstrip(" bc")),
+            "offsets": self._offsets,
+            "grain_mass": material.density * 4.0 / 3.0 * math.pi * radius**3,
+            "roll_energy": numbers.roll_energy_clamped,
+            "break_energy": numbers.break_energy,
+        }
+        if case.projectile is None:
+            columns = [[float(text) for text in str(cells[name]).split()] for name in ("largest", *MEASURED)]
+            return [shared | _sizes(n, radius, *several) for n, *several in zip(columns[0], *columns[1:], strict=True)]
+        target, projectile = case.target.grains, case.projectile.grains
+        growth = {"bodies": f"{target} + {projectile} grains"}
+        growth["growth_efficiency"] = (cells["largest"] - target) / projectile
+        sizes = _sizes(
+            target + projectile,
+            radius,
+            *(cells[name] for name in ("impact_energy", "contacts_after", "gyration_after")),
+        )
+        return [shared | growth | sizes | {"largest_remnant": cells["largest"] / (target + projectile)}]
+
+
+def _sizes(grains: float, radius: float, energy: float, contacts: float, gyration: float) -> Row:
+    """Impact energy, contacts per grain, and radius of gyration in radii of a grain, of bodies that have collided."""
+    sizes = {"contacts_per_grain": contacts / grains, "gyration": gyration / radius}
+    return {"grains": grains, "impact_energy": energy, **sizes}
+
+
+def _cells(folder: Path) -> list[dict[str, Any]]:
+    """Rows of the table of a sweep with the columns that are kept; sizes of fragments are summarised."""
+    if not (folder / SWEEP_CSV).exists():
+        return []
+    table = read_sweep(folder)
+    found = []
+    for values in zip(*table.values(), strict=True):
+        cells = {name: getattr(v, "item", lambda v=v: v)() for name, v in zip(table, values, strict=True)}
+        if "largest" not in cells:  # numbers of grains, in decreasing order
+            sizes = [int(size) for size in str(cells["fragments"]).split()] + [0]
+            cells |= {"largest": sizes[0], "second": sizes[1], "fragments": len(sizes) - 1}
+        found.append({name: cell for name, cell in cells.items() if name in KEPT or "." in name})
+    return found

@@ -1,0 +1,87 @@
+"""A result of a campaign against one parameter, for each seed: means, intervals and where it falls below a level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.fits import jackknife
+
+
+class Interval(NamedTuple):
+    """An estimate and its 95 % interval, NaN where it has none."""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+    def text(self, unit: str = "") -> str:
+        """The estimate and its interval, such as "48 (44 … 52) m/s"."""
+        if not math.isfinite(self.value):
+            return "outside the range of the campaign"
+        limits = f"{self.low:.3g} … {self.high:.3g}" if math.isfinite(self.low) else "no interval"
+        return f"{self.value:.3g} ({limits}) {unit}".rstrip()
+
+    def verdict(self, paper: float, reason: str, within: float = 0.0) -> str:
+        """Text "agrees" if the interval, widened by `within`, contains a paper's value; or the difference and why."""
+        low, high = (self.low, self.high) if math.isfinite(self.low) else (self.value, self.value)
+        if low - within <= paper <= high + within:
+            return "agrees" if high - low <= abs(paper) + 2.0 * within else "not decided: the interval is too wide"
+        if not math.isfinite(self.value):
+            return reason
+        return f"{self.value - paper:+.2g}{f' ({self.value / paper - 1.0:+.0%})' if paper else ''}: {reason}"
+
+
+class SeedTable(NamedTuple):
+    """Values against x > 0 for each seed, NaN where runs are missing."""
+
+    x: np.ndarray  # (V,), increasing
+    of_seeds: np.ndarray  # (S, V)
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Mean over the seeds that have a value, (V,)."""
+        known = np.isfinite(self.of_seeds)
+        total, count = np.where(known, self.of_seeds, 0.0).sum(axis=0), known.sum(axis=0)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    @property
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest value of the seeds, (V,) each."""
+        return np.fmin.reduce(self.of_seeds, axis=0), np.fmax.reduce(self.of_seeds, axis=0)
+
+    def falls_below(self, level: float) -> Interval:
+        """x at which the mean falls below a level, with the interval of a jackknife over the seeds."""
+        found = falls_below(self.x, self.mean, level)
+        fewer = [self._replace(of_seeds=np.delete(self.of_seeds, k, axis=0)) for k in range(len(self.of_seeds))]
+        without = [falls_below(self.x, one.mean, level) for one in fewer]
+        return Interval(found, *jackknife(found, np.array(without))[1:])
+
+
+def seed_table(values: Mapping[tuple[Any, float], float]) -> SeedTable:
+    """Table of values by seed and x."""
+    seeds, x = (sorted({key[k] for key in values}) for k in range(2))
+    of_seeds = np.full((len(seeds), len(x)), np.nan)
+    for (seed, place), value in values.items():
+        of_seeds[seeds.index(seed), x.index(place)] = value
+    return SeedTable(np.array(x), of_seeds)
+
+
+def falls_below(x: np.ndarray, y: np.ndarray, level: float) -> float:
+    """First x at which y falls below a level, by linear interpolation of y over ln x; NaN if it does not.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        (V,), x > 0 and increasing; points whose y is NaN are left out.
+    """
+    known = np.isfinite(y)
+    u, f = np.log(x[known]), y[known] - level
+    below = np.flatnonzero((f[1:] < 0.0) & (f[:-1] >= 0.0))
+    if not below.size:
+        return math.nan
+    k = int(below[0])
+    return float(np.exp(u[k] + (u[k + 1] - u[k]) * f[k] / (f[k] - f[k + 1])))

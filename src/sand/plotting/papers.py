@@ -1,0 +1,79 @@
+"""Figures of published campaigns: curves with intervals, and guide lines of what the paper gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter, StrMethodFormatter
+
+from .run_figure import DPI, RunFigure
+from .style import LARGEST_COLOURS, MUTED, legend_above, panel_letter, plot_style
+
+MARKERS = "osD^vP*X"
+
+
+class Curve(NamedTuple):
+    """Points of one curve; with `low` and `high`, limits of their intervals."""
+
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+    low: np.ndarray | None = None
+    high: np.ndarray | None = None
+
+
+class Guide(NamedTuple):
+    """A line that is no result of this campaign: a law y(x) if it has two points or more, a mark at x if it has one."""
+
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+
+
+class Panel(NamedTuple):
+    """One panel."""
+
+    xlabel: str
+    ylabel: str
+    curves: Sequence[Curve]
+    guides: Sequence[Guide] = ()
+    log: str = "x"  # logarithmic axes: "", "x", "y" or "xy"
+    zero: bool = False  # whether the line y = 0 is drawn
+    legend: str = ""  # title of the legend
+
+
+def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
+    """Figure of panels in a row, with a title."""
+    with plot_style():
+        figure = RunFigure(figsize=(4.6 * len(panels) + 0.4, 3.9), dpi=DPI, layout="constrained")
+        for k, (axes, panel) in enumerate(zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True)):
+            _draw(axes, panel)
+            panel_letter(axes, "abcd"[k], -0.14)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=8.0)
+    return figure
+
+
+def _draw(axes: Axes, panel: Panel) -> None:
+    for axis in panel.log:
+        getattr(axes, f"set_{axis}scale")("log")
+        shown = getattr(axes, f"{axis}axis")
+        shown.set_major_formatter(StrMethodFormatter("{x:g}"))
+        shown.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
+    if panel.zero:
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    for curve, colour, marker in zip(panel.curves, cycle(LARGEST_COLOURS), cycle(MARKERS), strict=False):
+        axes.plot(curve.x, curve.y, marker=marker, color=colour, markersize=4.0, linewidth=1.0, label=curve.label)
+        if curve.low is not None and curve.high is not None:
+            axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.18, linewidth=0.0)
+    for guide, style in zip(panel.guides, cycle(("--", ":", "-.")), strict=False):
+        if len(guide.x) > 1:
+            axes.plot(guide.x, guide.y, linestyle=style, color=MUTED, label=guide.label)
+        else:
+            axes.axvline(float(guide.x[0]), linestyle=style, color=MUTED, label=guide.label)
+    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
+    legend_above(axes, title=panel.legend)
