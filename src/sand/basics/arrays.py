@@ -89,8 +89,8 @@ class LongRangeArrays(NamedTuple):
     # positions and moments by sorted index; by grain in sums over all pairs
     packed_position: Annotated[np.ndarray, Array((3, "padded"), "m", saved=False)]
     packed_moment: Annotated[np.ndarray, Array((3, "padded"), "A m^2", saved=False)]
-    # squared distances of the candidates of one grain, while a list is built
-    squared_distance: Annotated[np.ndarray, Array(("padded",), "m^2", saved=False)]
+    # whether each candidate of one grain is within reach, while a list is built
+    near: Annotated[np.ndarray, Array(("padded",), dtype="i8", saved=False)]
     # position, moment, charge, mass, radius by sorted index, for generic pair forces
     packed_grain: Annotated[np.ndarray, Array((9, "sorted"), saved=False)]
     force: Annotated[np.ndarray, Array((3, GRAINS), "N", fewer=0)]  # long-range forces
@@ -179,7 +179,7 @@ class BodyArrays(NamedTuple):
 SAVED_BODIES, SAVED_LONG_RANGE = tuple(saved_in(BodyArrays)), tuple(saved_in(LongRangeArrays))
 """Arrays of bodies and long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
-CELL_ARRAYS = ("order", "cell_of", "cell_start", "squared_distance")
+CELL_ARRAYS = ("order", "cell_of", "cell_start", "near")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
 PACKED_ARRAYS = ("packed_position", "packed_moment", "packed_grain")
 RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")

@@ -109,7 +109,7 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
                     broken = True
                     continue
                 target = after_slip(reached, pose.n, constants, step.settings.reset)
-                new_pose = slipped_pose(target, pose, constants)
+                new_pose, _ = slipped_pose(target, pose, constants)
                 left = displacements_of(new_pose, overlap, r1, r2, constants)
                 record_slip(contacts, lost, c, slip_losses(start, reached, left, present))
                 put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), new_pose.n1))

@@ -23,11 +23,12 @@ from ..basics.arrays import CONTACTS_AT_ONCE
 from ..basics.state import CONTACT_LIMIT, CONTACTS, SLIPPED
 from ..compiler.jit import COMPILED, loop, rare
 from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
+from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads
 from .law import ContactLaw
 from .losses import add_damping_energies, add_slip_energies
-from .mechanics import contact_load, displacements_of, scaled_stiffness
+from .mechanics import contact_load, displacements_of, load_of_springs, scaled_stiffness
 from .pair_types import pair_type_count
 from .poses import nearest_separation, pose_at, pose_at_step_end, separation_of
 from .slip_rules import Reached, flag_contact, kept_loop, roll_contact, slip_contact
@@ -124,14 +125,16 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             overlap = r1 + r2 - pose.distance
             y, valid = radius_root(overlap, constants)
             present = scaled_stiffness(constants, y, True) if follow else constants
-            reached = Reached(pose, displacements_of(pose, overlap, r1, r2, constants), constants, valid)
-            pose, lost, flag = handle_limits(grains, contacts, c, reached, step)
+            _, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
+            reached = Reached(pose, displacements_of(pose, overlap, r1, r2, constants), along, constants, valid)
+            pose, sliding, lost, flag = handle_limits(grains, contacts, c, reached, step)
             normal = normal_force(overlap, y, constants)
             # a flagged contact is damped by events.slip_and_break_loop; padding columns hold no grains
             used = c < part.used
             active = (flag != PENDING_FLAG) & used
-            radius, springs = contact_radius(overlap, y, constants), contact_load(pose, normal, r1, r2, present)
-            loads, dissipated = damp(grains, contacts, c, Held(pose, radius, constants), springs, active, step)
+            held = Held(pose, contact_radius(overlap, y, constants), constants)
+            springs = load_of_springs(pose, sliding, normal, r1, r2, present)
+            loads, dissipated = damp(grains, contacts, c, held, springs, active, step)
             damped1 += dissipated[0]
             damped2 += dissipated[1]
             damped3 += dissipated[2]

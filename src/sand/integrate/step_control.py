@@ -272,7 +272,7 @@ def cycle_steps(clock, count, respa, dt):
 
     Impulses must be more frequent than contact oscillations for any dt: k_max counts steps as long as contacts allow.
     """
-    if count[CONTACTS] == 0:
+    if count[CONTACTS] == 0 or respa.max_steps == 1:
         return 1
     longest = min(clock[LONG_RANGE_LEVEL], respa.max_steps * clock[CONTACT_LIMIT])
     return max(1, min(respa.max_steps, int(longest / dt + 1e-6)))
