@@ -139,7 +139,7 @@ FAULTS = (
           "linear = turned(load4(bodies.orientation, first), linear)", "linear = linear",
           "physics/test_rigid_gas.py::test_friction_of_a_body_is_the_matrix_exponential"),
     Fault("loads of substeps act twice", "lost row", "loop", "integrate/rigid/rigid_body.py",
-          "if holds_loads or bodies.quick[first] == 1:", "if holds_loads:",
+          "if excludes_loads or bodies.quick[first] == 1:", "if excludes_loads:",
           "physics/test_substeps.py::test_substeps_are_of_order_two_and_as_accurate_as_steps_of_all"),
     Fault("the same noise in many substeps", "off by one", "loop", "engine/rigid/quick_bodies.py",
           "own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]",

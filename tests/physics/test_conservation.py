@@ -8,7 +8,7 @@ import pytest
 
 import sand
 from sand.basics.constants import MAGNETIC
-from sand.basics.state import CONTACT_STEP
+from sand.basics.state import CONTACT_LIMIT
 from sand.contact import jkr
 
 from .setups import PrescribedMotion, random_aggregate, rest_distance, struck_chain
@@ -243,7 +243,7 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms(record_bound):
         ledger = sim.ledger
         ringing = ledger["contacts"] > 0
         offset = (ledger["total"][ringing] - ledger["total"][0]).mean() / ledger["translation"][ringing].max()
-        largest = (2 * math.pi / period * sim.state.clock[CONTACT_STEP]) ** 2 / 12.0
+        largest = (2 * math.pi / period * sim.state.clock[CONTACT_LIMIT]) ** 2 / 12.0
         shares.append(abs(offset) / largest)
     record_bound("energy offset of the ringing over (ω_n dt)²/12", max(shares), most=1.0)
 

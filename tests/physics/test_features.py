@@ -32,7 +32,7 @@ def test_each_feature_takes_steps(name):
 
 @pytest.mark.validate
 @pytest.mark.compiled("contacts", "dipoles", "listed", "fields")
-@pytest.mark.parametrize("pair", itertools.combinations(features.FEATURES, 2), ids=" with ".join)
+@pytest.mark.parametrize("pair", list(itertools.combinations(features.FEATURES, 2)), ids=" with ".join)
 def test_each_pair_that_is_not_refused_takes_steps(pair):
     """Two features."""
     if reason := features.refusal(*pair):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.basics.state import CONTACT_STEP, CYCLE, LEFT, LONG_RANGE_SUMS
+from sand.basics.state import CONTACT_LIMIT, CYCLE, LEFT, LONG_RANGE_SUMS
 
 from .setups import rest_distance
 
@@ -101,7 +101,7 @@ def test_cycle_length_with_a_fixed_step(longer, sums):
     """A cycle of 12 contact steps has 4 steps if the fixed step is three times longer, 12 if it is half as long."""
     own = chain(True, length=5)
     own.run(steps=20)
-    sim = chain(True, far_steps="auto", length=5, step=longer * own.state.clock[CONTACT_STEP])
+    sim = chain(True, far_steps="auto", length=5, step=longer * own.state.clock[CONTACT_LIMIT])
     sim.run(steps=1200)
     assert sim.state.count[LONG_RANGE_SUMS] / sim.state.steps == pytest.approx(sums, rel=0.01, abs=0.0)
 
@@ -116,7 +116,7 @@ def test_energy_after_a_stop_within_a_cycle(far, steps):
     """
     own = chain(True, length=6)
     own.run(steps=20)
-    step = float(own.state.clock[CONTACT_STEP])
+    step = float(own.state.clock[CONTACT_LIMIT])
     falling = sand.Gravity([0.5e-8 / (step * step * steps), 0.0, 0.0])
     sim = chain(True, far, 70, length=6, step=step, others=[falling])
     sim.frame_every = 70 * step

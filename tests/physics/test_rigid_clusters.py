@@ -17,6 +17,7 @@ from sand.analysis.internal_motion import internal_kinetic_energy
 from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.basics.state import BODIES, CONTACT_STEPS, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 from sand.cli.main import main
+from sand.engine.rigid.resting import rest_as_body
 from sand.io.frame_chunks import code_of
 from sand.simulation.ledger import kinetic_energies
 
@@ -223,10 +224,12 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
     steps = engine.stepper
     assert not state.bodies.asleep.any()
     before, arrays = state.copy(), state.grains.arrays
-    steps.sort_members(state)
-    present, steps._vibrated = steps._take_awake(state), np.zeros(6, bool)
-    steps._measure_vibrations(engine)
-    steps._rest(engine, np.arange(3), present.clusters.offset[:, :3])
+    awake = steps.awake
+    awake.sort_members(state)
+    awake.take(engine, state)
+    awake.measure()
+    _, own, offset = next(awake.clusters(np.ones(6, bool)))
+    rest_as_body(engine, own, offset, awake.measures.strain[0], awake.measures.strength[:, 0])
     assert state.bodies.asleep.tolist() == [1, 1, 1, 0, 0, 0]
     old = before.grains.arrays
     for name in ("position", "orientation", "moment"):
@@ -246,7 +249,7 @@ def test_a_cluster_at_rest_has_the_momenta_and_bits_that_it_had_awake():
 
     removed = state.lost[QUIETING] - before.lost[QUIETING]
     assert removed == pytest.approx(kinetic(old) - kinetic(arrays), rel=1e-9, abs=1e-14 * kinetic(old))
-    assert removed == pytest.approx(steps._measures.vibration[0], rel=1e-6, abs=1e-14 * kinetic(old))
+    assert removed == pytest.approx(awake.measures.vibration[0], rel=1e-6, abs=1e-14 * kinetic(old))
     at_rest_state = state.copy()
     state.bodies.near[0] = 3
     steps._wake(engine)

@@ -19,8 +19,8 @@ from sand.basics.state import (
     STEPS,
     SUBSTEPS,
     WOKEN,
-    State,
 )
+from sand.engine.part import Part
 from sand.engine.rigid.quick_bodies import QuickBodies
 from sand.integrate.parts import Stop
 
@@ -276,13 +276,13 @@ def test_the_largest_overlap_and_impact_are_those_of_awake_grains(monkeypatch):
 
     Grains of 100 K touch with the speed that their dipoles give them, and ring about δ₀, 0.05 of their radius.
     """
-    seen, take = [], State.take_extremes
+    seen, give_back = [], Part.give_back
 
-    def record(self, part):
-        take(self, part)
-        seen.append([part.clock[k] for k in (LARGEST_OVERLAP, LARGEST_IMPACT, IMPACT_SPEED)])
+    def record(self, engine):
+        seen.append([self.state.clock[k] for k in (LARGEST_OVERLAP, LARGEST_IMPACT, IMPACT_SPEED)])
+        return give_back(self, engine)
 
-    monkeypatch.setattr(State, "take_extremes", record)
+    monkeypatch.setattr(Part, "give_back", record)
     sim = thin_gas()
     sim.run(until="0.2 us")
     assert counts(sim, MADE) == [2] and counts(sim, SUBSTEPS)[0] > 100

@@ -16,10 +16,12 @@ from .sources import SOURCES, UNIT_TESTS, identifiers, nodes_of, text_of
 
 CAPABILITIES = {
     "rigid clusters with walls, driven grains and ramps, settling with driven grains": 242,
-    "loops over contacts by what they did in the last step, with displacements that these keep": 198,
+    "loops over contacts by what they did in the last step, with displacements that these keep; sums of dense packings "
+    "side by side; cells of neighbour lists that are shifted across a periodic wall as a whole": 273,
     "end of a collision when its outcome is decided, kinds of outcomes, averages over impact parameters": 445,
-    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 0,
+    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 1200,
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
+    "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 680,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""

@@ -33,7 +33,7 @@ class ContactArrays(NamedTuple):
     pointer2: Annotated[np.ndarray, Array((3, USED))]  # contact pointer of grain 2
     twist: Annotated[np.ndarray, Array((USED,), "rad")]  # φ
     formed: Annotated[np.ndarray, Array((USED,), "s")]  # time of formation; the start time for initial contacts
-    # constants of the law; CONTACTS_PER_BLOCK identical columns if uniform, one of them in a checkpoint
+    # constants of the law; CONTACTS_AT_ONCE identical columns if uniform, one of them in a checkpoint
     constants: Annotated[np.ndarray, Array(("constants", USED), fewer=1)]
     # energy dissipated so far, the first 4 or all 6 losses of state.RECORDED
     lost: Annotated[np.ndarray, Array(("channels", USED), "J", summed=True)]
@@ -89,8 +89,8 @@ class LongRangeArrays(NamedTuple):
     # positions and moments by sorted index; by grain in sums over all pairs
     packed_position: Annotated[np.ndarray, Array((3, "padded"), "m", saved=False)]
     packed_moment: Annotated[np.ndarray, Array((3, "padded"), "A m^2", saved=False)]
-    # squared distances of the candidates of one grain, while a list is built
-    squared_distance: Annotated[np.ndarray, Array(("padded",), "m^2", saved=False)]
+    # whether each candidate of one grain is within reach, while a list is built
+    near: Annotated[np.ndarray, Array(("padded",), dtype="i8", saved=False)]
     # position, moment, charge, mass, radius by sorted index, for generic pair forces
     packed_grain: Annotated[np.ndarray, Array((9, "sorted"), saved=False)]
     force: Annotated[np.ndarray, Array((3, GRAINS), "N", fewer=0)]  # long-range forces
@@ -179,7 +179,7 @@ class BodyArrays(NamedTuple):
 SAVED_BODIES, SAVED_LONG_RANGE = tuple(saved_in(BodyArrays)), tuple(saved_in(LongRangeArrays))
 """Arrays of bodies and long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
-CELL_ARRAYS = ("order", "cell_of", "cell_start", "squared_distance")
+CELL_ARRAYS = ("order", "cell_of", "cell_start", "near")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
 PACKED_ARRAYS = ("packed_position", "packed_moment", "packed_grain")
 RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")
@@ -190,8 +190,9 @@ GATHER_CLASSES = 64
 """Classes of grains by contact count; as many entries of `gather_order`, behind those of the grains, are counters."""
 GATHER_ORDER_FROM = 4000
 """Fewest grains for which contact.gather sorts grains by contact count; branch predictors learn the counts of fewer."""
-CONTACTS_PER_BLOCK = 128
-"""Contacts per block of the pass over contacts, a multiple of the SIMD width."""
+CONTACTS_AT_ONCE = 128
+"""Contacts whose loops follow each other while they are in the cache, a multiple of the SIMD width; blocks of contacts
+that threads share (`integrate.task_queue`) consist of several."""
 OVER_ALLOCATION = 1.1
 """Initial over-allocation of tables."""
 PAIRS_PER_INNER_ENTRY = 8
@@ -251,7 +252,7 @@ def empty_contact_arrays(
     used = padded_size(max(int(capacity), FEWEST_COLUMNS))
     gather = grains + GATHER_CLASSES if grains >= GATHER_ORDER_FROM else 0
     sizes = {USED: used, SIDES: 2 * used, "constants": constant_count, "channels": channels, "gather": gather}
-    columns = ({} if damped else {"damping": 0}) | ({"constants": CONTACTS_PER_BLOCK} if uniform_contacts else {})
+    columns = ({} if damped else {"damping": 0}) | ({"constants": CONTACTS_AT_ONCE} if uniform_contacts else {})
     return new_group(ContactArrays, sizes | {"grains + 1": grains + 1}, columns)
 
 

@@ -18,11 +18,9 @@ from .array_groups import (
     USED,
     Array,
     arrays_of,
-    copy_group,
     grown,
     new_group,
     reorder_group,
-    resized,
     saved_in,
     table_in,
 )
@@ -45,7 +43,7 @@ from .own_quantities import OwnQuantities
 TIME = 0  # simulated time [s]
 STEP = 1  # present time step [s]
 LEVEL = 2  # longest step allowed by free grains and closing pairs, quantised to a power of two [s]
-CONTACT_STEP = 3  # longest step allowed by contacts [s]
+CONTACT_LIMIT = 3  # longest step allowed by contacts [s]
 CYCLE = 4  # length of the present r-RESPA cycle [s]
 LEFT = 5  # part of the cycle that remains [s]; 0 between cycles
 LONG_RANGE_LEVEL = 6  # longest cycle allowed by long-range forces, quantised [s]
@@ -64,16 +62,18 @@ IMPACT_SPEED = 18  # speed along the normal of this impact [m/s]
 CHANGED = 19  # time at which a contact last formed or broke [s]
 SLID = 20  # time at which a contact last slipped [s]
 CLOCK = (
-    *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
+    *("time", "step", "level", "contact_limit", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
     *("corrected", "settled", "component_step", "some_awake", "grains_awake", "largest_load"),
     *("largest_overlap", "largest_impact", "impact_speed", "changed", "slid"),
 )
+EXTREMES, SUMS = (LARGEST_LOAD, LARGEST_OVERLAP, CHANGED, SLID), (SOME_AWAKE, CORRECTED)
+"""Entries that are the largest, or latest, of all parts of the grains, and that add up over parts."""
 LEAST_CLOCK = LARGEST_OVERLAP
 """Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0."""
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
-STAGE = 1  # 0 between steps; 1 after the drift; 2 and 3 after substeps of rigid clusters, see integrate.rigid.substeps
+PHASE = 1  # 0 between steps; 1 after the drift; 2 and 3 after substeps of rigid clusters, see integrate.rigid.substeps
 CONTACTS = 2  # contacts in use
 PAIRS = 3  # candidate pairs in use
 MADE = 4  # contacts formed
@@ -98,10 +98,13 @@ RESTED = 22  # clusters that came to rest, and move as rigid bodies
 LATE = 23  # pairs that overlapped before their bodies were woken
 SUBSTEPS = 24  # steps of bodies that take several within a step of all bodies
 COUNT = (
-    *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
+    *("steps", "phase", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
     *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared", "unused"),
     *("bodies", "contact_steps", "woken", "rested", "late", "substeps"),
 )
+
+EVENTS = (MADE, BROKEN, SLIPPED, WOKEN, RESTED, LATE)
+"""Numbers of events, which add up over parts of the grains."""
 
 # --- indices of State.cutoff (float64): the cut-off of dipoles that follows the largest clusters -----------------
 CUT_RADIUS = 0  # cut-off [m]; 0 without such a cut-off
@@ -201,7 +204,7 @@ class State:
 
     def begin_empty_step(self) -> None:
         """Be in the middle of a step of 0 s, whose second half sums the loads."""
-        self.count[STAGE] = 1
+        self.count[PHASE] = 1
         self.clock[STEP] = self.clock[CYCLE] = self.clock[LEFT] = 0.0
 
     def held_grains(self) -> np.ndarray:
@@ -214,20 +217,6 @@ class State:
             if of == GRAINS
         ]
         return np.concatenate([*found, np.zeros(0, np.uint32)])
-
-    def give_component_arrays(self, other: State, own: np.ndarray, theirs: np.ndarray) -> None:
-        """Copy the groups of components to a state whose grains `theirs` are the grains `own` of this one."""
-        for name, group in self.of_components.items():
-            present = other.of_components.get(name) or resized(group, len(other.grains))
-            other.of_components[name] = copy_group(group, present, own, theirs)
-
-    def take_extremes(self, part: State) -> None:
-        """Take over largest overlap and impact, and last events, of a part of the grains that took steps of its own."""
-        own, other = self.clock, part.clock
-        for number in (LARGEST_OVERLAP, CHANGED, SLID):
-            own[number] = max(own[number], other[number])
-        if other[LARGEST_IMPACT] > own[LARGEST_IMPACT]:
-            own[LARGEST_IMPACT], own[IMPACT_SPEED] = other[LARGEST_IMPACT], other[IMPACT_SPEED]
 
     def copy(self) -> State:
         """Independent copy (snapshot); empty arrays, which nothing changes, are the same."""

@@ -13,7 +13,7 @@ from ..basics.errors import BadInput, did_you_mean
 from . import options, parsing, report
 
 STILL = "still"
-GROWTH, OF_GROWTH = "growth", {"speed", "impact_parameter", "reach", "growth_efficiency", "kind", "seed"}
+GROWTH, OF_GROWTH = "growth", ("impact_parameter", "reach", "growth_efficiency", "kind", "seed")
 """The figure of the growth efficiency, and the columns that it needs."""
 FORMATS = ("png", "pdf", "svg")
 FOLDER, SWEEP_TABLE = "plots", "sweep.csv"  # as `PLOTS` and `SWEEP_CSV` of `io.run_folder`, whose import is slow
@@ -187,7 +187,7 @@ def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
     sweep = Sweep(folder)
     if what is None:
         return sweep.shown
-    allowed = [*sweep.results, *([GROWTH] if OF_GROWTH.issubset(sweep.table) else [])]
+    allowed = [*sweep.results, *([GROWTH] if set(OF_GROWTH).issubset(sweep.table) else [])]
     mixed = [key for key in sweep.keys if key not in ("impact.speed", "impact.impact_parameter")]
     if GROWTH in what and mixed:
         raise BadInput(
@@ -286,6 +286,7 @@ def _draw_sweep(sweep: Any, names: list[str], form: str, how: dict[str, Any]) ->
         if name != GROWTH:
             return sweep_figure(sweep.done, sweep.keys, name)
         columns = {name: sweep.done[name].tolist() for name in OF_GROWTH}
+        columns["speed"] = sweep.done["impact.speed" if "impact.speed" in sweep.keys else "speed"].tolist()
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         return growth_figure(rows, f"{len(rows)} collisions")
 

@@ -49,6 +49,8 @@ from .user_code import code_digest
 
 __all__ = ["PythonStage", "Stage", "stage"]
 
+MOST_CALLS = 256
+"""Calls of stages with parameters that a table keeps."""
 Place = Callable[[str], tuple[int, Any]]
 """Index in the table and structure of a part, by its name."""
 
@@ -193,10 +195,13 @@ class Stage:
         if isinstance(parameters, tuple) and not parameters:
             address = table.stages.get(self) or table.stages.setdefault(self, self.address(table, parameters))
             return int(call_from_python(address, table.address, table.address, block))
-        call = table.calls.get(self)
+        call = table.calls.get((self, id(parameters[0])))
         if call is None or not _has_same_members(parameters, call[0]):
+            if len(table.calls) >= MOST_CALLS:
+                table.calls.clear()
             row = np.array([*words_of(parameters), 0], np.int64)
-            call = table.calls[self] = parameters, row, self.address(table, parameters), address_of(row)
+            call = parameters, row, self.address(table, parameters), address_of(row)
+            table.calls[self, id(parameters[0])] = call
         return int(call_from_python(call[2], table.address, call[3], block))
 
     def _part(self, name: str, place: Place, own: Any) -> tuple[Any, Any]:

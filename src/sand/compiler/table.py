@@ -233,8 +233,9 @@ class Table:
         Address of the table.
     stages : dict[Stage, int]
         Addresses of stages without parameters that were called, for the present structures of the parts.
-    calls : dict[Stage, tuple]
-        Of stages with parameters: those of the last call, their row of words, and the addresses of stage and row.
+    calls : dict[tuple[Stage, int], tuple]
+        Of stages with parameters, by the identity of the first one: those of the last call, their row of words, and
+        the addresses of stage and row.
     """
 
     def __init__(self, names: tuple[str, ...]):

@@ -29,7 +29,7 @@ from ..contact.mechanics import (
     time_since,
 )
 from ..contact.transitions import ZERO, Break, Touch, breaking_loop, clear_contact, touch_loop
-from ..contact.update import ContactStep
+from ..contact.update import PresentStep
 from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.vec import accrue, across, add, axpy, dot, load, load4, nearest_image, put, scale, sub
 from .wall_formulas import WallPose, wall_constants, wall_displacements, wall_load, wall_pointers
@@ -269,7 +269,7 @@ def wall_loop(law: ContactLaw, damping: str) -> Callable:
     def update(s, numbers):
         """Move the walls, and update their contacts at the end of a step; returns FULL or the number of contacts."""
         grains, walls, contacts, used = s.grains, s.walls, s.wall_contacts, s.wall_contacts.used
-        step = ContactStep(s.span, s.settings, s.count[STEPS], s.clock[STEP])
+        step = PresentStep(s.span, s.settings, s.count[STEPS], s.clock[STEP])
         formed = count_new_wall_contacts(grains, walls, contacts, numbers, step.dt)
         if used[0] + formed > contacts.pair.shape[1]:
             return FULL

@@ -100,7 +100,7 @@ def step_stage(law: ContactLaw) -> Stage:
                     approach = min(approach, max(required, CLOSING_FRACTION * gap / closing))
         step = s.criteria.longest
         if bound < step:
-            step = np.float64(np.float32(bound))  # as in contact.update.contact_step
+            step = np.float64(np.float32(bound))  # as in contact.update.contact_limit
         if approach < step:
             step = quantise_step(1.0, approach, True)
         s.scratch[LIMIT] = min(s.scratch[LIMIT], step)

@@ -23,7 +23,7 @@ class ConstantAccess(NamedTuple):
 def uniform_contacts(contacts):
     """Whether one set of constants serves all contacts.
 
-    Uniform constants are stored as CONTACTS_PER_BLOCK identical columns, individual ones as one column per allocated
+    Uniform constants are stored as CONTACTS_AT_ONCE identical columns, individual ones as one column per allocated
     contact.  If as many contacts are allocated the two cannot be distinguished; the answer False is then also correct.
     """
     return contacts.constants.shape[1] != contacts.flag.size

@@ -80,7 +80,7 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
 
     @rare
     def update_flagged_contacts(grains, contacts, pair_list, count, lost, step):
-        """Break or slip the flagged contacts, one by one, in a step (`update.ContactStep`).
+        """Break or slip the flagged contacts, one by one, in a step (`update.PresentStep`).
 
         Returns
         -------
@@ -109,7 +109,7 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
                     broken = True
                     continue
                 target = after_slip(reached, pose.n, constants, step.settings.reset)
-                new_pose = slipped_pose(target, pose, constants)
+                new_pose, _ = slipped_pose(target, pose, constants)
                 left = displacements_of(new_pose, overlap, r1, r2, constants)
                 record_slip(contacts, lost, c, slip_losses(start, reached, left, present))
                 put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), new_pose.n1))
@@ -231,7 +231,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
 
     @rare
     def form_contacts(grains, contacts, pair_list, count, lost, clock, step):
-        """Form the contacts of pairs that began to touch within the step (`update.ContactStep`)."""
+        """Form the contacts of pairs that began to touch within the step (`update.PresentStep`)."""
         for p in range(count[PAIRS]):
             i, j = pair_list.pair[0, p], pair_list.pair[1, p]
             separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), step.span)

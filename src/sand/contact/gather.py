@@ -21,7 +21,7 @@ LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
 """Contact counts of this number and more, separately as grain 1 and as grain 2, share a class."""
 DENSE_FROM = 3
 """Number of contacts over number of grains, half the mean coordination number, from which most grains have equally
-many contacts, so that sorting brings nothing."""
+many contacts, so that sorting brings nothing; the two sides of contacts are then summed in loops of their own."""
 
 
 @loop
@@ -37,6 +37,23 @@ def _gather_at(grains, contacts, g):
         else:
             force = add(force, load(contacts.force, c))
             torque = add(torque, load(contacts.torque1, c))
+    put(grains.force, g, force)
+    put(grains.torque, g, torque)
+
+
+@loop
+def _gather_sides_apart(grains, contacts, g):
+    """As `_gather_at`, with the same sums, in one loop over contacts as grain 1 and one over those as grain 2."""
+    force = torque = (0.0, 0.0, 0.0)
+    s, end = np.uint64(contacts.start[g]), np.uint64(contacts.start[g + np.uint64(1)])
+    while s < end and contacts.side[s] & 1 == 0:
+        force = add(force, load(contacts.force, contacts.side[s] >> 1))
+        torque = add(torque, load(contacts.torque1, contacts.side[s] >> 1))
+        s += np.uint64(1)
+    while s < end:
+        force = sub(force, load(contacts.force, contacts.side[s] >> 1))
+        torque = add(torque, load(contacts.torque2, contacts.side[s] >> 1))
+        s += np.uint64(1)
     put(grains.force, g, force)
     put(grains.torque, g, torque)
 
@@ -63,9 +80,9 @@ def gather_few(grains, contacts, first, last):
 
 
 @loop
-def _has_few_contacts(contacts, first, last):
-    """Whether at least half of the grains first … last − 1 (uint64) have no contacts, by the number of contacts."""
-    return 2 * (int(contacts.start[last]) - int(contacts.start[first])) < int(last - first)
+def _sides_of(contacts, first, last):
+    """Number of contacts of each of the grains first … last − 1 (uint64), added up."""
+    return int(contacts.start[last]) - int(contacts.start[first])
 
 
 @loop
@@ -74,8 +91,12 @@ def gather(grains, contacts, first, last):
 
     `first` and `last` are multiples of GRAINS_AT_ONCE, except where `last` is the number of grains.
     """
-    if _has_few_contacts(contacts, first, last):
+    sides, number = _sides_of(contacts, first, last), int(last - first)
+    if 2 * sides < number:  # at least half of the grains have no contacts
         gather_few(grains, contacts, first, last)
+    elif sides >= 2 * DENSE_FROM * number:
+        for k in range(last - first):
+            _gather_sides_apart(grains, contacts, first + k)
     elif contacts.gather_order.size > 0:
         for k in range(last - first):
             _gather_at(grains, contacts, contacts.gather_order[first + k])

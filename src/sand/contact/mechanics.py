@@ -26,11 +26,18 @@ class Pose(NamedTuple):
 
 
 @formula
-def pose_of(separation, n1, n2, twist):
-    """Pose of two grains with x1 − x2 [m], contact pointers n1, n2 in the laboratory frame and twist φ [rad]."""
+def direction_of(separation):
+    """Unit vector, length D [m] and 1/D of x1 − x2 [m]."""
     distance = math.sqrt(dot(separation, separation))
     inverse = 1.0 / distance
-    return Pose(scale(inverse, separation), distance, inverse, n1, n2, twist)
+    return scale(inverse, separation), distance, inverse
+
+
+@formula
+def pose_of(separation, n1, n2, twist):
+    """Pose of two grains with x1 − x2 [m], contact pointers n1, n2 in the laboratory frame and twist φ [rad]."""
+    n, distance, inverse = direction_of(separation)
+    return Pose(n, distance, inverse, n1, n2, twist)
 
 
 class Displacements(NamedTuple):
@@ -104,10 +111,16 @@ def contact_load(pose, normal, r1, r2, constants):
     constants : ContactConstants
         Constants with the present stiffnesses (see `scaled_stiffness`).
     """
-    zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
+    return load_of_springs(pose, tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2), normal, r1, r2, constants)
+
+
+@formula
+def load_of_springs(pose, sliding, normal, r1, r2, constants):
+    """As `contact_load`, with ζ and d·n [m] as of `tangential.sliding`."""
+    slide, along = sliding
     pull = constants.slide_stiffness * along * pose.inverse_distance
-    force, torque1, torque = load_on_grain(pose, pose.n2, zeta, pull, normal, r1, constants)
-    return force, torque1, add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
+    force, torque1, torque = load_on_grain(pose, pose.n2, slide, pull, normal, r1, constants)
+    return force, torque1, add(scale(r2 * constants.slide_stiffness, cross(pose.n2, slide)), torque)
 
 
 @formula

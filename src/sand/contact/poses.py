@@ -4,7 +4,7 @@ from ..compiler.jit import loop
 from ..numerics.quaternion import turned, turned_by
 from ..numerics.vec import axpy, load, load4, nearest_image, scale, sub
 from . import tangential
-from .mechanics import Pose, displacements_of, pose_of
+from .mechanics import Pose, direction_of, displacements_of, pose_of
 
 
 @loop
@@ -29,9 +29,10 @@ def pose_at(grains, contacts, span, c, twist):
 def pose_apart(grains, contacts, separation, c, twist):
     """As `pose_at`, for given x1 − x2 [m]."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
+    n, distance, inverse = direction_of(separation)  # first: processors wait longest for its root and division
     n1 = turned(load4(grains.orientation, i), load(contacts.pointer1, c))
     n2 = turned(load4(grains.orientation, j), load(contacts.pointer2, c))
-    return pose_of(separation, n1, n2, twist)
+    return Pose(n, distance, inverse, n1, n2, twist)
 
 
 @loop

@@ -26,7 +26,6 @@ from .mechanics import (
     after_rolling,
     after_slip,
     breaks,
-    displacements_of,
     exceeds_limits,
     exceeds_rolling,
     exceeds_sliding_or_twisting,
@@ -45,6 +44,7 @@ class Reached(NamedTuple):
 
     pose: Any  # mechanics.Pose
     displacements: Any  # mechanics.Displacements
+    along: Any  # d·n [m] of `tangential.sliding`
     constants: Any  # law.ContactConstants
     valid: bool  # whether the contact radius is
 
@@ -66,33 +66,44 @@ def select(condition, u, v):
 
 @formula
 def slipped_pose(left, pose, constants):
-    """Pose after slip: the pointers and the twist represent the displacements that `mechanics.after_slip` leaves."""
-    d = constants.derived
-    n1, n2 = tangential.pointers_by(left.slide, left.roll, pose.n, d.inverse_radius1, d.inverse_radius2, d.inverse_sum)
-    return Pose(pose.n, pose.distance, pose.inverse_distance, n1, n2, left.twist)
+    """Pose after slip, and its d·n [m] of `tangential.sliding`.
+
+    The pointers and the twist represent the displacements that `mechanics.after_slip` leaves.
+    """
+    d, n = constants.derived, pose.n
+    n1, n2, c1, c2 = tangential.pointers_by(
+        left.slide, left.roll, n, d.inverse_radius1, d.inverse_radius2, d.inverse_sum
+    )
+    slipped = Pose(n, pose.distance, pose.inverse_distance, n1, n2, left.twist)
+    return slipped, -d.radius1 * c1 - d.radius2 * c2
 
 
 @loop
 def flag_contact(grains, contacts, c, reached, step):
-    """Only flag a contact beyond a limit; returns its pose, the energies [J] dissipated by slip, and its flag."""
+    """Only flag a contact beyond a limit.
+
+    Returns its pose, ζ and d·n [m], the energies [J] dissipated by slip, and its flag.
+    """
     exceeded = exceeds_limits(reached.displacements, reached.pose.n, reached.constants) | (not reached.valid)
-    return reached.pose, (0.0, 0.0, 0.0), PENDING_FLAG if exceeded else 0
+    sliding = reached.displacements.slide, reached.along
+    return reached.pose, sliding, (0.0, 0.0, 0.0), PENDING_FLAG if exceeded else 0
 
 
 @loop
 def roll_contact(grains, contacts, c, reached, step):
     """As `flag_contact`, but let a contact slip that is beyond the limit of rolling alone."""
-    pose, displacements, constants, valid = reached
+    pose, displacements, _, constants, valid = reached
     others = breaks(displacements, constants) | exceeds_sliding_or_twisting(displacements, constants) | (not valid)
     slips = exceeds_rolling(displacements, pose.n, constants) & (not others)
     left = after_rolling(displacements, pose.n, constants, step.settings.reset)
-    pose = _slipped_where(slips, grains, contacts, c, slipped_pose(left, pose, constants), pose)
+    pose, along = _slipped_where(slips, grains, contacts, c, slipped_pose(left, pose, constants), reached)
     roll = tangential.rolling(pose.n1, pose.n2, constants.reduced_radius)
     lost = roll_loss(load_rows(contacts.kept, ROLL, c), displacements.roll, roll, constants)
     lost = lost if slips else 0.0
     contacts.lost[ROLLING_ROW, c] += lost
     _keep(contacts, c, displacements.slide, roll, 0.0 if others else next_step(step.number, step.dt))
-    return pose, (0.0, lost, 0.0), PENDING_FLAG if others else SLIPPED_FLAG if slips else 0
+    flag = PENDING_FLAG if others else SLIPPED_FLAG if slips else 0
+    return pose, (displacements.slide, along), (0.0, lost, 0.0), flag
 
 
 @loop
@@ -101,33 +112,36 @@ def slip_contact(grains, contacts, c, reached, step):
 
     Contacts that break, or whose contact radius is not valid, are only flagged.
     """
-    pose, displacements, constants, valid = reached
+    pose, displacements, _, constants, valid = reached
     slides = exceeds_sliding_or_twisting(displacements, constants)
     needs_event = breaks(displacements, constants) | (not valid)
     slips = (slides | exceeds_rolling(displacements, pose.n, constants)) & (not needs_event)
     slide, roll = load_rows(contacts.kept, SLIDE, c), load_rows(contacts.kept, ROLL, c)
     start = Displacements(0.0, slide, roll, contacts.twist[c])
     left = after_slip(displacements, pose.n, constants, step.settings.reset)
-    pose = _slipped_where(slips, grains, contacts, c, slipped_pose(left, pose, constants), pose)
-    r1, r2 = constants.derived.radius1, constants.derived.radius2
-    left = displacements_of(pose, displacements.overlap, r1, r2, constants)
+    pose, along = _slipped_where(slips, grains, contacts, c, slipped_pose(left, pose, constants), reached)
+    slide = select(slips, left.slide, displacements.slide)
+    roll = tangential.rolling(pose.n1, pose.n2, constants.reduced_radius)
+    left = Displacements(displacements.overlap, slide, roll, pose.twist)
     lost = select(slips, slip_losses(start, displacements, left, constants), (0.0, 0.0, 0.0))
     add_slip_losses(contacts.lost, c, lost)
     _keep(contacts, c, left.slide, left.roll, 0.0 if needs_event else next_step(step.number, step.dt))
     flag = SLID_FLAG if slides else SLIPPED_FLAG
-    return pose, lost, PENDING_FLAG if needs_event else flag if slips else 0
+    return pose, (slide, along), lost, PENDING_FLAG if needs_event else flag if slips else 0
 
 
 @loop
-def _slipped_where(slips, grains, contacts, c, slipped, pose):
-    """The pose of contact c, and its stored pointers: those after slip where it slips."""
+def _slipped_where(slips, grains, contacts, c, left, reached):
+    """The pose of contact c, its d·n [m] and its stored pointers: those after slip where it slips."""
+    (slipped, along), pose = left, reached.pose
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     body1 = turned_back(load4(grains.orientation, i), slipped.n1)
     body2 = turned_back(load4(grains.orientation, j), slipped.n2)
     put(contacts.pointer1, c, select(slips, body1, load(contacts.pointer1, c)))
     put(contacts.pointer2, c, select(slips, body2, load(contacts.pointer2, c)))
     n1, n2 = select(slips, slipped.n1, pose.n1), select(slips, slipped.n2, pose.n2)
-    return Pose(pose.n, pose.distance, pose.inverse_distance, n1, n2, slipped.twist if slips else pose.twist)
+    twist = slipped.twist if slips else pose.twist
+    return Pose(pose.n, pose.distance, pose.inverse_distance, n1, n2, twist), along if slips else reached.along
 
 
 @loop

@@ -41,22 +41,29 @@ def pointers_for(slide, roll, n, r1, r2):
 
     t1 = ξ/r1 + ζ/(r1+r2), t2 = ξ/r2 − ζ/(r1+r2), n1 = −n√(1−t1²) + t1, n2 = n√(1−t2²) + t2
     """
-    return pointers_by(slide, roll, n, 1.0 / r1, 1.0 / r2, 1.0 / (r1 + r2))
+    return pointers_by(slide, roll, n, 1.0 / r1, 1.0 / r2, 1.0 / (r1 + r2))[:2]
 
 
 @formula
 def pointers_by(slide, roll, n, inverse1, inverse2, inverse_sum):
-    """As `pointers_for`, from 1/r1, 1/r2 and 1/(r1 + r2) [1/m]."""
+    """As `pointers_for`, from 1/r1, 1/r2 and 1/(r1 + r2) [1/m]; returns n1, n2, −n1·n and n2·n."""
     shared = scale(inverse_sum, slide)
     t1 = axpy(inverse1, roll, shared)
     t2 = sub(scale(inverse2, roll), shared)
-    return pointer(-1.0, n, t1), pointer(1.0, n, t2)
+    c1, c2 = cosine(t1), cosine(t2)
+    return axpy(-c1, n, t1), axpy(c2, n, t2), c1, c2
 
 
 @formula
 def pointer(sign, n, t):
     """The unit vector ±n√(1−t²) + t, for t perpendicular to n."""
-    return axpy(sign * math.sqrt(max(1.0 - dot(t, t), 0.0)), n, t)
+    return axpy(sign * cosine(t), n, t)
+
+
+@formula
+def cosine(t):
+    """√(1−t²), the part along n of a pointer with the part t across it."""
+    return math.sqrt(max(1.0 - dot(t, t), 0.0))
 
 
 @formula

@@ -103,7 +103,7 @@ def touch_loop(law: ContactLaw, dashpots: DampingVariant) -> Callable:
         ----------
         touched : Touch
             The contact, with its loads without dashpots.
-        step : update.ContactStep
+        step : update.PresentStep
             The step; that of 0 s at the start of a run finds grains that overlap already.
 
         Returns

@@ -19,21 +19,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..basics.arrays import CONTACTS_PER_BLOCK
-from ..basics.state import CONTACT_STEP, CONTACTS, SLIPPED
+from ..basics.arrays import CONTACTS_AT_ONCE
+from ..basics.state import CONTACT_LIMIT, CONTACTS, SLIPPED
 from ..compiler.jit import COMPILED, loop, rare
 from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
+from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads
 from .law import ContactLaw
 from .losses import add_damping_energies, add_slip_energies
-from .mechanics import contact_load, displacements_of, scaled_stiffness
+from .mechanics import contact_load, displacements_of, load_of_springs, scaled_stiffness
 from .pair_types import pair_type_count
 from .poses import nearest_separation, pose_at, pose_at_step_end, separation_of
 from .slip_rules import Reached, flag_contact, kept_loop, roll_contact, slip_contact
 from .transitions import PENDING_FLAG, SLIPPED_FLAG
 
-BLOCK_SIZE = np.uint64(CONTACTS_PER_BLOCK)
+BLOCK_SIZE = np.uint64(CONTACTS_AT_ONCE)
 """Contacts per block."""
 SLIP_FRACTION = 0.1
 """Fraction of a block's contacts beyond a limit in the last step, above which contacts slip in the loop."""
@@ -52,7 +53,7 @@ class PassVariant(NamedTuple):
     adhesive: bool = False  # whether all contacts adhere
 
 
-class ContactStep(NamedTuple):
+class PresentStep(NamedTuple):
     """What is the same for all contacts in a step."""
 
     span: Any  # box.Span, the box
@@ -104,7 +105,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             Arrays of grains and contacts.
         part : ContactRange
             The range.
-        step : ContactStep
+        step : PresentStep
             The step.
 
         Returns
@@ -124,14 +125,16 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             overlap = r1 + r2 - pose.distance
             y, valid = radius_root(overlap, constants)
             present = scaled_stiffness(constants, y, True) if follow else constants
-            reached = Reached(pose, displacements_of(pose, overlap, r1, r2, constants), constants, valid)
-            pose, lost, flag = handle_limits(grains, contacts, c, reached, step)
+            _, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
+            reached = Reached(pose, displacements_of(pose, overlap, r1, r2, constants), along, constants, valid)
+            pose, sliding, lost, flag = handle_limits(grains, contacts, c, reached, step)
             normal = normal_force(overlap, y, constants)
             # a flagged contact is damped by events.slip_and_break_loop; padding columns hold no grains
             used = c < part.used
             active = (flag != PENDING_FLAG) & used
-            radius, springs = contact_radius(overlap, y, constants), contact_load(pose, normal, r1, r2, present)
-            loads, dissipated = damp(grains, contacts, c, Held(pose, radius, constants), springs, active, step)
+            held = Held(pose, contact_radius(overlap, y, constants), constants)
+            springs = load_of_springs(pose, sliding, normal, r1, r2, present)
+            loads, dissipated = damp(grains, contacts, c, held, springs, active, step)
             damped1 += dissipated[0]
             damped2 += dissipated[1]
             damped3 += dissipated[2]
@@ -173,7 +176,7 @@ def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
 
     @loop
     def contact_pass(grains, contacts, first, last, step):
-        """Update the contacts first … last − 1 (uint64) in a step (`ContactStep`); result as for `contact_loop`.
+        """Update the contacts first … last − 1 (uint64) in a step (`PresentStep`); result as for `contact_loop`.
 
         With stiffnesses that follow a(δ) all contacts beyond a limit stay flagged: the work of the stiffness change
         must be logged before they slip.
@@ -259,7 +262,7 @@ def single_contact_loop(law: ContactLaw) -> Callable:
 
 
 @rare
-def contact_step(contacts, pair_list, count, n, clock, per_period):
+def contact_limit(contacts, pair_list, count, n, clock, per_period):
     """Set the longest step [s] allowed by contacts: shortest period / per_period, times √(6/z) for z > 6 contacts.
 
     Contact candidates are included, so that the step is short enough before two small grains touch.  The step is
@@ -272,10 +275,10 @@ def contact_step(contacts, pair_list, count, n, clock, per_period):
     for g in range(n):
         most_contacts = max(most_contacts, int(contacts.start[g + 1]) - int(contacts.start[g]))
     coordination = max(1.0, most_contacts / 6.0)
-    clock[CONTACT_STEP] = math.inf
+    clock[CONTACT_LIMIT] = math.inf
     if squared_frequency > 0.0:
-        clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(squared_frequency * coordination) / per_period
+        clock[CONTACT_LIMIT] = 2.0 * math.pi / math.sqrt(squared_frequency * coordination) / per_period
         for k in range(pair_type_count(pair_list, count)):
-            clock[CONTACT_STEP] = min(clock[CONTACT_STEP], pair_list.step[k])
+            clock[CONTACT_LIMIT] = min(clock[CONTACT_LIMIT], pair_list.step[k])
         # 24 significant bits, so that sums of steps are exact and r-RESPA cycles conserve momenta to rounding
-        clock[CONTACT_STEP] = np.float64(np.float32(clock[CONTACT_STEP]))
+        clock[CONTACT_LIMIT] = np.float64(np.float32(clock[CONTACT_LIMIT]))

@@ -12,7 +12,7 @@ from ..basics.box import Box
 from ..basics.errors import BadInput, first_problems
 from ..basics.grains import GrainArrays, Grains
 from ..basics.own_quantities import joined as joined_own
-from ..basics.state import CONTACT_STEP, CONTACTS, CUT_FIRST, CUT_SECOND, GRAIN1, GRAIN2, PAIRS, State
+from ..basics.state import CONTACT_LIMIT, CONTACTS, CUT_FIRST, CUT_SECOND, GRAIN1, GRAIN2, PAIRS, State
 
 SAME_SEPARATION = 1e-9
 """Largest change of the separation of two grains in contact, in their radii, that counts as rounding."""
@@ -130,6 +130,6 @@ def regrouped_arrays(state: State, kept: np.ndarray, grains: Grains, target: Sta
     count, clock, cutoff = out["count"], out["clock"], out["cutoff"]
     count[CONTACTS], count[PAIRS] = pair.shape[1], 0
     count[GRAIN1] = count[GRAIN2] = -1
-    clock[CONTACT_STEP] = np.inf
+    clock[CONTACT_LIMIT] = np.inf
     cutoff[[CUT_FIRST, CUT_SECOND]] = 0.0  # chosen anew before the next step
     return out

@@ -166,8 +166,9 @@ class CompiledState:
         """
         alone = self.workers is None or not self.workers.have_started
         if self._queue is not None and self._queue_size == (grains, contacts) and alone:
-            self._queue.words[:] = 0
-            self._queue.words[SHARED] = uses_task_queue(grains)
+            if uses_task_queue(grains):
+                self._queue.words[:] = 0
+                self._queue.words[SHARED] = 1
         else:
             self._queue, self._queue_size = new_task_queue(grains, contacts), (grains, contacts)
         return self._queue

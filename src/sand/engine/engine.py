@@ -16,7 +16,7 @@ from ..basics.state import (
     BROKEN,
     CHECKED,
     COMPARED,
-    CONTACT_STEP,
+    CONTACT_LIMIT,
     CONTACT_STEPS,
     LISTED,
     LONG_RANGE_SUMS,
@@ -296,7 +296,7 @@ class Engine(CompiledState):
         state = self.state
         state.begin_empty_step()
         state.count[CHECKED] = state.count[STEP_INCREASES] = -INCREASE_INTERVAL
-        state.clock[CONTACT_STEP] = math.inf
+        state.clock[CONTACT_LIMIT] = math.inf
         self.drive(-math.inf, 1)
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
         state.count[COMPARED] = min(state.count[COMPARED], 0)

@@ -4,56 +4,48 @@ from __future__ import annotations
 
 import copy
 import math
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from operator import is_
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..basics.arrays import SAVED_BODIES, SAVED_LONG_RANGE, ContactArrays, body_arrays, cluster_arrays
-from ..basics.state import (
-    BROKEN,
-    CHECKED,
-    COMPARED,
-    CONTACT_STEP,
-    CONTACT_STEPS,
-    CONTACTS,
-    CORRECTED,
-    GRAIN1,
-    GRAIN2,
-    GRAINS_AWAKE,
-    KICKED,
-    LARGEST_LOAD,
-    LATE,
-    MADE,
-    RESTED,
-    SETTLED,
-    SLIPPED,
-    SOME_AWAKE,
-    STEP_INCREASES,
-    STEPS,
-    TIME,
-    WOKEN,
-    State,
-)
+from ..basics.array_groups import copy_group, resized
+from ..basics.arrays import SAVED_BODIES, ContactArrays, body_arrays, cluster_arrays
+from ..basics.grains import GrainArrays
+from ..basics.state import BROKEN, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE, SETTLED, State
+from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
-from ..integrate.step_control import INCREASE_INTERVAL
+from ..integrate.part_copies import ColumnCopies, add_sums_of_part, array_pairs, begin_part, copy_columns
 from ..integrate.task_queue import uses_task_queue
 from .changed_state import subset
 from .engine import Engine
 from .new_state import new_state
 
-NOT_COPIED = ("pair", "constants", "every_step", "kept", "side", "start", "gather_order")
+NOT_COPIED = ("constants", "every_step", "kept", "side", "start", "gather_order")
 CONTACT_COLUMNS = tuple(name for name in ContactArrays._fields if name not in NOT_COPIED)
-"""Arrays of contacts that a part needs and changes; pairs are numbered anew, the others follow."""
+"""Arrays of contacts that a part needs and changes; constants only if they are not uniform, the others follow."""
 MOVING = ("position", "velocity", "orientation", "spin", "moment", "image")
 """Arrays of grains that change in a step."""
 BODY_COLUMNS = (*SAVED_BODIES, "decay", "mode")
 """Arrays of bodies that a part with bodies needs and changes."""
-EVENTS = (MADE, BROKEN, SLIPPED, WOKEN, RESTED, LATE)
-"""Numbers of `State.count` that are added to those of all grains."""
+INDICES = ("pair", "first")
+"""Those of these arrays that have indices of grains."""
 MOST_ENGINES = 64
 """Engines of different numbers of grains that are kept: the table of an engine is slow to fill with other arrays."""
+
+
+class Copies(NamedTuple):
+    """Copies of grains and their contacts to a part, and back."""
+
+    arrays: tuple[
+        weakref.ref[np.ndarray], ...
+    ]  # the first and the last array of each group, of all grains and the part
+    of: tuple[np.ndarray, np.ndarray]  # the grains, and the columns of contacts
+    take: ColumnCopies
+    give: ColumnCopies
 
 
 @dataclass
@@ -81,6 +73,11 @@ class Part:
     index: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))
     columns: np.ndarray = field(init=False, default_factory=lambda: np.zeros(0, np.int64))
     _engines: dict[int, Engine] = field(init=False, default_factory=dict)
+    _pairs: dict[int, Any] = field(init=False, default_factory=dict)  # of arrays that are copied, by number of grains
+    _moved: tuple[Any, Any] = field(init=False, default=((), None))  # contacts, and pairs of each array with itself
+    _copies: Copies | None = field(init=False, default=None)
+    _start: np.ndarray = field(init=False, default_factory=lambda: np.zeros(4))  # numbers of `begin_part`
+    _numbers: np.ndarray = field(init=False, default_factory=lambda: np.zeros(2))  # and of `add_sums_of_part`
 
     def __post_init__(self) -> None:
         self.engine = self.prototype
@@ -109,48 +106,45 @@ class Part:
         columns : ndarray
             Columns of all contacts between them.
         """
-        self.index, self.columns = index, columns
-        self.engine = self._engines.get(len(index)) or self._new_engine(state)
-        own = self.state
-        own.count[:], own.clock[:], own.lost[:] = 0, 0.0, 0.0
-        for name, array in own.grains.arrays._asdict().items():
-            getattr(state.grains.arrays, name).take(index, axis=-1, out=array)
-        self._copy_contacts(state, own)
-        if self.has_bodies:
-            _copy(BODY_COLUMNS, state.bodies, index, own.bodies, slice(None))
-            own.bodies.first[:] = np.searchsorted(index, own.bodies.first)
-        state.give_component_arrays(own, index, np.arange(len(index)))
-        self.engine.content.heavy[:] = np.searchsorted(index, self.prototype.content.heavy)
-        own.count[COMPARED] = -1
-        own.count[CHECKED] = own.count[STEP_INCREASES] = -INCREASE_INTERVAL
-        # the kicks of the gas are counted with the steps of grains, so that no random number is used twice
-        own.count[CONTACT_STEPS] = state.count[CONTACT_STEPS]
-        own.clock[TIME] = own.clock[KICKED] = state.time
-        own.clock[SETTLED] = state.clock[SETTLED]
-        own.clock[CONTACT_STEP] = math.inf
-        for name in SAVED_LONG_RANGE:
-            getattr(own.long_range, name)[...] = math.inf if name == "anchor" else 0.0
-        own.pair_list.anchor[...] = math.inf
-        resort_contacts_by_grain.run(self.engine.table_of(own))
+        if index is not self.index or self.engine is self.prototype:
+            self.index, self.engine = (
+                index,
+                self._engines.get(len(index)) or self._new_engine(state, index, len(columns)),
+            )
+            self.engine.content.heavy[:] = np.searchsorted(index, self.prototype.content.heavy)
+            self._numbers[:] = self.steps_are, len(index) / len(state.grains)
+        self.columns, own = columns, self.state
+        if own.contacts.pair.shape[1] < len(columns):
+            own.grow("contacts", len(columns))
+        table = self.engine.table_of(own)
+        copy_columns.run(table, self._copies_of(state, own).take)
+        if state.uniform_contacts:
+            own.contacts.constants[...] = state.contacts.constants
+        self._give_component_arrays(state, own, index, np.arange(len(index)))
+        self._start[:] = state.time, state.clock[SETTLED], state.count[CONTACT_STEPS], len(columns)
+        begin_part.run(table, (self._start,))
         return own
 
-    def give_back(self, state: State) -> bool:
-        """Copy what has moved back to the state of all grains, with counts and losses.
+    def give_back(self, engine: Engine) -> bool:
+        """Copy what has moved back to the state of all grains, that of their engine, with counts and losses.
 
         Returns
         -------
         bool
             Whether contacts have formed or broken; then `columns` are others.
         """
-        own = self.state
-        _copy(MOVING, own.grains.arrays, slice(None), state.grains.arrays, self.index)
+        state, own = engine.regular_state, self.state
         changed = bool(own.count[MADE] + own.count[BROKEN])
-        self.columns = self._changed_contacts(state, own) if changed else self._same_contacts(state, own)
-        if self.has_bodies:
-            _copy(BODY_COLUMNS, own.bodies, slice(None), state.bodies, self.index)
-            state.bodies.first[self.index] = self.index[own.bodies.first]
-        own.give_component_arrays(state, np.arange(len(self.index)), self.index)
-        self._count(state, own)
+        table = engine.table_of(state)
+        if changed:
+            self.columns = self._make_room(state, table, int(own.count[CONTACTS]))
+            if state.uniform_contacts:
+                state.contacts.constants[...] = own.contacts.constants
+        copy_columns.run(table, self._copies_of(state, own).give)
+        self._give_component_arrays(own, state, np.arange(len(self.index)), self.index)
+        if changed:
+            resort_contacts_by_grain.run(engine.table_of(state))
+        add_sums_of_part.run(table, (own.clock, own.count, own.lost, self._numbers))
         return changed
 
     def name_limiting(self, state: State) -> None:
@@ -159,84 +153,91 @@ class Part:
             number = int(self.state.count[grain])
             state.count[grain] = self.index[number] if 0 <= number < len(self.index) else -1
 
-    def _new_engine(self, state: State) -> Engine:
+    def _new_engine(self, state: State, index: np.ndarray, contacts: int) -> Engine:
         """An engine for these grains, which is kept for others of the same number; there are at most `MOST_ENGINES`."""
-        given, count = self.prototype, len(self.index)
-        grains, capacity = subset(state.grains, self.index), len(self.columns)
-        made = new_state(grains, state.box, given.parameters, given.content, capacity, over_all_pairs=True)
+        given, count = self.prototype, len(index)
+        grains = subset(state.grains, index)
+        made = new_state(grains, state.box, given.parameters, given.content, contacts, over_all_pairs=True)
         made.uniform_contacts = state.uniform_contacts
         if self.has_bodies:
             made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
         else:
             made.clusters = cluster_arrays(count)
-        state.give_component_arrays(made, self.index, np.arange(count))
+        for name in given.stored_state.of_components:
+            made.of_components[name] = resized(state.of_components[name], count)
         # few grains, and bodies, share no work between threads
         engine = given.for_state(made, with_threads=uses_task_queue(count) and not self.has_bodies)
         engine.content = given.content.for_part(count)
         if len(self._engines) == MOST_ENGINES:
             self._engines.clear()
+            self._pairs.clear()
         self._engines[count] = engine
         return engine
 
-    def _copy_contacts(self, state: State, own: State) -> None:
-        """Copy the contacts to the state of the part."""
-        used, contacts = len(self.columns), state.contacts
-        if own.contacts.pair.shape[1] < used:
-            own.grow("contacts", used)
-        own.contacts.pair[:, :used] = np.searchsorted(self.index, contacts.pair[:, self.columns])
-        _copy(CONTACT_COLUMNS, contacts, self.columns, own.contacts, slice(used))
-        if state.uniform_contacts:
-            own.contacts.constants[...] = contacts.constants
-        else:
-            own.contacts.constants[:, :used] = contacts.constants[:, self.columns]
-        own.contacts.every_step[:] = 0
-        own.contacts.kept[:] = 0.0  # displacements of another step, before the clusters moved as rigid bodies
-        own.count[CONTACTS] = used
+    def _give_component_arrays(self, source: State, target: State, own: np.ndarray, theirs: np.ndarray) -> None:
+        """Copy the groups of the components that act in the part (`Component.in_parts`)."""
+        for name in self.prototype.stored_state.of_components:
+            target.of_components[name] = copy_group(source.of_components[name], target.of_components[name], own, theirs)
 
-    def _same_contacts(self, state: State, own: State) -> np.ndarray:
-        """Copy contacts back, none of which has formed or broken; returns their columns."""
-        _copy(CONTACT_COLUMNS, own.contacts, slice(int(own.count[CONTACTS])), state.contacts, self.columns)
-        return self.columns
+    def _copies_of(self, state: State, own: State) -> Copies:
+        """What copies the grains and contacts to the part, and back."""
+        groups = state.grains.arrays, state.contacts, state.bodies, own.grains.arrays, own.contacts, own.bodies
+        arrays = [array for group in groups for array in (group[0], group[-1])]
+        of = self.index, self.columns
+        if self._copies is None or not (all(map(is_, of, self._copies.of)) and are_those(arrays, self._copies.arrays)):
+            here, contacts = np.arange(len(self.index)), np.arange(len(self.columns))
+            known, taken, given = self._pairs.get(len(here), ((), None, None))
+            if not are_those(arrays, known):
+                known, (taken, given) = references(arrays), map(np.array, self._array_pairs(state, own))
+                self._pairs[len(here)] = known, taken, given
+            number = np.zeros(len(state.grains), np.int64)
+            number[self.index] = here
+            there, of_contacts = np.array([self.index, here]), np.array([self.columns, contacts])
+            give = ColumnCopies(given, there[::-1].copy(), of_contacts[::-1].copy(), self.index)
+            self._copies = Copies(known, of, ColumnCopies(taken, there, of_contacts, number), give)
+        return self._copies
 
-    def _changed_contacts(self, state: State, own: State) -> np.ndarray:
-        """Copy contacts back behind those of all other grains; returns their columns."""
-        used = int(own.count[CONTACTS])
+    def _array_pairs(self, state: State, own: State) -> tuple[list[list[int]], list[list[int]]]:
+        """Pairs of arrays that are copied to the part, and back."""
+
+        def pairs(one: State, other: State, grains: Sequence[str]) -> list[list[int]]:
+            names = contact_columns(state)
+            found = [
+                *array_pairs(one.grains.arrays, other.grains.arrays, grains),
+                *array_pairs(one.contacts, other.contacts, names, INDICES),
+            ]
+            of_bodies = BODY_COLUMNS if self.has_bodies else ()
+            return [*found, *array_pairs(one.bodies, other.bodies, of_bodies, INDICES)]
+
+        return pairs(state, own, GrainArrays._fields), pairs(own, state, MOVING)
+
+    def _make_room(self, state: State, table: Table, used: int) -> np.ndarray:
+        """Move the contacts of all other grains to the first columns; returns `used` columns behind them."""
         kept = np.setdiff1d(np.arange(state.count[CONTACTS]), self.columns)
         first, end = len(kept), len(kept) + used
         if state.contacts.pair.shape[1] < end:
             state.grow("contacts", end)
-        contacts, pairs = state.contacts, self.index[own.contacts.pair[:, :used]]
-        for name in ("pair", *CONTACT_COLUMNS, "constants"):
-            array = getattr(contacts, name)
-            if not array.shape[-1]:
-                continue
-            if name == "constants" and state.uniform_contacts:
-                array[...] = own.contacts.constants
-                continue
-            array[..., :first] = array[..., kept]
-            array[..., first:end] = pairs if name == "pair" else getattr(own.contacts, name)[..., :used]
+        if first > 0 and kept[-1] >= first:
+            if not are_those([state.contacts.pair], self._moved[0]):
+                pairs = array_pairs(state.contacts, state.contacts, contact_columns(state))
+                self._moved = references([state.contacts.pair]), np.array([*pairs])
+            columns = np.array([kept, np.arange(first)])
+            copy_columns.run(table, ColumnCopies(self._moved[1], columns, columns, kept))
         state.count[CONTACTS] = end
         state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
-        resort_contacts_by_grain(state.grains.arrays, contacts, state.count)
         return np.arange(first, end)
 
-    def _count(self, state: State, own: State) -> None:
-        """Add what the part has counted and lost to the numbers of all grains."""
-        for number in EVENTS:
-            state.count[number] += own.count[number]
-        state.count[CONTACT_STEPS] = own.count[CONTACT_STEPS]
-        state.count[self.steps_are] += own.count[STEPS]
-        state.lost += own.lost
-        state.clock[SETTLED] = own.clock[SETTLED]
-        state.clock[SOME_AWAKE] += own.clock[SOME_AWAKE]
-        state.clock[GRAINS_AWAKE] += own.clock[GRAINS_AWAKE] * len(self.index) / len(state.grains)
-        state.clock[CORRECTED] += own.clock[CORRECTED]
-        state.clock[LARGEST_LOAD] = max(state.clock[LARGEST_LOAD], own.clock[LARGEST_LOAD])
-        state.take_extremes(own)
+
+def references(arrays: Sequence[np.ndarray]) -> tuple[weakref.ref[np.ndarray], ...]:
+    """Weak references: the memory of a state that is no longer used is free."""
+    return tuple(map(weakref.ref, arrays))
 
 
-def _copy(names: Sequence[str], source: Any, taken: Any, target: Any, given: Any) -> None:
-    """Copy columns of the arrays with these names that are not empty, to columns of a target."""
-    for name in names:
-        if getattr(target, name).shape[-1]:
-            getattr(target, name)[..., given] = getattr(source, name)[..., taken]
+def are_those(arrays: Sequence[np.ndarray], known: Sequence[weakref.ref[np.ndarray]]) -> bool:
+    """Whether references are to these arrays."""
+    return len(known) == len(arrays) and all(each() is array for each, array in zip(known, arrays, strict=True))
+
+
+def contact_columns(state: State) -> tuple[str, ...]:
+    """Arrays of contacts that are copied."""
+    return CONTACT_COLUMNS if state.uniform_contacts else (*CONTACT_COLUMNS, "constants")

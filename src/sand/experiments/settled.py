@@ -204,13 +204,15 @@ def _energy_along(grains: Any, pairs: np.ndarray) -> np.ndarray:
 
 
 def strength_of(simulation: Simulation, pairs: np.ndarray) -> Strength:
-    """`Strength` of each contact, (C,) each."""
+    """`Strength` of each contact, (C,) each; 0 where grains have no contact model."""
     grains = simulation.grains
-    model = next(force for force in simulation.forces if isinstance(force, Contact))
+    model = next((force for force in simulation.forces if isinstance(force, Contact)), None)
+    if model is None:
+        return Strength(*np.zeros((len(Strength._fields), len(pairs))))
     kinds, radii, material = grains.materials, np.asarray(grains.radius).tolist(), np.asarray(grains.material).tolist()
-    between = [[model.pairing(a, b) for b in kinds] for a in kinds]
-    of = [
-        contact_strength(model.contact_law, between[material[i]][material[j]], radii[i], radii[j])
-        for i, j in pairs.tolist()
-    ]
-    return Strength(*np.array(of).T)
+    kinds_of = [(material[i], material[j], radii[i], radii[j]) for i, j in pairs.tolist()]
+    found = {
+        (a, b, *sizes): contact_strength(model.contact_law, model.pairing(kinds[a], kinds[b]), *sizes)
+        for a, b, *sizes in dict.fromkeys(kinds_of)
+    }
+    return Strength(*np.array([found[one] for one in kinds_of]).T)

@@ -51,8 +51,8 @@ TABLE_EVERY, TABLE_COST = 30.0, 0.02
 """Shortest wall time [s] between two tables of an unfinished sweep, and the largest part of the time that they take."""
 MOST_LOSSES = 3
 """Times that the process of a run may die before the run counts as failed."""
-SET_UP, MOST_SET_UP = 8, 64
-"""Runs that are set up before the first one is computed: at least, and at most."""
+SET_UP, MOST_SET_UP, SET_UP_SECONDS = 8, 64, 20.0
+"""Runs that are set up before the first one is computed: at least, and at most; fewer after this wall time [s]."""
 ROW_BYTES = 12e3
 """Disk space of a run of which only the row is kept [bytes]."""
 NOTES = 5
@@ -200,7 +200,10 @@ class SweepJob(Job):
         errors, found, self._is_set_up = ErrorCollector(), list[Expected](), True
         with warnings.catch_warnings(record=True) as noted:
             warnings.simplefilter("always")
+            latest = time.monotonic() + SET_UP_SECONDS
             for row in self._sample(left):
+                if found and time.monotonic() > latest:
+                    break
                 place = f"{self.path}: {_named(row)}"
                 try:
                     found.append(self.kind(changed_content(self.content, row.values), place).expected(row.seed))
@@ -405,14 +408,14 @@ class _Table:
         """Write the table of all runs that have ended: those of the design in its order, then earlier ones."""
         began = time.monotonic()
         place, known = self._place, self.known
-        keys = dict.fromkeys(key for cells in known.values() for key in cells["keys"])
+        keys = [*self.job.keys, *sorted({key for cells in known.values() for key in cells["keys"]} - {*self.job.keys})]
         order = sorted(known, key=lambda name: (place.get(name, len(place)), str(known[name]["values"]), name))
         rows = []
         for name in order:
             cells = dict(known[name])
             values = cells.pop("values")
             del cells["keys"]
-            rows.append({key: values.get(key) for key in [*self.job.keys, *keys]} | cells)
+            rows.append({key: values.get(key) for key in keys} | cells)
         write_sweep(self.job.folder, rows, self.job.parquet)
         self._written = time.monotonic()
         self._took = self._written - began

@@ -4,7 +4,7 @@ One step:  choose dt → kick dt/2, drift, rotate dt → check the pair lists �
 (contacts, long-range, external) → kick dt/2.  Long-range forces are summed once per cycle of one or more steps; a
 contact that forms or breaks ends the cycle.  The driver returns between two cycles: at the requested end, because no
 step is possible, or after a contact formed or broke, if a cut-off follows the clusters.  It returns in the middle of a
-step (STAGE = 1) if an array is too small; the call after it resumes there, so enlarging arrays does not change the
+step (PHASE = 1) if an array is too small; the call after it resumes there, so enlarging arrays does not change the
 result.
 
 The driver is compiled once, for all forces and contact laws: it calls their stages by address (`stages`,
@@ -29,11 +29,11 @@ from ..basics.state import (
     MADE,
     OUTSIDE,
     PAIR_LIST_SKIN,
+    PHASE,
     SLID,
     SLIPPED,
     SQUARED_SPEED,
     SQUARED_SPIN,
-    STAGE,
     STEP,
     STEPS,
     TIME,
@@ -66,7 +66,7 @@ from .respa import (
     update_constant_loads,
 )
 from .stages import StageNumber
-from .step_control import cycle_steps, hold_step, is_close, is_past
+from .step_control import cycle_steps, has_arrived, hold_step, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 from .taylor import sum_rates
@@ -239,7 +239,7 @@ def first_half(s):
     consume_skins(s.pair_list, displacement)
     s.clock[LEFT] = s.clock[LEFT] - dt if s.clock[LEFT] > 1.5 * dt else 0.0
     s.clock[STEP] = dt
-    s.count[STAGE] = 1
+    s.count[PHASE] = 1
     return Stop.NONE.value
 
 
@@ -302,7 +302,7 @@ def second_half(s):
     if stop != Stop.NONE.value:
         return stop
     if formed > 0 or list_rebuilt:
-        call_stage(s, StageNumber.CONTACT_STEP)
+        call_stage(s, StageNumber.CONTACT_LIMIT)
     dt, elapsed = s.clock[STEP], s.clock[CYCLE] - s.clock[LEFT]
     due = s.clock[LEFT] == 0.0 or broken or formed > 0
     if s.respa.impulse and s.count[CONTACTS] > 0:
@@ -318,14 +318,14 @@ def second_half(s):
     if broken:
         call_stage(s, StageNumber.REMOVE_BROKEN)
         call_stage(s, StageNumber.SORT)
-        call_stage(s, StageNumber.CONTACT_STEP)
+        call_stage(s, StageNumber.CONTACT_LIMIT)
     s.clock[TIME] += dt
     if broken or formed > 0:
         s.clock[CHANGED] = s.clock[TIME]
     if s.count[SLIPPED] != slipped:
         s.clock[SLID] = s.clock[TIME]
     s.count[STEPS] += 1
-    s.count[STAGE] = 0
+    s.count[PHASE] = 0
     call_hook(s, Hook.END_STEP)
     if due:
         call_hook(s, Hook.BETWEEN_CYCLES)
@@ -344,12 +344,12 @@ def steps_until(s):
     reset_skins(s.pair_list, s.count)
     while True:
         stop = Stop.NONE.value
-        if s.count[STAGE] == 0:
+        if s.count[PHASE] == 0:
             if s.clock[LEFT] == 0.0:
                 # before all other returns, so that no output lies between the step and the new cut-off
                 if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                     return Stop.CLUSTERS_CHANGED.value
-                if s.clock[TIME] >= s.until or (s.shorten and is_close(s.clock[TIME], s.until)):
+                if has_arrived(s.clock[TIME], s.until, s.shorten):
                     return Stop.TIME_REACHED.value
                 if s.count[STEPS] >= s.last:
                     return Stop.NONE.value
@@ -359,7 +359,7 @@ def steps_until(s):
                     call_stage(s, StageNumber.EXPLAIN, stop)
             else:
                 stop = first_half(s)
-        if stop == Stop.NONE.value and s.count[STAGE] == 1:
+        if stop == Stop.NONE.value and s.count[PHASE] == 1:
             stop = second_half(s)
         if stop != Stop.NONE.value:
             return stop
@@ -373,7 +373,7 @@ def steps_until(s):
 def advance(s):
     """Take steps, then end the work of the other threads; returns the value of a `Stop`.
 
-    A run starts in the middle of a step of length 0 (STAGE 1): its second half builds the lists, finds grains that
+    A run starts in the middle of a step of length 0 (PHASE 1): its second half builds the lists, finds grains that
     overlap already and sums the loads; its counters and energies are discarded.
     """
     stop = steps_until(s)

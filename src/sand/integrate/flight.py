@@ -5,7 +5,7 @@
 
 import math
 
-from ..basics.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, STAGE, STEP, STEP_INCREASES, STEPS, TIME
+from ..basics.state import CHECKED, CYCLE, FLIGHT, LEFT, OUTSIDE, PHASE, STEP, STEP_INCREASES, STEPS, TIME
 from ..compiler.jit import caller, rare
 from ..compiler.program import call_stage
 from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement
@@ -67,7 +67,7 @@ def finish_flight_step(s, dt, in_contact, before, work):
         s.pair_list.anchor[0, 0] = math.inf
         s.clock[FLIGHT] = 0.0
         s.count[CHECKED] = s.count[STEP_INCREASES] = s.count[STEPS] - INCREASE_INTERVAL
-        s.count[STAGE] = 1
+        s.count[PHASE] = 1
     else:
         s.clock[STEP] = dt
         s.count[STEPS] += 1

@@ -114,7 +114,7 @@ def _contact_stages(given: ProgramContent, parameters: StepParameters) -> dict[i
         StageNumber.INNER_LIST: stages.inner_list,
         StageNumber.CONTACT_PASS: stages.contact_pass_stage(given.law, variant, given.wide),
         StageNumber.SORT: resort_contacts_by_grain,
-        StageNumber.CONTACT_STEP: stages.set_contact_step,
+        StageNumber.CONTACT_LIMIT: stages.set_contact_limit,
         StageNumber.REMOVE_BROKEN: stages.remove_broken,
     }
     if not settings.follow:

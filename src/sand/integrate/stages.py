@@ -16,7 +16,7 @@ from ..contact.events import compact_contacts, forming_loops, slip_and_break_loo
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
 from ..contact.stiffness_work import stiffness_work_loop
-from ..contact.update import ContactStep, PassVariant, contact_pass_loop, contact_step, store_contact_sums
+from ..contact.update import PassVariant, PresentStep, contact_limit, contact_pass_loop, store_contact_sums
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
@@ -41,7 +41,7 @@ class StageNumber(IntEnum):
     SLIP_AND_BREAK = auto()  # contact.events: contacts beyond a limit
     FORM = auto()  # contact.events: new contacts
     SORT = auto()  # contact.gather: contacts of each grain
-    CONTACT_STEP = auto()  # the step that contacts allow
+    CONTACT_LIMIT = auto()  # the step that contacts allow
     REMOVE_BROKEN = auto()  # contact.events
     GATHER = auto()  # contact.gather: loads of contacts on grains, if there are other loads
     GATHER_AND_KICK = auto()  # motion.gather_and_kick: the same, and the kick, with loads of contacts alone
@@ -123,7 +123,7 @@ def contact_pass_stage(law: ContactLaw, variant: PassVariant, long_vectors: bool
     def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):
         first = block * CONTACTS_PER_BLOCK
         last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
-        step = ContactStep(span, settings, count[STEPS], clock[STEP])
+        step = PresentStep(span, settings, count[STEPS], clock[STEP])
         found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), step)
         store_contact_sums(queue.passed, block, found)
         return 0
@@ -145,12 +145,12 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     @stage("the slip and breaking of contacts", seconds=2.0)
     def slip_and_break_contacts(grains, contacts, pair_list, clock, count, lost, span, settings):
         """Slip or break flagged contacts; returns 1 if any contact broke."""
-        step = ContactStep(span, settings, count[STEPS], clock[STEP])
+        step = PresentStep(span, settings, count[STEPS], clock[STEP])
         return 1 if slip_and_break(grains, contacts, pair_list, count, lost, step) else 0
 
     @stage("the forming of contacts", seconds=1.5)
     def form(grains, contacts, pair_list, clock, count, lost, span, settings):
-        step = ContactStep(span, settings, count[STEPS], clock[STEP])
+        step = PresentStep(span, settings, count[STEPS], clock[STEP])
         form_contacts(grains, contacts, pair_list, count, lost, clock, step)
         return 0
 
@@ -170,9 +170,9 @@ def bath_work(grains, contacts, clock, count, lost, scratch, span, block):
 
 
 @stage("the time step of contacts")
-def set_contact_step(grains, contacts, pair_list, clock, count, settings):
+def set_contact_limit(grains, contacts, pair_list, clock, count, settings):
     """Set the longest step that contacts allow."""
-    contact_step(contacts, pair_list, count, grains.mass.size, clock, settings.per_period)
+    contact_limit(contacts, pair_list, count, grains.mass.size, clock, settings.per_period)
     return 0
 
 

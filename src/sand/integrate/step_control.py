@@ -7,7 +7,7 @@ from ..basics.state import (
     CALM,
     CHECKED,
     COMPONENT_STEP,
-    CONTACT_STEP,
+    CONTACT_LIMIT,
     CONTACTS,
     CYCLE,
     GRAIN1,
@@ -40,7 +40,7 @@ A step that follows the phase of contact oscillations heats them: Verlet conserv
 change of dt changes the energy by up to one per cent, with a sign that depends on the phase.
 """
 EQUAL_STEPS = 1.0 - 1e-6
-"""The contact step is rounded to single precision (`contact_step`): steps equal to within this factor are the same."""
+"""The limit of contacts has single precision (`contact_limit`): steps equal to within this factor are the same."""
 MAX_SPIN_ANGLE = 0.05
 """Largest rotation of a grain in one step [rad]."""
 MAX_FIELD_PHASE = 0.03
@@ -86,9 +86,9 @@ def load_step(force, torque, mass, inertia, criteria):
 def grain_step(grains, long_range, start, criteria, i):
     """Largest step [s] allowed by the motion of grain i, and largest cycle of the long-range loads.
 
-    Grains in contact oscillate at contact frequencies, which the contact step resolves: only their flight, spin and
-    moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The
-    load criterion uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no
+    Grains in contact oscillate at contact frequencies, which the limit of contacts resolves: only their flight, spin
+    and moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.
+    The load criterion uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no
     energy error.
     """
     v, w = load(grains.velocity, i), load(grains.spin, i)
@@ -151,7 +151,7 @@ def pair_step(grains, pair_list, span, criteria, p):
     required = criteria.impact * overlap / speed if fast else required
     gap = distance - grains.radius[i] - grains.radius[j]
     free = max(required, CLOSING_FRACTION * gap / closing) if closing > 0.0 else math.inf
-    # slow pairs in contact are resolved by the contact step
+    # slow pairs in contact are resolved by the limit of contacts
     bound = required if fast else math.inf
     return bound if touching else free
 
@@ -201,10 +201,10 @@ def quantise_step(level, wanted, may_grow):
 
 @loop
 def choose_step(grains, long_range, start, pair_list, clock, count, span, criteria):
-    """The next step [s]: the contact step, or less if another criterion requires it; 0 if the state is not finite.
+    """The next step [s]: the limit of contacts, or less if another criterion requires it; 0 if the state is not finite.
 
-    Steps below the contact step are powers of two of a second and change seldom, because each change costs velocity
-    Verlet a little energy.  Within a cycle the long-range loads are not available, and only pairs are checked.
+    Steps below the limit of contacts are powers of two of a second and change seldom, because each change costs
+    velocity Verlet a little energy.  Within a cycle the long-range loads are not available, and only pairs are checked.
     """
     between_cycles = clock[LEFT] == 0.0
     no_contacts = count[CONTACTS] == 0
@@ -226,15 +226,15 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
         if may_grow:
             count[STEP_INCREASES] = count[STEPS]
         if not no_contacts:
-            if wanted >= EQUAL_STEPS * clock[CONTACT_STEP]:  # the contact step itself, not the power of two below it
-                wanted = max(wanted, 2.0 * clock[CONTACT_STEP])
+            if wanted >= EQUAL_STEPS * clock[CONTACT_LIMIT]:  # that limit itself, not the power of two below it
+                wanted = max(wanted, 2.0 * clock[CONTACT_LIMIT])
             elif wanted < 2.0 * clock[LEVEL]:
                 count[NEEDED] = count[STEPS]
             may_grow = count[STEPS] - count[NEEDED] >= HOLD_STEPS
         clock[LEVEL] = quantise_step(clock[LEVEL], wanted, may_grow)
     if criteria.fixed > 0.0:
         return criteria.fixed
-    chosen_step = min(clock[LEVEL], clock[CONTACT_STEP])
+    chosen_step = min(clock[LEVEL], clock[CONTACT_LIMIT])
     return min(chosen_step, clock[COMPONENT_STEP]) if clock[COMPONENT_STEP] > 0.0 else chosen_step
 
 
@@ -261,12 +261,18 @@ def is_close(time, until):
 
 
 @loop
+def has_arrived(time, until, shorten):
+    """Whether steps have arrived at `until` [s], to rounding if the last step is shortened to end there."""
+    return time >= until or (shorten and is_close(time, until))
+
+
+@loop
 def cycle_steps(clock, count, respa, dt):
     """Number of steps of dt [s] in the next cycle of the long-range loads; 1 without contacts.
 
-    Impulses must be more frequent than contact oscillations for any dt, so k_max counts steps of the contact step.
+    Impulses must be more frequent than contact oscillations for any dt: k_max counts steps as long as contacts allow.
     """
-    if count[CONTACTS] == 0:
+    if count[CONTACTS] == 0 or respa.max_steps == 1:
         return 1
-    longest = min(clock[LONG_RANGE_LEVEL], respa.max_steps * clock[CONTACT_STEP])
+    longest = min(clock[LONG_RANGE_LEVEL], respa.max_steps * clock[CONTACT_LIMIT])
     return max(1, min(respa.max_steps, int(longest / dt + 1e-6)))

@@ -43,7 +43,8 @@ class Verlet(IntegratorSettings):
         the instantaneous velocity and spin of all grains, contact oscillations included. "every step": summed in
         every step.
     far_steps : int or str, optional
-        Largest number of steps in a cycle, k_max ≥ 1, counted in contact steps if a fixed `step` is longer; or
+        Largest number of steps in a cycle, k_max ≥ 1, counted in the steps that contacts allow if a fixed `step` is
+        longer; or
         "auto": for "impulse" the largest cycle below half the fastest contact period, 12 steps of 25; for Taylor
         series 70, as in the paper. Impulses of longer cycles are resonant with contact oscillations and slowly heat
         them. Cycles are shorter where the long-range loads, spins or moments of free grains require it, and have one

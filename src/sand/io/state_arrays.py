@@ -15,7 +15,7 @@ from ..basics.array_groups import GRAINS, SIDES, USED, Array, saved_in
 from ..basics.arrays import BodyArrays, ContactArrays, LongRangeArrays, PairList
 from ..basics.errors import BadInput
 from ..basics.grains import GrainArrays
-from ..basics.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LEAST_CLOCK, LOST, PAIRS, STAGE, STEPS, TIME
+from ..basics.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LEAST_CLOCK, LOST, PAIRS, PHASE, STEPS, TIME
 
 Groups = Mapping[str, type]
 """Groups of arrays by name; if a file has an array of one of them, it has those of all."""
@@ -208,7 +208,7 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
     n = arrays["grains/radius"].size
     wanted = {
         STEPS: meta["steps"],
-        STAGE: 0,
+        PHASE: 0,
         CONTACTS: arrays["contacts/pair"].shape[1],
         PAIRS: arrays["pair_list/pair"].shape[1],
     }

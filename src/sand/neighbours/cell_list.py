@@ -19,6 +19,7 @@ from ..basics.arrays import CELLS_PER_GRAIN
 from ..basics.state import LISTED
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
+from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import dot, load, nearest_image, put, sub
 
 FULL = -1
@@ -51,6 +52,9 @@ class Grid(NamedTuple):
     subdivision: Any  # this many cells along x together are at least as wide as the reach
     width_y: Any  # cell widths [m]
     width_z: Any
+    periods: Any  # box lengths [m] as multiples of the spacings, 0 on open axes
+    spacings: Any  # coordinates on periodic axes are rounded to multiples of these [m]; 0 on open axes
+    folded: Any  # whether a periodic axis is not divided, so that images have to be found pair by pair
 
 
 @loop
@@ -63,6 +67,22 @@ def cells_on_axis(low, high, length, reach):
     number = max(1, min(int(extent / reach), 1 << 20)) if extent > 0.0 else 1
     number = 1 if length > 0.0 and number < MIN_PERIODIC_CELLS else number
     return number, start, number / extent if extent > 0.0 else 0.0
+
+
+@loop
+def spacing_on_axis(length):
+    """Spacing [m], 2⁻⁵¹ of the power of two above a box length, so that coordinates, L and their sums are exact."""
+    return math.ldexp(1.0, math.frexp(length)[1] - 51) if length > 0.0 else 0.0
+
+
+@loop
+def on_spacings(x, spacings):
+    """Position [m] with its coordinates rounded to multiples of the spacings; those without one are unchanged."""
+    return (
+        np.rint(x[0] / spacings[0]) * spacings[0] if spacings[0] > 0.0 else x[0],
+        np.rint(x[1] / spacings[1]) * spacings[1] if spacings[1] > 0.0 else x[1],
+        np.rint(x[2] / spacings[2]) * spacings[2] if spacings[2] > 0.0 else x[2],
+    )
 
 
 @loop
@@ -85,9 +105,12 @@ def choose_grid(anchor, span, reach):
         if nx * ny * nz <= CELLS_PER_GRAIN * anchor.shape[1] + 27 or max(nx, ny, nz) <= 3:
             subdivision = max(1, min(anchor.shape[1] // (nx * ny * nz), MAX_SUBDIVISION))
             width_y, width_z = 1.0 / py if py > 0.0 else 0.0, 1.0 / pz if pz > 0.0 else 0.0
+            spacings = spacing_on_axis(span.x), spacing_on_axis(span.y), spacing_on_axis(span.z)
+            folded = (span.x > 0.0) & (nx == 1) | (span.y > 0.0) & (ny == 1) | (span.z > 0.0) & (nz == 1)
             return Grid(
-                (nx * subdivision, ny, nz), (lx, ly, lz), (px * subdivision, py, pz), subdivision, width_y, width_z
-            )
+                (nx * subdivision, ny, nz), (lx, ly, lz), (px * subdivision, py, pz), subdivision, width_y, width_z,
+                on_spacings((span.x, span.y, span.z), spacings), spacings, folded,
+            )  # fmt: skip
         # enlarge the cells on the axis with the most cells
         if nx >= ny and nx >= nz:
             x *= 1.25
@@ -136,7 +159,7 @@ def sort_into_cells(long_range, sorted_position, anchor, span, grid):
         cell = long_range.cell_of[i]
         s = long_range.cell_start[cell]
         long_range.order[s] = i
-        put(sorted_position, s, nearest_image(load(anchor, i), span))
+        put(sorted_position, s, on_spacings(nearest_image(load(anchor, i), span), grid.spacings))
         long_range.cell_start[cell] += 1
     for k in range(total):
         c = total - k
@@ -145,14 +168,17 @@ def sort_into_cells(long_range, sorted_position, anchor, span, grid):
 
 
 @loop
-def neighbour_on_axis(c, step, number, periodic):
-    """Index of the cell at distance `step`, or −1 beyond the end of an open axis and on an undivided axis."""
+def neighbour_on_axis(c, step, number, period):
+    """Index of the cell at distance `step` and its shift [m], 0 or ±`period`; −1 where no cell is at that distance.
+
+    There is none beyond the end of an open axis, whose period is 0, nor on an undivided one.
+    """
     other = c + step
     if 0 <= other < number:
-        return other
-    if not periodic or number == 1:
-        return -1
-    return other - number if other >= number else other + number
+        return other, 0.0
+    if period == 0.0 or number == 1:
+        return -1, 0.0
+    return (other - number, period) if other >= number else (other + number, -period)
 
 
 @loop
@@ -162,26 +188,42 @@ def gap_on_axis(x, c, step, width):
     return max(0.0, gap - CELL_TOLERANCE) * width if step != 0 else 0.0
 
 
-@loop
-def append_range(long_range, sorted_position, span, limit, s, first, last, used):
-    """Append the sorted indices first … last − 1 closer than √limit to grain s; returns the new length, or FULL.
+class Centre(NamedTuple):
+    """A grain whose neighbours are sought."""
 
-    Squared distances are computed first, in a loop that vectorises.  Then each index is written, and the length is
-    increased if the pair is close enough: without branches.  Separations of i and j have equal magnitudes to the last
-    bit, so that both rows contain the pair or neither.
+    s: Any  # its sorted index, uint64
+    position: Any  # [m], shifted by whole box lengths to where its neighbours are
+    limit: Any  # squared reach [m²]
+
+
+@loop
+def append_range(long_range, sorted_position, span, folded, centre, cells, used):
+    """Append the sorted indices of the neighbours of a `Centre` in a range of cells; returns the new length, or FULL.
+
+    Whether pairs are close is computed first, as integers, in a loop that vectorises.  Then each index is written, and
+    the length is increased by that integer: without branches.  Separations of i and j have equal magnitudes to the last
+    bit, because sums of coordinates and box lengths are exact: both rows contain the pair, or neither.
     """
-    own_position, length = load(sorted_position, s), last - first
-    if used + np.int64(length) + SIMD_WIDTH > long_range.neighbour.size:  # whole SIMD vectors are read
+    s, own_position, limit = centre
+    first, last = np.uint64(long_range.cell_start[cells[0]]), np.uint64(long_range.cell_start[cells[1]])
+    length = last - first
+    if used + np.int64(length) + SIMD_WIDTH > long_range.neighbour.size:  # one entry more than neighbours is written
         return FULL
-    for k in range(length):
-        separation = nearest_image(sub(own_position, load(sorted_position, first + k)), span)
-        long_range.squared_distance[k] = dot(separation, separation)
+    padded = min(round_up_to_simd_width(length, np.uint64(1)), np.uint64(long_range.order.size) - first)
+    if folded:
+        for k in range(padded):
+            separation = nearest_image(sub(own_position, load(sorted_position, first + k)), span)
+            long_range.near[k] = np.int64(dot(separation, separation) < limit)
+    else:
+        for k in range(padded):
+            separation = sub(own_position, load(sorted_position, first + k))
+            long_range.near[k] = np.int64(dot(separation, separation) < limit)
     if first <= s < last:
-        long_range.squared_distance[s - first] = math.inf
+        long_range.near[s - first] = 0
     next_entry = np.uint64(used)
     for k in range(length):
         long_range.neighbour[next_entry] = first + k
-        next_entry += np.uint64(long_range.squared_distance[k] < limit)
+        next_entry += np.uint64(long_range.near[k])
     return np.int64(next_entry)
 
 
@@ -194,28 +236,29 @@ class CellRow(NamedTuple):
 
 
 @loop
-def append_cell_row(long_range, sorted_position, grid, span, limit, s, cells, used):
-    """Append the neighbours of s in a row of cells (`CellRow`); returns the new length, or FULL.
+def append_cell_row(long_range, sorted_position, span, grid, centre, row, used):
+    """Append the neighbours of a `Centre` in a row of cells (`CellRow`); returns the new length, or FULL.
 
     Candidates lie within ±√squared_half_width [m] along x; across a periodic boundary they form a second range.  On a
     periodic axis shorter than three times the reach all grains are candidates.
     """
-    (x, row, squared_half_width), nx = cells, grid.counts[0]
-    if span.x > 0.0 and nx == grid.subdivision:
-        begin, stop = np.uint64(long_range.cell_start[row]), np.uint64(long_range.cell_start[row + nx])
-        return append_range(long_range, sorted_position, span, limit, np.uint64(s), begin, stop, used)
-    half_width, cell = math.sqrt(squared_half_width) * grid.per_length[0] + CELL_TOLERANCE, cell_index(x, nx)
+    nx, period = grid.counts[0], grid.periods[0]
+    if period > 0.0 and nx == grid.subdivision:
+        return append_range(long_range, sorted_position, span, grid.folded, centre, (row.first, row.first + nx), used)
+    half_width, cell = math.sqrt(row.squared_half_width) * grid.per_length[0] + CELL_TOLERANCE, cell_index(row.x, nx)
     # at most the cells within the reach: in a box of three, one more would be visited from both sides;
     # at least one cell, even if a coordinate is NaN
-    low = min(max(math.floor(x - half_width), cell - grid.subdivision), cell)
-    high = max(min(math.floor(x + half_width), cell + grid.subdivision), cell)
+    low = min(max(math.floor(row.x - half_width), cell - grid.subdivision), cell)
+    high = max(min(math.floor(row.x + half_width), cell + grid.subdivision), cell)
     first, last = max(low, 0), min(high, nx - 1) + 1
     for _ in range(2):
-        begin, stop = np.uint64(long_range.cell_start[row + first]), np.uint64(long_range.cell_start[row + last])
-        used = append_range(long_range, sorted_position, span, limit, np.uint64(s), begin, stop, used)
-        if used == FULL or not (span.x > 0.0 and (low < 0 or high >= nx)):
+        cells = row.first + first, row.first + last
+        used = append_range(long_range, sorted_position, span, grid.folded, centre, cells, used)
+        if used == FULL or not (period > 0.0 and (low < 0 or high >= nx)):
             break
         first, last = (low + nx, nx) if low < 0 else (0, high - nx + 1)
+        x, y, z = centre.position
+        centre = Centre(centre.s, (x + period if low < 0 else x - period, y, z), centre.limit)
     return used
 
 
@@ -257,19 +300,23 @@ def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
     """
     nx, ny, nz = grid.counts
     squared_reach = (1.0 + REACH_TOLERANCE) * reach * reach
-    x = cell_coordinates(grid, load(sorted_position, s))
+    position = load(sorted_position, s)
+    x = cell_coordinates(grid, position)
     cy, cz = cell_index(x[1], ny), cell_index(x[2], nz)
-    for step in range(9):
-        dy, dz = step % 3 - 1, step // 3 - 1
-        ty = neighbour_on_axis(cy, dy, ny, span.y > 0.0)
-        tz = neighbour_on_axis(cz, dz, nz, span.z > 0.0)
-        gap_y, gap_z = gap_on_axis(x[1], cy, dy, grid.width_y), gap_on_axis(x[2], cz, dz, grid.width_z)
-        squared_half_width = squared_reach - gap_y * gap_y - gap_z * gap_z
-        if ty >= 0 and tz >= 0 and squared_half_width > 0.0:
-            cells = CellRow(x[0], (tz * ny + ty) * nx, squared_half_width)
-            used = append_cell_row(long_range, sorted_position, grid, span, reach * reach, s, cells, used)
-            if used == FULL:
-                return FULL
+    for dz in range(-1, 2):
+        tz, shift_z = neighbour_on_axis(cz, dz, nz, grid.periods[2])
+        gap_z = gap_on_axis(x[2], cz, dz, grid.width_z)
+        for dy in range(-1, 2):
+            ty, shift_y = neighbour_on_axis(cy, dy, ny, grid.periods[1])
+            gap_y = gap_on_axis(x[1], cy, dy, grid.width_y)
+            squared_half_width = squared_reach - gap_y * gap_y - gap_z * gap_z
+            if ty >= 0 and tz >= 0 and squared_half_width > 0.0:
+                row = CellRow(x[0], (tz * ny + ty) * nx, squared_half_width)
+                shifted = position[0], position[1] - shift_y, position[2] - shift_z
+                centre = Centre(np.uint64(s), shifted, reach * reach)
+                used = append_cell_row(long_range, sorted_position, span, grid, centre, row, used)
+                if used == FULL:
+                    return FULL
     return used
 
 

@@ -38,7 +38,7 @@ def invalidate_skins(pair_list):
 
 @loop
 def update_safe_speed(pair_list, count):
-    """Set the smallest speed [m/s], over all candidate pairs, that moves a pair by δ_c in one contact step."""
+    """Set the smallest speed [m/s] of all candidate pairs that moves a pair by δ_c in a step that contacts allow."""
     safe_speed = math.inf
     for k in range(pair_type_count(pair_list, count)):
         safe_speed = min(

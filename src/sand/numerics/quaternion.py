@@ -16,7 +16,7 @@ from .vec import add, axpy, cross, scale
 def turned(q, v):
     """R(ϱ) v: body vector rotated into the laboratory frame (Eq. 30, |ϱ| = 1)."""
     u = (q[0], q[1], q[2])
-    t = scale(2.0, cross(u, v))
+    t = cross(scale(2.0, u), v)
     return add(axpy(q[3], t, v), cross(u, t))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.body_motion import temperatures_of
 from ..analysis.clusters import mean_size
-from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns, dissipated_in
+from ..analysis.ledger_columns import AWAKE, LOSSES, LedgerColumns
 from ..basics.clusters import labels_of
 from ..basics.constants import BOLTZMANN
 from ..basics.errors import BadInput
@@ -28,7 +28,8 @@ KINETIC = "translation", "rotation"
 MAGNETIC = "magnetic"
 """A column that every ledger has, with or without dipoles."""
 RUNAWAY = 0.5
-"""Change of the total energy, relative to all present energies and all dissipation, at which a run is stopped."""
+"""Change of the total energy, relative to all energies at the start and now and all that was put in, at which a run is
+stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 INTERNAL = "internal"
 """Column of the kinetic energy of clusters beyond their rigid motion; a part of the kinetic energies."""
@@ -177,17 +178,19 @@ class Ledger(LedgerColumns):
         self.frame_times = [row["time"] for row in self.rows] if frame_times is None else frame_times.tolist()
 
     def runs_away(self, row: dict[str, float]) -> bool:
-        """Whether the energy error exceeds half of all energies in this row plus all dissipation.
+        """Whether the energy error exceeds half of all energies in this row and the first one, and of what was put in.
 
-        Only this row and the first one count, so that the result does not depend on how often rows are written.
+        Dissipation has no share in this scale: what is dissipated was one of these before, unless it is an error.  Only
+        this row and the first one count, so that the result does not depend on how often rows are written.
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, *self._further, *OF_MOTION, *NUMBERS, AWAKE, *self._more}
-        energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
+        lost = *LOSSES, *self._further
+        others = {"total", "step", "time", *lost, *OF_MOTION, *NUMBERS, AWAKE, *self._more}
+        energies = [abs(each[name]) for each in (row, self.rows[0]) for name in self.columns if name not in others]
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN
-        return not change <= RUNAWAY * (energies + dissipated_in(row))
+        return not change <= RUNAWAY * math.fsum([*energies, *(max(-row[name], 0.0) for name in lost)])
 
     def drift_per_kT(self, temperature: float, grains: int) -> float:  # noqa: N802, a name that scripts count on
         """Change of the total energy over N k_B T; NaN for T = 0."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..basics.errors import BadInput, FilesFailed
 from ..basics.paths import user_path
-from ..basics.state import CLOCK, CONTACT_STEPS, COUNT, CUTOFF, GRAINS_AWAKE, LARGEST_OVERLAP, LOST, STAGE
+from ..basics.state import CLOCK, CONTACT_STEPS, COUNT, CUTOFF, GRAINS_AWAKE, LARGEST_OVERLAP, LOST, PHASE
 from ..basics.version import __version__
 from ..compiler.jit import cache_folder
 from ..io import run_folder as files
@@ -205,7 +205,7 @@ class RunWriter:
         """
         self._stop_beside_others()
         regular = simulation.regular_state
-        assert regular.count[STAGE] == 0
+        assert regular.count[PHASE] == 0
         begun = monotonic()
         if self._trajectory is not None:
             self._trajectory.flush(sync=True)

@@ -166,13 +166,13 @@ import numpy as np
 import sand
 from sand.compiler import ahead
 from sand.compiler.jit import in_cache
-from sand.integrate.stages import gather_stage, remove_broken, set_contact_step
+from sand.integrate.stages import gather_stage, remove_broken, set_contact_limit
 simulation = sand.Simulation(
     sand.Grains(np.array([[0.0, 0.0, 0.0], [1e-6, 0.0, 0.0]]), 1e-8, sand.IRON), [sand.Contact()]
 )
 engine = simulation._engine
 table = engine.table_for_call()
-stages = [(table, each, ()) for each in (remove_broken, gather_stage(False), set_contact_step)]
+stages = [(table, each, ()) for each in (remove_broken, gather_stage(False), set_contact_limit)]
 ahead.WORTH_HELPERS, ahead.LONGEST_WAIT = 0.0, 60.0
 if "alone" in sys.argv:
     ahead._start = None  # no helper may start

@@ -22,7 +22,7 @@ from sand.contact.poses import displacements_before, pose_at, twist_increment
 from sand.contact.slip_rules import ROLL, STEP_KEPT
 from sand.contact.tangential import pointers_for
 from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLID_FLAG, SLIPPED_FLAG
-from sand.contact.update import ContactStep, ContactSums, PassVariant, log_contact_sums, single_contact_loop
+from sand.contact.update import ContactSums, PassVariant, PresentStep, log_contact_sums, single_contact_loop
 from sand.integrate.motion import drift_for
 from sand.integrate.parts import ContactParameters
 from sand.integrate.stages import StageNumber, contact_event_stages, contact_pass_stage
@@ -78,7 +78,7 @@ def update_each(grains, contacts, near, count, lost, span, law, dt):
         beyond = exceeds_limits(found, pose.n, constants) or not JKR.fast_radius_root(found.overlap, constants)[1]
         contacts.flag[c] = PENDING_FLAG if beyond else 0
         write_loads(grains, contacts, span, law, c)
-    update_flagged_contacts(grains, contacts, near, count, lost, ContactStep(span, law, 0, dt))
+    update_flagged_contacts(grains, contacts, near, count, lost, PresentStep(span, law, 0, dt))
 
 
 def random_contacts(material, box, seed=1):

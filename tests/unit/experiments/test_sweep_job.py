@@ -406,3 +406,26 @@ def test_a_worker_without_the_package(case):
     with pytest.raises(BadInput, match="a worker or the scheduler lacks the package sand; install sand-dust"):
         swept(path, executor=Without())
     assert swept(path)["done"] == len(computed) == 12
+
+
+def test_growth_of_a_sweep_is_drawn(case, monkeypatch, capsys):
+    """`--what growth` takes the speed of the key and columns of results, and does not average over another key."""
+    rows, run = [], SweptCollision.run
+
+    def with_growth(self, seed, folder, observers=()):
+        found = {"impact_parameter": 1e-8, "reach": 4e-7, "growth_efficiency": 0.5, "kind": "mass transfer"}
+        return run(self, seed, folder, observers) | found
+
+    monkeypatch.setattr(SweptCollision, "run", with_growth)
+    monkeypatch.setattr("sand.plotting.collisions.growth_figure", lambda given, title: rows.extend(given))
+    monkeypatch.setattr("sand.plotting.run_figure.figure_bytes", lambda *_: b"")
+    words = ["sweep", "case.toml", "--seeds", "2", "--files", "none", "--quiet"]
+    assert main([*words, "--vary", "impact.speed=1,2", "--out", "speeds"]) == 0
+    assert main(["plot", "speeds", "--what", "growth", "--quiet"]) == 0
+    assert sorted((row["speed"], row["seed"], row["kind"]) for row in rows) == [
+        (speed, seed, "mass transfer") for speed in (1.0, 2.0) for seed in (1, 2)
+    ]
+    assert main([*words, "--vary", "target.grains=2,3", "--out", "sizes"]) == 0
+    capsys.readouterr()
+    assert main(["plot", "sizes", "--what", "growth"]) == 2
+    assert "would average over target.grains; give columns" in capsys.readouterr().err

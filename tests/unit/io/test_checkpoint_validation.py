@@ -11,7 +11,7 @@ import sand
 from sand import components
 from sand.basics.array_groups import Array, new_group, saved_in
 from sand.basics.arrays import body_arrays
-from sand.basics.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
+from sand.basics.state import CONTACTS, COUNT, GRAIN1, PAIRS, PHASE, STEPS
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.io.state_arrays import ALWAYS, NUMBERS, OPTIONAL, PLANNED_END, SINGLE, check_state
@@ -140,7 +140,7 @@ def changed_entry(name, index, value):
 
 @pytest.mark.parametrize(
     ("index", "value"),
-    [(CONTACTS, 2), (CONTACTS, 10**15), (CONTACTS, -1), (PAIRS, 4), (STAGE, 1), (STEPS, 61), (GRAIN1, FAR)],
+    [(CONTACTS, 2), (CONTACTS, 10**15), (CONTACTS, -1), (PAIRS, 4), (PHASE, 1), (STEPS, 61), (GRAIN1, FAR)],
 )
 def test_inconsistent_counters(tmp_path, index, value):
     """Numbers of contacts and pairs against the arrays, the step against meta.json, an invalid grain index."""

@@ -87,21 +87,22 @@ def test_many_grains_in_thin_cells(lengths, reach):
 
 
 @pytest.mark.compiled("small")
-@pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.0)])
+@pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.0), (0.7, 0.7, 0.7)])
 @pytest.mark.parametrize("cells_across", [3, 4, 11])
 def test_lists_are_symmetric(lengths, cells_across):
     """Distances that differ from the reach by rounding: the matrix is symmetric, with no pair twice.
 
     A lattice with the reach as spacing, shifted by irregular offsets: neighbours in x, y and z are ε from the reach on
-    either side, also across the walls and close to borders of cells.
+    either side, also across the walls, where coordinates are shifted by L, and close to borders of cells.
     """
-    box, reach = Box(lengths), 1.0 / cells_across
+    side = lengths[0] or 1.0
+    box, reach = Box(lengths), side / cells_across
     edge = (np.arange(cells_across) + 0.5) / cells_across - 0.5
     doubtful = 0
     for seed in range(10):
         rng = np.random.default_rng(seed)
         lattice = np.stack(np.meshgrid(edge, edge, edge), -1).reshape(-1, 3) + rng.uniform(-0.3, 0.3, 3) / cells_across
-        perturbed = lattice + rng.choice([-1e-16, 0.0, 1e-16], lattice.shape)
+        perturbed = side * (lattice + rng.choice([-1e-15, 0.0, 1e-15], lattice.shape))
         found = rows(rng.permutation(perturbed), box, reach)
         assert (found == found.T).all()
         assert found.max() <= 1

@@ -22,7 +22,7 @@ from ...forces.base import Force
 from ...forces.pair.ewald_force import EwaldForce
 from ...integrate.hooks import Hook
 from ...integrate.parts import ContactParameters
-from ...integrate.rigid.awake_clusters import HeldLoads, add_held_loads
+from ...integrate.rigid.awake_clusters import PERIODS, add_held_loads, no_loads
 from ...integrate.rigid.body_friction import LARGEST_DEVIATE
 from ...integrate.rigid.rigid_clusters import RigidLimits
 from ...integrate.rigid.rigid_driver import LARGEST_FLIGHT
@@ -31,7 +31,8 @@ from ..engine import Engine
 from ..kinds import Build, Kind
 from ..part import Part
 from ..step_parameters import ForceDependent, ForcesByType
-from .body_steps import PERIODS, BodySteps
+from .awake_steps import AwakeSteps
+from .body_steps import BodySteps
 from .quick_bodies import QuickBodies
 
 GRAINS = "use clusters = 'grains' (sand.Verlet)"
@@ -140,16 +141,15 @@ class BodiesKind(Kind):
         inner = build(near, Neighbours("all pairs", order="as given"))
         if self.holds and engine.content.pair_forces:
             stages = dict(inner.content.of_components)
-            none = HeldLoads(np.zeros((3, 0)), np.zeros((3, 0)))
-            stages[Hook.LOADS] = [*stages.get(Hook.LOADS, ()), (add_held_loads, none)]
+            stages[Hook.LOADS] = [*stages.get(Hook.LOADS, ()), (add_held_loads, no_loads(0))]
             inner.content = inner.content._replace(of_components=stages).for_part(len(inner.regular_state.grains))
-        limits = parameters.flight_limits._replace(substeps=False, holds_loads=True)
+        limits = parameters.flight_limits._replace(substeps=False, excludes_loads=True)
         own = inner.parameters._replace(flight_limits=limits, criteria=parameters.criteria)
-        steps = BodySteps(Part(inner, CONTACT_STEPS))
+        steps = BodySteps(AwakeSteps(Part(inner, CONTACT_STEPS)))
         of_quick = dataclasses.replace(inner, parameters=own, warnings=engine.warnings, stepper=steps)
         quick = QuickBodies(Part(of_quick, SUBSTEPS, has_bodies=True))
         made = functools.partial(self._steps, build=build)
-        return BodySteps(Part(inner, CONTACT_STEPS), None if self.holds else quick, made)
+        return BodySteps(AwakeSteps(Part(inner, CONTACT_STEPS)), None if self.holds else quick, made)
 
 
 def _between_all(force: Force) -> Force:

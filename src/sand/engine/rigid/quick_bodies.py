@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.state import BROKEN, MADE, OUTSIDE, RESTED, STAGE, STEP, STEPS, SUBSTEPS, WOKEN, State
+from ...basics.state import BROKEN, MADE, OUTSIDE, PHASE, RESTED, STEP, STEPS, SUBSTEPS, WOKEN, State
 from ...compiler.stage import Stage
 from ...integrate.parts import Stop
 from ...integrate.rigid.substeps import AFTER_SUBSTEPS, find_slow_rate, kick_by_slow_loads, place_all_velocities
@@ -63,7 +63,7 @@ class QuickBodies:
                 getattr(bodies, name).take(self.part.index, axis=1, out=getattr(own.bodies, name))
             # a body may wake before its first substep: then the velocities of its grains are all that remains
             place_all_velocities.run(part.table_of(own))
-            steps.kick_awake(own, own.bodies.excluded_force, own.bodies.excluded_torque, step)
+            steps.awake.kick(part, own, (own.bodies.excluded_force, own.bodies.excluded_torque), step)
             stop = part.drive(state.time + step, math.inf, shorten=True)
         finally:
             if stop is not Stop.TIME_REACHED:
@@ -88,8 +88,8 @@ class QuickBodies:
         # the random numbers of a gas are counted with steps and substeps
         own.count[SUBSTEPS] = state.count[STEPS] + state.count[SUBSTEPS]
         steps: Any = self.part.engine.stepper  # `body_steps.BodySteps`
-        steps.sort_members(own)
-        steps.sum_outer_loads(self.part.engine)
+        steps.awake.sort_members(own)
+        steps.sum_loads(self.part.engine)
         return steps
 
     def _exclude_loads(self, engine: Engine) -> None:
@@ -102,11 +102,11 @@ class QuickBodies:
         find_slow_rate.run(self.part.engine.table_of(own), (slow[0], slow[2], rate))
         longest = engine.parameters.flight_limits.step_fraction / max(float(rate[0]), LEAST_RATE)
         state.clock[STEP] = min(state.clock[STEP], longest)
-        for name, held in (("force", slow[0]), ("torque", slow[1])):
+        for name, kept in (("force", slow[0]), ("torque", slow[1])):
             acting, excluded = getattr(own.grains.arrays, name), f"excluded_{name}"
             getattr(state.bodies, excluded)[:, index] = acting
-            getattr(own.bodies, excluded)[...] = held
-            acting += held
+            getattr(own.bodies, excluded)[...] = kept
+            acting += kept
 
     def _store(self, engine: Engine) -> None:
         """Give grains, contacts and bodies back, and the loads that acted in the last substep."""
@@ -117,10 +117,10 @@ class QuickBodies:
             part, end = self.part.engine, state.time + float(state.clock[STEP])
             for outer in engine.external:
                 state.lost[OUTSIDE] += external_energy(part, outer, end) - external_energy(part, outer, state.time)
-        self.part.give_back(state)
+        self.part.give_back(engine)
         bodies.quick[index] = 1
         bodies.excluded_force[:, index] = own.grains.arrays.force - own.bodies.excluded_force
         bodies.excluded_torque[:, index] = own.grains.arrays.torque - own.bodies.excluded_torque
         if changed:
             sort_members(state)
-        state.count[STAGE] = AFTER_SUBSTEPS
+        state.count[PHASE] = AFTER_SUBSTEPS

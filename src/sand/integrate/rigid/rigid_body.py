@@ -109,10 +109,10 @@ def free_sphere(q, angular, inertia, t):
 
 
 @loop
-def sum_body_loads(grains, bodies, count, holds_loads):
+def sum_body_loads(grains, bodies, count, excludes_loads):
     """Sum force [N] and torque [N m] about the centre of mass of each body; awake ones included.
 
-    The `excluded` loads on the grains of quick bodies, or of all if `holds_loads`, are left out.
+    The excluded loads on the grains of quick bodies, or of all if `excludes_loads`, are left out.
     """
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
@@ -121,7 +121,7 @@ def sum_body_loads(grains, bodies, count, holds_loads):
         for k in range(bodies.start[b], bodies.start[b + 1]):
             i = bodies.member[k]
             own, turning = load(grains.force, i), load(grains.torque, i)
-            if holds_loads or bodies.quick[first] == 1:
+            if excludes_loads or bodies.quick[first] == 1:
                 own = sub(own, load(bodies.excluded_force, i))
                 turning = sub(turning, load(bodies.excluded_torque, i))
             force = add(force, own)

@@ -29,7 +29,9 @@ class RigidLimits(NamedTuple):
     smallest_radius: float  # [m]
     friction_rate: float  # fastest decay of a velocity or spin by friction in a gas [1/s]; 0 without gas
     substeps: bool  # whether bodies may take several steps within a step of all bodies
-    holds_loads: bool  # whether these are substeps, in which other loads on the grains are known but do not act
+    excludes_loads: (
+        bool  # whether these are substeps, in which `BodyArrays.excluded_force` and torque do not kick bodies
+    )
 
 
 @register
@@ -90,5 +92,5 @@ class RigidClusters(IntegratorSettings):
         """Run-time numbers; the engine, which knows contacts, gas and grains, sets all but the first three."""
         longest = math.inf if self.longest_step == "auto" else self.longest_step
         return RigidLimits(
-            self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, substeps=False, holds_loads=False
+            self.vibration, self.step_fraction, longest, longest, 0.0, 0.0, substeps=False, excludes_loads=False
         )

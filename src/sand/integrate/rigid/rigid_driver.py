@@ -22,8 +22,8 @@ from ...basics.state import (
     OUTSIDE,
     PAIR_LIST_SKIN,
     PAIRS,
+    PHASE,
     SOME_AWAKE,
-    STAGE,
     STEP,
     STEPS,
     TIME,
@@ -41,7 +41,7 @@ from ..motion import wrap_all
 from ..parts import DRIVER_PARTS, Stop
 from ..respa import add_long_range_loads
 from ..stages import StageNumber
-from ..step_control import is_close, is_past
+from ..step_control import has_arrived, is_past
 from ..task_queue import join_workers
 from .body_friction import drift_bodies_in_gas
 from .body_touches import CLEAR, LOADED, find_near_bodies
@@ -192,8 +192,8 @@ def update_lists(s):
 
 
 @caller
-def sum_outer_loads(s, holds_loads):
-    """Sum all loads but those of contacts, over all pairs of grains, at the time of the end of the step."""
+def sum_loads(s, excludes_loads):
+    """Sum all loads on the grains but those of contacts, at the time of the end of the step; add those excluded."""
     for i in range(s.grains.mass.size):
         put(s.grains.force, i, (0.0, 0.0, 0.0))
         put(s.grains.torque, i, (0.0, 0.0, 0.0))
@@ -201,7 +201,7 @@ def sum_outer_loads(s, holds_loads):
     if s.forces.pair > 0:
         sum_pair_forces(s)
         add_long_range_loads(s.grains, s.long_range)
-    if holds_loads:
+    if excludes_loads:
         for i in range(s.grains.mass.size):
             accrue(s.grains.force, i, load(s.bodies.excluded_force, i))
             accrue(s.grains.torque, i, load(s.bodies.excluded_torque, i))
@@ -220,7 +220,7 @@ def awake_grains(bodies):
 def first_half(s, some_awake):
     """Choose the step, kick and drift; returns the value of a `Stop`, `NONE` if the step was begun."""
     s.bodies.quick[:] = 0
-    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
+    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.excludes_loads)
     h, longest = longest_step(s.grains, s.bodies, s.pair_list, s.count, s.span, s.criteria, s.flight_limits, some_awake)
     if not h > 0.0:
         call_stage(s, StageNumber.EXPLAIN, Stop.NOT_FINITE.value)
@@ -250,7 +250,7 @@ def first_half(s, some_awake):
     drift_with_work(s, h)
     if not some_awake:
         call_hook(s, Hook.NONE_AWAKE)
-    s.count[STAGE] = 1
+    s.count[PHASE] = 1
     return Stop.AWAKE_STEPS.value if some_awake else Stop.NONE.value
 
 
@@ -260,8 +260,8 @@ def second_half(s, awake, had_substeps):
     stop = update_lists(s)
     if stop != Stop.NONE.value:
         return stop
-    sum_outer_loads(s, s.flight_limits.holds_loads)
-    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.holds_loads)
+    sum_loads(s, s.flight_limits.excludes_loads)
+    sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.excludes_loads)
     kick_bodies(s.bodies, s.count, 0.5 * s.clock[STEP])
     move_velocities(s.grains, s.bodies, s.count)
     s.bodies.quick[:] = 0
@@ -272,7 +272,7 @@ def second_half(s, awake, had_substeps):
         s.clock[SOME_AWAKE] += s.clock[STEP] if awake > 0 else 0.0
         s.clock[GRAINS_AWAKE] += awake * s.clock[STEP] / s.grains.mass.size
     s.count[STEPS] += 1 if s.clock[STEP] > 0.0 else 0
-    s.count[STAGE] = 0
+    s.count[PHASE] = 0
     return Stop.AWAKE_LOADS.value if awake > 0 else Stop.NONE.value
 
 
@@ -283,19 +283,19 @@ def body_steps_until(s):
     invalidate_speeds(s.pair_list)
     while True:
         stop = Stop.NONE.value
-        if s.count[STAGE] == 0:
+        if s.count[PHASE] == 0:
             if s.count[COMPARED] >= 0 and s.count[COMPARED] != s.count[MADE] + s.count[BROKEN]:
                 return Stop.CLUSTERS_CHANGED.value
-            if s.clock[TIME] >= s.until or (s.shorten and is_close(s.clock[TIME], s.until)):
+            if has_arrived(s.clock[TIME], s.until, s.shorten):
                 return Stop.TIME_REACHED.value
             if s.count[STEPS] >= s.last:
                 return Stop.NONE.value
             stop = first_half(s, awake > 0)
-        elif s.count[STAGE] == AFTER_SUBSTEPS:
+        elif s.count[PHASE] == AFTER_SUBSTEPS:
             drift_with_work(s, s.clock[STEP])
-            s.count[STAGE] = AFTER_ALL
+            s.count[PHASE] = AFTER_ALL
         if stop == Stop.NONE.value:
-            stop = second_half(s, awake, s.count[STAGE] == AFTER_ALL)
+            stop = second_half(s, awake, s.count[PHASE] == AFTER_ALL)
         if stop != Stop.NONE.value:
             return stop
 
@@ -315,7 +315,7 @@ def advance_bodies(s):
 @stage("the search for touches of bodies")
 def mark_near_bodies(grains, bodies, pair_list, clock, count, span, gas, flight_limits):
     """Mark bodies near others, for a step as long as the last one."""
-    sum_body_loads(grains, bodies, count, flight_limits.holds_loads)
+    sum_body_loads(grains, bodies, count, flight_limits.excludes_loads)
     bodies.near[:] = CLEAR
     find_near_bodies(grains, bodies, pair_list, count, span, gas, flight_limits.friction_rate, clock[STEP])
     return 0

@@ -1,9 +1,9 @@
 """Substeps: bodies whose loads change fast take several steps within one step of all bodies.
 
 The step of all bodies is set by the slowest ones.  With the loads F of all grains on each other and F_q of the quick
-bodies on each other and of external forces on them, one step H is
+bodies on each other and of external forces on them, the quick loads, one step H is
 
-    all bodies:    P += ½H (F − F_q)
+    all bodies:    P += ½H (F − F_q)                                                 (the slow loads)
     quick bodies:  steps h < H:  P += ½h F_q, drift, rotor, new F_q, P += ½h F_q     (the steps of `rigid_driver`)
     other bodies:  drift H, rotor                                                    (F_q = 0)
     all bodies:    new F;  P += ½H (F − F_q)
@@ -12,7 +12,10 @@ This is the impulse method of multiple time stepping (Tuckerman, Berne & Martyna
 bodies (Pelupessy, Jänes & Portegies Zwart 2012): each force acts on both bodies of a pair at the same time, so that
 momentum and angular momentum are conserved to rounding.  Quick are bodies that require a step shorter than H, awake
 clusters, all that are near these, and pairs that may touch within H.  In their substeps these bodies touch, wake and
-come to rest as in any step.  Contacts at rest carry all loads: the slow ones are held as they were at the start.
+come to rest as in any step.  Contacts at rest carry all loads: of the slow ones those at the start.
+
+`BodyArrays.excluded_force` and torque are the loads on a grain that do not kick its body: F_q in the state of all
+bodies, F − F_q in that of the quick ones.
 """
 
 import math
@@ -25,7 +28,7 @@ from .body_touches import reach_of_pair
 from .rigid_body import kick_bodies, move_velocities, sum_body_loads
 
 AFTER_SUBSTEPS, AFTER_ALL = 2, 3
-"""Values of `STAGE` when the quick bodies have arrived at the end of the step, and when all others have, too."""
+"""Values of `PHASE` when the quick bodies have arrived at the end of the step, and when all others have, too."""
 GRAIN_COST, CALL_COST = 0.35, 250.0
 """Estimated cost [µs] of a step for each grain, and of substeps besides that of each substep."""
 SUBSTEP_COST, SUBSTEP_GRAIN_COST, SUBSTEP_PAIR_COST = 1.0, 0.2, 0.0075
