@@ -56,11 +56,11 @@ class SeedTable(NamedTuple):
         return np.fmin.reduce(self.of_seeds, axis=0), np.fmax.reduce(self.of_seeds, axis=0)
 
     def falls_below(self, level: float) -> Interval:
-        """x at which the mean falls below a level, with the interval of a jackknife over the seeds."""
+        """x at which the mean falls below a level, with the interval of a jackknife of ln x over the seeds."""
         found = falls_below(self.x, self.mean, level)
         fewer = [self._replace(of_seeds=np.delete(self.of_seeds, k, axis=0)) for k in range(len(self.of_seeds))]
         without = [falls_below(self.x, one.mean, level) for one in fewer]
-        return Interval(found, *jackknife(found, np.array(without))[1:])
+        return Interval(found, *np.exp(jackknife(math.log(found), np.log(without))[1:]).tolist())
 
 
 def seed_table(values: Mapping[tuple[Any, float], float]) -> SeedTable:

@@ -44,17 +44,18 @@ def test_a_crossing():
 def test_an_interval_over_seeds():
     """Three seeds with zeros at 40, 50 and 62.5: the mean of f in ln v has its zero at the geometric mean 50.
 
-    Without one seed it is at √(50·62.5), √(40·62.5) = 50 and √(40·50); the jackknife of these, with t = 4.303 for two
-    degrees of freedom, is the interval.
+    Without one seed it is at √(50·62.5), √(40·62.5) = 50 and √(40·50); the jackknife of their logarithms, with
+    t = 4.303 for two degrees of freedom, is the interval.
     """
     v = np.geomspace(10.0, 200.0, 41)
     zeros = {1: 40.0, 2: 50.0, 3: 62.5}
     table = seed_table({(seed, x): math.log(zero / x) for seed, zero in zeros.items() for x in v})
     found = table.falls_below(0.0)
-    without = np.array([math.sqrt(50.0 * 62.5), 50.0, math.sqrt(2000.0)])
+    without = np.log([math.sqrt(50.0 * 62.5), 50.0, math.sqrt(2000.0)])
     half = 4.302653 * math.sqrt(2.0 / 3.0 * ((without - without.mean()) ** 2).sum())
     assert found.value == pytest.approx(50.0, rel=1e-9, abs=0.0)
-    assert (found.low, found.high) == pytest.approx((50.0 - half, 50.0 + half), rel=1e-6, abs=0.0)
+    limits = 50.0 * math.exp(-half), 50.0 * math.exp(half)
+    assert (found.low, found.high) == pytest.approx(limits, rel=1e-6, abs=0.0)
     one = seed_table({(1, x): math.log(40.0 / x) for x in v}).falls_below(0.0)
     assert one.text("m/s") == "40 (no interval) m/s"
 
