@@ -237,7 +237,9 @@ class SweepJob(Job):
         if not self._is_set_up:
             self.expected(self.left())
         self.begin()
-        table = SweepTable(self, progress, 1 if executor is None else getattr(executor, "_max_workers", None))
+        workers = 1 if executor is None else getattr(executor, "_max_workers", None)
+        how: Any = {"progress": progress, "workers": workers, "shown": self.notes, "parquet": self.parquet}
+        table = SweepTable(self.folder, self.rows, {key: self.defaults.get(key) for key in self.keys}, **how)
         try:
             self._compute(executor, observers, table)
         finally:

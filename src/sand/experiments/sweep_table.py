@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from ..basics.errors import warn
 from ..io import run_folder as files
@@ -14,9 +15,6 @@ from ..io.sweep_files import DONE, FAILED, STATE, flat, read_rows, write_sweep
 from .job import Progress
 from .sweep_design import value_read
 from .sweep_row import Row, named, version
-
-if TYPE_CHECKING:
-    from .sweep_job import SweepJob
 
 TABLE_EVERY, TABLE_COST = 30.0, 0.02
 """Shortest wall time [s] between two tables of an unfinished sweep, and the largest part of the time that they take."""
@@ -27,15 +25,44 @@ NOTES = 5
 
 
 class SweepTable:
-    """The rows of a sweep: known ones, those that arrive, and the table that is written of them."""
+    """The rows of a sweep: known ones, those that arrive, and the table that is written of them.
 
-    def __init__(self, job: SweepJob, progress: Progress, workers: int | None):
-        self.job, self._progress, self._workers = job, progress, workers
+    Parameters
+    ----------
+    folder : Path
+        Folder of the sweep.
+    rows : sequence of Row
+        All runs.
+    defaults : mapping
+        The keys that change, with their values in rows that do not give them, or None.
+    progress : callable
+        See `job.Progress`.
+    workers : int or None
+        Number of processes, if it is known.
+    shown : sequence of str
+        Warnings that were shown before the first run.
+    parquet : bool
+        Whether the table is written as Parquet, too.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        rows: Sequence[Row],
+        defaults: Mapping[str, Any],
+        *,
+        progress: Progress,
+        workers: int | None,
+        shown: Sequence[str],
+        parquet: bool,
+    ):
+        self._folder, self._rows, self._defaults = folder, rows, defaults
+        self._progress, self._workers, self._shown, self._parquet = progress, workers, shown, parquet
         self.known: dict[str, dict[str, Any]] = {}
         self.busy: set[str] = set()  # runs that other processes compute
         self.notes: Counter[str] = Counter()
         self._written, self._took = time.monotonic(), 0.0
-        self._place = {row.name: k for k, row in enumerate(job.rows)}
+        self._place = {row.name: k for k, row in enumerate(rows)}
         self._states: Counter[str] = Counter()  # of the runs of the design
         self._take_all()
         self._named_versions: set[str] = {version()}
@@ -46,18 +73,18 @@ class SweepTable:
         """Warn of rows that other versions have made, once of each version."""
         number = Counter(cells["version"] for cells in self.known.values())
         if others := [f"{number[name]} by {name}" for name in number if name not in self._named_versions]:
-            warn(f"{self.job.folder} has runs of other versions of SAND: {', '.join(others)}; this one is {version()}")
+            warn(f"{self._folder} has runs of other versions of SAND: {', '.join(others)}; this one is {version()}")
         self._named_versions |= number.keys()
 
     def _take_all(self) -> None:
         """Take the rows of all runs that have ended, also those of other processes."""
-        for name, row in read_rows(self.job.folder, without=self.known):
+        for name, row in read_rows(self._folder, without=self.known):
             self._take(name, row)
 
     def _take(self, name: str, row: dict[str, Any]) -> None:
         if name in self._place and name not in self.known:
             self._states[row[STATE]] += 1
-        self.known[name] = _cells(name, row, self.job.keys, self.job.defaults)
+        self.known[name] = _cells(name, row, self._defaults)
 
     def add(self, row: Row, found: dict[str, Any] | None) -> None:
         """Take the row of a run that has ended; None if another process computes it."""
@@ -65,7 +92,7 @@ class SweepTable:
             self.busy.add(row.name)
             return
         self._take(row.name, found)
-        self.notes.update(text for text in found.get("notes", []) if text not in self.job.notes)
+        self.notes.update(text for text in found.get("notes", []) if text not in self._shown)
         line = f"  run {row.name} failed ({named(row)}): {found['message']}" if found[STATE] == FAILED else ""
         self._show(line)
         now = time.monotonic()
@@ -87,7 +114,10 @@ class SweepTable:
         """Write the table of all runs that have ended: those of the design in its order, then earlier ones."""
         began = time.monotonic()
         place, known = self._place, self.known
-        keys = [*self.job.keys, *sorted({key for cells in known.values() for key in cells["keys"]} - {*self.job.keys})]
+        keys = [
+            *self._defaults,
+            *sorted({key for cells in known.values() for key in cells["keys"]} - {*self._defaults}),
+        ]
         order = sorted(known, key=lambda name: (place.get(name, len(place)), str(known[name]["values"]), name))
         rows = []
         for name in order:
@@ -95,7 +125,7 @@ class SweepTable:
             values = cells.pop("values")
             del cells["keys"]
             rows.append({key: values.get(key) for key in keys} | cells)
-        write_sweep(self.job.folder, rows, self.job.parquet)
+        write_sweep(self._folder, rows, self._parquet)
         self._written = time.monotonic()
         self._took = self._written - began
 
@@ -107,15 +137,15 @@ class SweepTable:
         dict
             The content of the results file.
         """
-        with writing(self.job.folder, patience=PATIENCE):
+        with writing(self._folder, patience=PATIENCE):
             self._take_all()
             self._name_versions()
             self.write()
             count = self.counts()
-            failed = {row.name: self._message(row) for row in self.job.rows if self._state(row) == FAILED}
-            content = {"folder": str(self.job.folder), **count, "failures": failed, "version": version()}
+            failed = {row.name: self._message(row) for row in self._rows if self._state(row) == FAILED}
+            content = {"folder": str(self._folder), **count, "failures": failed, "version": version()}
             if not count["left"]:
-                files.write_json(self.job.folder / self.job.RESULTS, content)
+                files.write_json(self._folder / files.SWEEP, content)
         for text, number in self.notes.most_common(NOTES):
             warn(f"in {number} run{'s' * (number > 1)}: {text}")
         return content
@@ -127,9 +157,9 @@ class SweepTable:
         return f"{named(row)}: {self.known[row.name]['message']}"
 
 
-def _cells(name: str, row: dict[str, Any], keys: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, Any]:
+def _cells(name: str, row: dict[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
     """Cells of the table of one row, with its keys and their values."""
-    values = {key: value_read(row["case"], key, defaults.get(key)) for key in dict.fromkeys([*keys, *row["keys"]])}
+    values = {key: value_read(row["case"], key, defaults.get(key)) for key in dict.fromkeys([*defaults, *row["keys"]])}
     values |= {key: _listed(row["keys"][key]) for key in row["keys"]}
     shared = {"seed": row["seed"], STATE: row[STATE], **flat(row["results"])}
     costs = {key: row[key] for key in ("message", "seconds", "cpu_seconds", "version")}
