@@ -131,6 +131,10 @@ def test_a_run_continues_from_its_checkpoint(place, command, name):
     assert list((place / "stopped").glob("checkpoint-*"))
     for _ in range(2):
         assert made().run(1, place / "stopped") == expected
+    for path in (place / "stopped").glob("checkpoint-*"):
+        path.write_bytes(b"damaged")
+    with pytest.warns(UserWarning, match="the run begins again"):
+        assert made().run(1, place / "stopped") == expected
 
 
 STAND_INS = {

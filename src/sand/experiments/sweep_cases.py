@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, warn
 from ..config.build import resume, simulation_of
 from ..config.case import Case, check_case, material_errors
 from ..config.key_errors import validate
@@ -131,8 +131,8 @@ class SweptRun(SweptCase):
         self.case.run.seed = seed
         run, met = self.case.run, None
         ends = {"until": run.until, "steps": run.steps, "stop": run.stop}
-        if folder is not None and checkpoint_files(folder):
-            simulation = resume(folder, observers=list(observers))
+        simulation = _resumed(folder, lambda: resume(str(folder), observers=list(observers)))
+        if simulation is not None:
             end, last, stop = simulation.planned
             met = simulation.met_condition if stop is not None and simulation.met_condition == stop else None
             if met or simulation.time >= end or simulation.steps >= last:  # killed before its row was written
@@ -178,9 +178,8 @@ class SweptCollision(SweptCase):
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
         """Simulate the collision."""
         start, physics, own = self.case.approach(seed), self.case.physics(), list(observers)
-        if folder is not None and checkpoint_files(folder):
-            simulation = resume_collision(start, folder, *physics, observers=own)
-        else:
+        simulation = _resumed(folder, lambda: resume_collision(start, str(folder), *physics, observers=own))
+        if simulation is None:
             simulation = prepare(start, *physics, out=folder, overwrite=True, observers=own)
         found = run_to_end(start, simulation, self.case.ending()).to_dict()
         return {key: value for key, value in found.items() if key not in ("seed", "speed")}
@@ -264,6 +263,17 @@ class SweptScattering(SweptCase):
             how = {"known": table.rows, "keep": lambda rows: table.add(rows.tolist())}
         found = measure(flight, relative_error=goal, seed=seed, **how).to_dict()
         return {key: value for key, value in found.items() if key not in self.NO_RESULTS}
+
+
+def _resumed(folder: Path | None, make: Callable[[], Any]) -> Any:
+    """The simulation of an interrupted run; None if there is none, or none that can be continued, which is noted."""
+    if folder is None or not checkpoint_files(folder):
+        return None
+    try:
+        return make()
+    except BadInput as error:
+        warn(f"{error.problems[0]}; the run begins again")
+        return None
 
 
 def _or_never(end: float | None) -> float:

@@ -6,29 +6,25 @@ import math
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.errors import BadInput, ErrorCollector, FilesFailed, shown, warn
+from ..basics.errors import BadInput, ErrorCollector, shown, warn
 from ..basics.paths import user_path
-from ..basics.version import __version__
-from ..compiler.jit import cache_folder
 from ..config.case import with_absolute_files
 from ..config.commands import command_for
 from ..config.key_errors import validate
 from ..io import run_folder as files
 from ..io.damage import digest_of
-from ..io.lock import FolderLock, holder, writing
-from ..io.sweep_files import CLAIM, DONE, FAILED, ROW, RUNS, STATE, flat, read_row, read_rows, write_row, write_sweep
+from ..io.lock import holder, writing
+from ..io.sweep_files import CLAIM, DONE, FAILED, ROW, RUNS, STATE, read_row, read_rows, write_row
 from ..results import Sweep
-from ..simulation.displays import DISPLAYS
 from .executors import results_of
 from .job import Job, Progress, ignored
 from .sweep_cases import CASES, Expected
@@ -44,27 +40,15 @@ from .sweep_design import (
     value_read,
     without_keys,
 )
+from .sweep_row import Row, named, new_row, run_row, texts_of
+from .sweep_table import NOTES, PATIENCE, SweepTable
 
-PATIENCE = 10.0
-"""Longest wall time [s] to wait for another process that writes to the folder for a moment, or that is ending."""
-TABLE_EVERY, TABLE_COST = 30.0, 0.02
-"""Shortest wall time [s] between two tables of an unfinished sweep, and the largest part of the time that they take."""
 MOST_LOSSES = 3
 """Times that the process of a run may die before the run counts as failed."""
 SET_UP, MOST_SET_UP, SET_UP_SECONDS = 8, 64, 20.0
 """Runs that are set up before the first one is computed: at least, and at most; fewer after this wall time [s]."""
 ROW_BYTES = 12e3
 """Disk space of a run of which only the row is kept [bytes]."""
-NOTES = 5
-"""Warnings of runs that are shown, the most frequent ones."""
-
-
-class Row(NamedTuple):
-    """A run of a sweep."""
-
-    name: str  # of its folder: a digest of its case and seed
-    values: dict[str, Any]  # by key
-    seed: int
 
 
 class SweepJob(Job):
@@ -204,12 +188,12 @@ class SweepJob(Job):
             for row in self._sample(left):
                 if found and time.monotonic() > latest:
                     break
-                place = f"{self.path}: {_named(row)}"
+                place = f"{self.path}: {named(row)}"
                 try:
                     found.append(self.kind(changed_content(self.content, row.values), place).expected(row.seed))
                 except BadInput as error:
                     errors.problems += error.at(place).problems
-        self.notes = _texts(noted)
+        self.notes = texts_of(noted)
         for text in self.notes[:NOTES]:
             warn(text)
         errors.done()
@@ -253,7 +237,9 @@ class SweepJob(Job):
         if not self._is_set_up:
             self.expected(self.left())
         self.begin()
-        table = _Table(self, progress, 1 if executor is None else getattr(executor, "_max_workers", None))
+        workers = 1 if executor is None else getattr(executor, "_max_workers", None)
+        how: Any = {"progress": progress, "workers": workers, "shown": self.notes, "parquet": self.parquet}
+        table = SweepTable(self.folder, self.rows, {key: self.defaults.get(key) for key in self.keys}, **how)
         try:
             self._compute(executor, observers, table)
         finally:
@@ -303,7 +289,7 @@ class SweepJob(Job):
                 "--out, or the same case"
             )
 
-    def _compute(self, executor: Executor | None, observers: Sequence[Any], table: _Table) -> None:
+    def _compute(self, executor: Executor | None, observers: Sequence[Any], table: SweepTable) -> None:
         """Compute what is left; after the death of a worker process the pool is started again."""
         place = str(self.folder.absolute())  # workers may be in another folder
         keeps = self.section.files == "all"
@@ -342,210 +328,9 @@ class SweepJob(Job):
     def _given_up(self, row: Row) -> dict[str, Any]:
         """The row of a run whose process died too often."""
         message = f"the process that computed it died {MOST_LOSSES} times; memory may be exhausted"
-        found = _row(self.command, changed_content(self.content, row.values), row, FAILED, message)
+        found = new_row(self.command, changed_content(self.content, row.values), row, FAILED, message)
         write_row(self.folder / RUNS / row.name, found)
         return found
-
-
-class _Table:
-    """The rows of a sweep: known ones, those that arrive, and the table that is written of them."""
-
-    def __init__(self, job: SweepJob, progress: Progress, workers: int | None):
-        self.job, self._progress, self._workers = job, progress, workers
-        self.known: dict[str, dict[str, Any]] = {}
-        self.busy: set[str] = set()  # runs that other processes compute
-        self.notes: Counter[str] = Counter()
-        self._written, self._took = time.monotonic(), 0.0
-        self._place = {row.name: k for k, row in enumerate(job.rows)}
-        self._states: Counter[str] = Counter()  # of the runs of the design
-        self._take_all()
-        self._named_versions: set[str] = {version()}
-        self._name_versions()
-        self._show()
-
-    def _name_versions(self) -> None:
-        """Warn of rows that other versions have made, once of each version."""
-        number = Counter(cells["version"] for cells in self.known.values())
-        if others := [f"{number[name]} by {name}" for name in number if name not in self._named_versions]:
-            warn(f"{self.job.folder} has runs of other versions of SAND: {', '.join(others)}; this one is {version()}")
-        self._named_versions |= number.keys()
-
-    def _take_all(self) -> None:
-        """Take the rows of all runs that have ended, also those of other processes."""
-        for name, row in read_rows(self.job.folder, without=self.known):
-            self._take(name, row)
-
-    def _take(self, name: str, row: dict[str, Any]) -> None:
-        if name in self._place and name not in self.known:
-            self._states[row[STATE]] += 1
-        self.known[name] = _cells(name, row, self.job.keys, self.job.defaults)
-
-    def add(self, row: Row, found: dict[str, Any] | None) -> None:
-        """Take the row of a run that has ended; None if another process computes it."""
-        if found is None:
-            self.busy.add(row.name)
-            return
-        self._take(row.name, found)
-        self.notes.update(text for text in found.get("notes", []) if text not in self.job.notes)
-        line = f"  run {row.name} failed ({_named(row)}): {found['message']}" if found[STATE] == FAILED else ""
-        self._show(line)
-        now = time.monotonic()
-        if now - self._written > max(TABLE_EVERY, self._took / TABLE_COST):
-            self.write()
-
-    def counts(self) -> dict[str, int]:
-        """Numbers of runs of the design that are done, that failed, and that are left."""
-        states, total = self._states, len(self._place)
-        return {"runs": total, DONE: states[DONE], FAILED: states[FAILED], "left": total - states.total()}
-
-    def _show(self, line: str = "") -> None:
-        count = self.counts()
-        running = "" if self._workers is None else f"{min(self._workers, count['left'])} running, "
-        text = f"{count[DONE]} of {count['runs']} runs done, {running}{count[FAILED]} failed, {count['left']} left"
-        self._progress(text, 1.0 - count["left"] / max(count["runs"], 1), line)
-
-    def write(self) -> None:
-        """Write the table of all runs that have ended: those of the design in its order, then earlier ones."""
-        began = time.monotonic()
-        place, known = self._place, self.known
-        keys = [*self.job.keys, *sorted({key for cells in known.values() for key in cells["keys"]} - {*self.job.keys})]
-        order = sorted(known, key=lambda name: (place.get(name, len(place)), str(known[name]["values"]), name))
-        rows = []
-        for name in order:
-            cells = dict(known[name])
-            values = cells.pop("values")
-            del cells["keys"]
-            rows.append({key: values.get(key) for key in keys} | cells)
-        write_sweep(self.job.folder, rows, self.job.parquet)
-        self._written = time.monotonic()
-        self._took = self._written - began
-
-    def finish(self) -> dict[str, Any]:
-        """Write the table with the rows of all processes and, if no run is left, the results file.
-
-        Returns
-        -------
-        dict
-            The content of the results file.
-        """
-        with writing(self.job.folder, patience=PATIENCE):
-            self._take_all()
-            self._name_versions()
-            self.write()
-            count = self.counts()
-            failed = {row.name: self._message(row) for row in self.job.rows if self._state(row) == FAILED}
-            content = {"folder": str(self.job.folder), **count, "failures": failed, "version": version()}
-            if not count["left"]:
-                files.write_json(self.job.folder / self.job.RESULTS, content)
-        for text, number in self.notes.most_common(NOTES):
-            warn(f"in {number} run{'s' * (number > 1)}: {text}")
-        return content
-
-    def _state(self, row: Row) -> str | None:
-        return self.known.get(row.name, {}).get(STATE)
-
-    def _message(self, row: Row) -> str:
-        return f"{_named(row)}: {self.known[row.name]['message']}"
-
-
-def _named(row: Row) -> str:
-    """Values and seed of a run in words."""
-    return ", ".join([*(f"{key} = {value}" for key, value in row.values.items()), f"seed {row.seed}"])
-
-
-def _cells(name: str, row: dict[str, Any], keys: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, Any]:
-    """Cells of the table of one row, with its keys and their values."""
-    values = {key: value_read(row["case"], key, defaults.get(key)) for key in dict.fromkeys([*keys, *row["keys"]])}
-    values |= {key: _listed(row["keys"][key]) for key in row["keys"]}
-    shared = {"seed": row["seed"], STATE: row[STATE], **flat(row["results"])}
-    costs = {key: row[key] for key in ("message", "seconds", "cpu_seconds", "version")}
-    return {**shared, **costs, "run": name, "values": values, "keys": tuple(row["keys"])}
-
-
-def _listed(value: Any) -> Any:
-    return " ".join(map(str, value)) if isinstance(value, list) else value
-
-
-def version() -> str:
-    """The version of SAND, with the beginning of the digest of its source."""
-    return f"{__version__}+{cache_folder().name[:12]}"
-
-
-def _row(command: str, case: dict[str, Any], row: Row, state: str, message: str = "", **more: Any) -> dict[str, Any]:
-    content = {"command": command, "case": case, "keys": row.values, "seed": row.seed, STATE: state}
-    known = {"message": message, "results": {}, "seconds": 0.0, "cpu_seconds": 0.0, "notes": [], "version": version()}
-    return {**content, **known, "run": row.name, **more}
-
-
-def _texts(noted: Sequence[warnings.WarningMessage]) -> list[str]:
-    """Texts of warnings for users, each once."""
-    return list(dict.fromkeys(str(one.message) for one in noted if issubclass(one.category, UserWarning)))
-
-
-@contextmanager
-def _without_figures() -> Iterator[None]:
-    """In the block, runs draw no figure at their end, which would take longer than a short run."""
-    before = DISPLAYS.get("save figure")
-    DISPLAYS["save figure"] = lambda *_: None
-    try:
-        yield
-    finally:
-        if before is not None:
-            DISPLAYS["save figure"] = before
-
-
-def run_row(
-    command: str, base: dict[str, Any], folder: str, keeps: bool, row: Row, *, observers: Sequence[Any] = ()
-) -> dict[str, Any] | None:
-    """Compute a run of a sweep, and write its row; runs in worker processes.
-
-    Parameters
-    ----------
-    base : dict
-        Content of the case that all runs share.
-    folder : str
-        Folder of the sweep.
-    keeps : bool
-        Whether the files of the run are kept.
-
-    Returns
-    -------
-    dict or None
-        The row, also if it was there already; None if another process computes it.
-
-    Raises
-    ------
-    FilesFailed
-        If a file cannot be written.
-    """
-    place = Path(folder) / RUNS / row.name
-    place.mkdir(parents=True, exist_ok=True)
-    with warnings.catch_warnings(record=True) as noted:
-        warnings.simplefilter("always")
-        try:
-            claim = FolderLock(place, name=CLAIM)
-        except BadInput:
-            return None
-        try:
-            if (known := read_row(place)) is not None:
-                return known
-            case, began = changed_content(base, row.values), (time.monotonic(), time.process_time())
-            state, message, results = DONE, "", {}
-            try:
-                with _without_figures():
-                    results = CASES[command](case, "case").run(row.seed, place if keeps else None, observers)
-            except FilesFailed:
-                raise
-            except BadInput as error:
-                state, message = FAILED, "; ".join(error.problems)
-            except Exception as error:
-                state, message = FAILED, " ".join(f"{type(error).__name__}: {error}".split())
-            costs = {"seconds": time.monotonic() - began[0], "cpu_seconds": time.process_time() - began[1]}
-            found = _row(command, case, row, state, message, results=results, notes=_texts(noted), **costs)
-            write_row(place, found)
-            return files.plain(found)
-        finally:
-            claim.release()
 
 
 def _tables_of(section: Mapping[str, Any]) -> list[dict[str, Any]]:

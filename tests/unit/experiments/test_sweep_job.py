@@ -12,7 +12,7 @@ import pytest
 import sand
 from sand.basics.errors import BadInput, FilesFailed
 from sand.cli.main import main
-from sand.experiments import sweep_job
+from sand.experiments import sweep_job, sweep_row, sweep_table
 from sand.experiments.sweep_cases import Expected, SweptCollision
 from sand.experiments.sweep_job import SweepJob
 from sand.io.lock import FolderLock
@@ -192,7 +192,8 @@ def test_another_version_says_so(case, monkeypatch):
     """Rows name the version that made them."""
     path, _ = case
     swept(path)
-    monkeypatch.setattr(sweep_job, "version", lambda: "9.9+new")
+    for module in (sweep_row, sweep_table):
+        monkeypatch.setattr(module, "version", lambda: "9.9+new")
     with pytest.warns(UserWarning, match=r"out has runs of other versions of SAND: 12 by 0\..*; this one is 9.9\+new"):
         swept(path, {**VARY, "seeds": [7]})
     assert set(sand.open("out").table["version"]) > {"9.9+new"}
