@@ -1,12 +1,13 @@
 """Cadences of output change no bit; a condition ends a run at a step that output and interruptions do not change."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 
 import sand
-from sand.basics.state import State
+from sand.basics.state import CONTACTS, State
 from sand.cli.main import main
 from sand.io.checkpoint import newest_checkpoint
 
@@ -235,3 +236,41 @@ def finished_run_of_frames(tmp_path):
     sim.writer.draws = False
     sim.run(until="3 ns")
     return sand.open(tmp_path / "run").frames
+
+
+@pytest.mark.compiled("dipoles")
+def test_a_run_that_is_killed_after_a_new_setting_can_be_resumed(tmp_path):
+    """case.toml has the setting as soon as the next run begins, and a checkpoint, too; the bits are those without."""
+
+    class Copy(sand.Observer):
+        """Copies the folder at the first row, as after a kill."""
+
+        def see(self, simulation, row):
+            if row["time"] > 2e-9 and not (tmp_path / "killed").exists():
+                shutil.copytree(tmp_path / "run", tmp_path / "killed")
+
+    sim = gas_simulation(out=tmp_path / "run", frame_every="1 ns", observers=[Copy()])
+    sim.writer.draws = False
+    sim.run(until="2 ns")
+    sim.frame_every = "2 ns"
+    sim.run(until="6 ns")
+    resumed = sand.resume(tmp_path / "killed")
+    assert resumed.frame_every == 2e-9
+    resumed.run(until="6 ns")
+    assert state(resumed) == state(sim)
+
+
+@pytest.mark.compiled("contacts")
+def test_new_contacts_take_nothing_of_broken_ones(tmp_path):
+    """A contact that breaks may leave a column that is not finite, and the next contact in it can be saved at once."""
+    pair = sand.setup.chain(2, radius="0.1 um", material="silica").position * 1.01
+    grains = sand.Grains(pair, "0.1 um", "silica", velocity=-pair / np.linalg.norm(pair, axis=1)[:, None])
+    sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run")
+    sim.writer.draws = False
+    contacts = sim.state.contacts
+    assert sim.state.count[CONTACTS] == 0 and contacts.kept.shape[1] > 0
+    contacts.kept[...] = np.nan
+    while sim.state.count[CONTACTS] == 0:
+        sim.run(steps=10)
+    assert np.isfinite(sim.state.contacts.kept[:, 0]).all()
+    assert sand.resume(tmp_path / "run").steps == sim.steps

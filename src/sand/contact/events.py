@@ -39,7 +39,7 @@ from .mechanics import (
     time_since,
 )
 from .poses import displacements_before, pose_at
-from .slip_rules import STEP_KEPT, slipped_pose
+from .slip_rules import slipped_pose
 from .transitions import BROKEN_FLAG, PENDING_FLAG, Break, Touch, breaking_loop, clear_contact, touch_loop
 from .update import single_contact_loop
 
@@ -220,7 +220,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
         put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), scale(-1.0, n)))
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n))
         clear_contact(contacts, c, formed)
-        contacts.kept[STEP_KEPT, c] = 0.0
+        contacts.kept[:, c] = 0.0  # the column may hold those of a broken contact
         constants = constants_of_pair(grains, settings.pairings, i, j)
         first, last = (0, contacts.constants.shape[1]) if settings.uniform_contacts else (c, c + 1)
         if c == 0 or not settings.uniform_contacts:

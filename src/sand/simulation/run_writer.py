@@ -94,20 +94,19 @@ class RunWriter:
         """
         self._lock = FolderLock(self.folder)
         self._refuse_others_files(simulation.steps)
-        changed, self._changed = self._changed, False
-        ends = (criteria.time, criteria.step, criteria.stop)
-        is_new = changed or ends != self._ends
-        if is_new:
-            self._ends, self._case = ends, case_of(simulation, *ends)
+        before, self._ends = plain(self._case), (criteria.time, criteria.step, criteria.stop)
+        self._case = case_of(simulation, *self._ends)
+        case = plain(self._case)
+        # by a change, or by a setting such as `frame_every`
+        changed, self._changed = self._changed or _without_ends(case) != _without_ends(before), False
         if self._trajectory is None:
             self._open_files(simulation)
         elif changed:
             self.save(simulation)
-        # after the checkpoint, which names the case in the file before
-        if is_new:
-            text = "the complete case in SI units, with all defaults"
-            write_toml(self.folder / files.CASE, self._case, text)
-            self._written = plain(self._case)
+        # after the checkpoint, which names the case in the file before, so that one of both fits
+        if changed or case != before:
+            write_toml(self.folder / files.CASE, case, "the complete case in SI units, with all defaults")
+            self._written = case
 
     def _open_files(self, simulation: Simulation) -> None:
         """Open ledger and trajectory, or create them, and write a checkpoint."""
@@ -270,6 +269,11 @@ class RunWriter:
         if simulation.ledger.rows:
             with simulation._timer.figure():
                 DISPLAYS["save figure"](simulation, self.folder / files.FIGURE)
+
+
+def _without_ends(case: dict[str, Any]) -> dict[str, Any]:
+    """A case without the ends of its run, which `sand resume` lets the user change."""
+    return {**case, "run": case.get("run", {}) | {"until": None, "steps": None, "stop": None}}
 
 
 def _stamp(path: Path) -> tuple[str, int]:
