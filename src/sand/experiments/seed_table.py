@@ -26,10 +26,11 @@ class Interval(NamedTuple):
         return f"{self.value:.3g} ({limits}) {unit}".rstrip()
 
     def verdict(self, paper: float, reason: str, within: float = 0.0) -> str:
-        """Text "agrees" if the interval, widened by `within`, contains a paper's value; or the difference and why."""
+        """Text "agrees" if the interval contains a paper's value, "within …" of it; or the difference and why."""
         low, high = (self.low, self.high) if math.isfinite(self.low) else (self.value, self.value)
         if low - within <= paper <= high + within:
-            return "agrees" if high - low <= abs(paper) + 2.0 * within else "not decided: the interval is too wide"
+            near = "" if low <= paper <= high else f" within {within:g} of the interval"
+            return "not decided: the interval is too wide" if high - low > abs(paper) + 2 * within else "agrees" + near
         if not math.isfinite(self.value):
             return reason
         return f"{self.value - paper:+.2g}{f' ({self.value / paper - 1.0:+.0%})' if paper else ''}: {reason}"

@@ -61,10 +61,10 @@ def test_an_interval_over_seeds():
 
 
 def test_a_verdict():
-    """A value within the interval agrees; one outside has the difference and the reason."""
+    """A value within the interval agrees; of one near it this is said; others have the difference and the reason."""
     assert Interval(48.0, 44.0, 52.0).verdict(50.0, "why") == "agrees"
     assert Interval(48.0, 44.0, 52.0).verdict(80.0, "why") == "-32 (-40%): why"
-    assert Interval(48.0, 44.0, 52.0).verdict(53.0, "why", within=1.0) == "agrees"
+    assert Interval(48.0, 44.0, 52.0).verdict(53.0, "why", within=1.0) == "agrees within 1 of the interval"
     assert Interval(math.nan).verdict(50.0, "why") == "why"
 
 
@@ -107,7 +107,11 @@ def test_mass_ratios_are_compared():
     rows = growth_rows(50.0, bodies="500 + 500") + growth_rows(60.0, bodies="500 + 4000")
     other, one, ratio = compare_mass_ratios(rows)
     assert one.ours.startswith("50 (50 … 50) m/s") and one.verdict.startswith("-26 (-35%)")
-    assert other.what == "critical speed of 500 + 4000" and ratio.ours.startswith("1.2") and ratio.verdict == "agrees"
+    assert (
+        other.what == "critical speed of 500 + 4000"
+        and ratio.ours.startswith("1.2")
+        and ratio.verdict.startswith("agrees")
+    )
 
 
 def test_the_exponent_of_a_parameter():
@@ -132,8 +136,8 @@ def test_compression_is_compared():
         for energy in np.geomspace(0.45 * SAME["roll_energy"], 19.0 * 998.0 * SAME["break_energy"], 60)
     ]  # fmt: skip
     exponent, disruption = compare_compression(rows)
-    assert exponent.ours.startswith("-0.1 (") and exponent.verdict == "agrees"
-    assert disruption.ours.startswith("10 (") and disruption.verdict == "agrees"
+    assert exponent.ours.startswith("-0.1 (") and exponent.verdict.startswith("agrees")
+    assert disruption.ours.startswith("10 (") and disruption.verdict.startswith("agrees")
 
 
 def test_a_chain_is_compared():
@@ -149,7 +153,7 @@ def test_a_chain_is_compared():
     ]  # fmt: skip
     slow, fast = compare_chain(rows)
     assert slow.ours.startswith("1.9 (") and fast.ours.startswith("2.5 (")
-    assert (slow.verdict, fast.verdict) == ("agrees", "agrees")
+    assert slow.verdict.startswith("agrees") and fast.verdict.startswith("agrees")
 
 
 @pytest.mark.compiled("contacts")
