@@ -10,6 +10,9 @@ from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.errors import BadInput
 from ..basics.units import seed_given, whole_number
 
+SMALLEST = 1e-3
+"""Largest impact parameter in units of b_max below which lengths in metres were probably given for fractions."""
+
 __all__ = ["ImpactAverage", "impact_average", "impact_parameters", "impact_weights"]
 
 
@@ -102,7 +105,8 @@ def impact_average(
     Raises
     ------
     BadInput
-        If columns have different lengths, values are not finite, or impact parameters are out of range.
+        If columns have different lengths, values are not finite, or impact parameters are out of range, or lengths
+        without `most`.
     """
     columns = [np.asarray(each, float) for each in (values, b, seeds)]
     if len({each.shape for each in columns}) != 1 or columns[0].ndim != 1 or not columns[0].size:
@@ -118,6 +122,8 @@ def impact_average(
             return _result(mean, (sums - mean * counts) / counts.mean() + mean, len(f))
         return _result(float(f.mean()), sums / counts, len(f))
     different, which = np.unique(impact, return_inverse=True)
+    if most is None and 0.0 < different[-1] < SMALLEST:
+        raise BadInput(f"most is missing: impact parameters up to {different[-1]:g} are no fractions; give b_max")
     weights = impact_weights(different, 1.0 if most is None else most)
     names, groups = np.unique(seed, return_inverse=True)
     table = np.full((len(names), len(different)), np.nan)
