@@ -10,9 +10,6 @@ from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.errors import BadInput
 from ..basics.units import seed_given, whole_number
 
-SMALLEST = 1e-3
-"""Largest impact parameter in units of b_max below which lengths in metres were probably given for fractions."""
-
 __all__ = ["ImpactAverage", "impact_average", "impact_parameters", "impact_weights"]
 
 
@@ -122,7 +119,7 @@ def impact_average(
             return _result(mean, (sums - mean * counts) / counts.mean() + mean, len(f))
         return _result(float(f.mean()), sums / counts, len(f))
     different, which = np.unique(impact, return_inverse=True)
-    if most is None and 0.0 < different[-1] < SMALLEST:
+    if most is None and 0.0 < different[-1] < 1e-3:  # lengths in metres
         raise BadInput(f"most is missing: impact parameters up to {different[-1]:g} are no fractions; give b_max")
     weights = impact_weights(different, 1.0 if most is None else most)
     names, groups = np.unique(seed, return_inverse=True)

@@ -322,9 +322,8 @@ class State:
             If an array is missing or has another shape.
         """
         if "clock" in saved and LEAST_CLOCK <= saved["clock"].size < len(CLOCK):
-            clock = np.pad(saved["clock"], (0, len(CLOCK) - saved["clock"].size))
-            clock[max(CHANGED, saved["clock"].size) :] = clock[TIME]
-            saved = saved | {"clock": clock}
+            known = np.pad(saved["clock"], (0, max(CHANGED - saved["clock"].size, 0)))
+            saved = saved | {"clock": np.append(known, np.full(len(CLOCK) - known.size, known[TIME]))}
         for name in ("clock", "count", "lost", "cutoff"):
             _copy_into(getattr(self, name), saved, name)
         if "order" in saved:
