@@ -102,7 +102,8 @@ def impact_average(
     Raises
     ------
     BadInput
-        If columns have different lengths, values are not finite, or impact parameters are out of range.
+        If columns have different lengths, values are not finite, or impact parameters are out of range, or lengths
+        without `most`.
     """
     columns = [np.asarray(each, float) for each in (values, b, seeds)]
     if len({each.shape for each in columns}) != 1 or columns[0].ndim != 1 or not columns[0].size:
@@ -118,6 +119,8 @@ def impact_average(
             return _result(mean, (sums - mean * counts) / counts.mean() + mean, len(f))
         return _result(float(f.mean()), sums / counts, len(f))
     different, which = np.unique(impact, return_inverse=True)
+    if most is None and 0.0 < different[-1] < 1e-3:  # lengths in metres
+        raise BadInput(f"most is missing: impact parameters up to {different[-1]:g} are no fractions; give b_max")
     weights = impact_weights(different, 1.0 if most is None else most)
     names, groups = np.unique(seed, return_inverse=True)
     table = np.full((len(names), len(different)), np.nan)

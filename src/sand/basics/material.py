@@ -162,7 +162,7 @@ _DT97, _W07, _W08 = "ApJ 480, 647", "ApJ 661, 320, doi:10.1086/514332", "ApJ 677
 _W09, _W13, _K13 = "ApJ 702, 1490", "A&A 559, A62", "A&A 554, A4"
 _S12, _T19 = "A&A 541, A59, arXiv:1203.3630", "ApJ 874, 159, arXiv:1902.08356"
 _T23, _A22 = "ApJ 953, 6, arXiv:2306.09259", "ApJ 939, 100, arXiv:2210.00913"
-_PROGRAM = "abstract; material: default of the public program of the first author; factors from memory"
+_PROGRAM = "abstract; material and factors: Silicate.mat of the public program of the first author"
 PAPERS = (
     _paper("ice (Dominik & Tielens 1997)", 1000.0, (0.37, 7.0e9, 0.25), 2e-10, _DT97, stiffness="dt97"),
     _paper("quartz (Dominik & Tielens 1997)", 2600.0, _SILICA, 2e-10, _DT97, stiffness="dt97"),
@@ -174,7 +174,7 @@ PAPERS = (
     _paper(
         "silica (Seizinger et al. 2012)",
         2650.0,
-        _SILICA,
+        (0.02, 54.0e9, 0.17),
         20e-10,
         _S12,
         _PROGRAM,

@@ -69,7 +69,8 @@ CLOCK = (
 EXTREMES, SUMS = (LARGEST_LOAD, LARGEST_OVERLAP, CHANGED, SLID), (SOME_AWAKE, CORRECTED)
 """Entries that are the largest, or latest, of all parts of the grains, and that add up over parts."""
 LEAST_CLOCK = LARGEST_OVERLAP
-"""Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0."""
+"""Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0, but the times of
+the last events at its time, because nothing is known of the contacts before."""
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
@@ -321,7 +322,8 @@ class State:
             If an array is missing or has another shape.
         """
         if "clock" in saved and LEAST_CLOCK <= saved["clock"].size < len(CLOCK):
-            saved = saved | {"clock": np.pad(saved["clock"], (0, len(CLOCK) - saved["clock"].size))}
+            known = np.pad(saved["clock"], (0, max(CHANGED - saved["clock"].size, 0)))
+            saved = saved | {"clock": np.append(known, np.full(len(CLOCK) - known.size, known[TIME]))}
         for name in ("clock", "count", "lost", "cutoff"):
             _copy_into(getattr(self, name), saved, name)
         if "order" in saved:

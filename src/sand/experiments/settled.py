@@ -37,13 +37,31 @@ def expected_breaks(energy: Any, breaking: Any, modes: Any, attempts: Any) -> np
     energy, breaking : ndarray
         E ≥ 0, the energy of the vibrations of each body, and E_b > 0, to break its weakest contact [J], (K,).
     modes : ndarray
-        s, number of modes: 6N − 6 for N grains, (K,).
+        s, number of modes, see `modes_of`, (K,).
     attempts : ndarray
         A, number of vibrations of all its contacts in the time that is asked for, (K,).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(energy > breaking, 1.0 - np.asarray(breaking) / energy, 0.0)
     return np.where(share > 0.0, attempts * share ** (np.maximum(modes, 1) - 1.0), 0.0)
+
+
+@checked
+def modes_of(grains: Any, contacts: Any, springs: int) -> np.ndarray:
+    """Number of modes that share the energy of each body: 6N − 6, but no more than it has springs.
+
+    Without springs against sliding, rolling or twisting there are fewer modes, and more of the energy for each. In a
+    pair the motion along the line of the centres is apart from all others: 1.
+
+    Parameters
+    ----------
+    grains, contacts : ndarray
+        Numbers N of grains and C of contacts of each body (K,).
+    springs : int
+        Springs of a contact, see `springs_of`.
+    """
+    count = np.asarray(grains)
+    return np.where(count == 2, 1, np.minimum(6 * count - 6, springs * np.asarray(contacts)))
 
 
 @checked
@@ -184,8 +202,9 @@ def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
     lonely = motion.grains[of_contact] == 2
     energy[of_contact[lonely]] = _energy_along(grains, pairs[lonely]) + (table["energy_normal"] - strength.rest)[lonely]
     frequency = np.sqrt(state.contacts.constants[FASTEST_MODE].max()) / (2.0 * np.pi)
-    attempts = (HORIZON - 1.0) * simulation.time * frequency * np.bincount(of_contact, minlength=count)
-    modes = np.where(motion.grains == 2, 1, 6 * motion.grains - 6)
+    contacts = np.bincount(of_contact, minlength=count)
+    attempts = (HORIZON - 1.0) * simulation.time * frequency * contacts
+    modes = modes_of(motion.grains, contacts, springs_of(contact_model(simulation)))
     if expected_breaks(energy, weakest, modes, attempts).sum() > MOST_BREAKS:
         return False
     found = swings(grains, pairs, simulation.box)
@@ -203,10 +222,20 @@ def _energy_along(grains: Any, pairs: np.ndarray) -> np.ndarray:
     return 0.5 * mass[one] * mass[other] / (mass[one] + mass[other]) * opening**2
 
 
+def contact_model(simulation: Simulation) -> Contact | None:
+    """The contact model of a simulation, if there is one."""
+    return next((force for force in simulation.forces if isinstance(force, Contact)), None)
+
+
+def springs_of(model: Contact | None) -> int:
+    """Springs of a contact: one along the line of centres, two against sliding, two against rolling, one of twist."""
+    factors = () if model is None else ((model.slide_factor, 2), (model.roll_factor, 2), (model.twist_factor, 1))
+    return 1 + sum(number for factor, number in factors if factor > 0.0)
+
+
 def strength_of(simulation: Simulation, pairs: np.ndarray) -> Strength:
     """`Strength` of each contact, (C,) each; 0 where grains have no contact model."""
-    grains = simulation.grains
-    model = next((force for force in simulation.forces if isinstance(force, Contact)), None)
+    grains, model = simulation.grains, contact_model(simulation)
     if model is None:
         return Strength(*np.zeros((len(Strength._fields), len(pairs))))
     kinds, radii, material = grains.materials, np.asarray(grains.radius).tolist(), np.asarray(grains.material).tolist()

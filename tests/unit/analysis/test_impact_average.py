@@ -78,6 +78,8 @@ def test_without_a_second_seed_there_is_no_interval():
         (lambda: impact_average([1.0, 2.0], [0.1], [1, 2]), "columns of equal length"),
         (lambda: impact_average([1.0, np.nan], [0.1, 0.2], [1, 2]), "values must be finite"),
         (lambda: impact_average([1.0, 2.0], [0.1, 1.2], [1, 2]), "from 0 to most"),
+        # lengths [m] as in the table of a sweep, of which the largest would get all the weight
+        (lambda: impact_average([1.0, 2.0], [1e-7, 2e-7], [1, 1]), "most is missing: .* up to 2e-07 are no fractions"),
         (lambda: impact_weights(np.array([0.1, 0.1]), 1.0), "different from each other"),
         (lambda: impact_parameters(0), "number = 0"),
         (lambda: impact_parameters(3, -1.0), "most = -1.0 must be above 0"),

@@ -72,5 +72,5 @@ def test_a_miss_ends_and_says_why():
     extent = float(np.ptp(sim.grains.position, axis=0).max())
     sim.run(until=sim.time + 4.0 * extent / 1.0)
     assert sim.ledger["made"][-1] == 0
-    hit, _ = collide(*bodies, speed=1.0, impact_parameter="0.1 b")
-    assert hit.made > 0 and hit.end == "the fragments are apart and hold together"
+    hit, _ = collide(*bodies, speed=0.3, impact_parameter="0.1 b")  # slow: they stick
+    assert (hit.outcome, hit.end) == ("stick", "one body is left and holds together")

@@ -8,11 +8,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import sand
+from sand.analysis.clusters import cluster_labels
 from sand.basics.state import BROKEN, CHANGED, MADE, SLID
 from sand.contact.jkr import LAW
 from sand.contact.law import contact_strength
 from sand.experiments.collision import Ending, approach, collide, latest_end, prepare, run_to_end
-from sand.experiments.settled import expected_breaks, swing_time, swings
+from sand.experiments.settled import are_settled, expected_breaks, modes_of, springs_of, swing_time, swings
 from sand.setup import bpca, chain, grain
 from sand.theory import contact
 
@@ -41,6 +42,37 @@ def test_energy_shared_by_modes_at_random():
         7.0,
         0.0,
     ]
+
+
+def test_modes_are_at_most_as_many_as_springs():
+    """6N − 6 with all springs; 3N − 6 = 6 of a tetrahedron of grains without friction; 1 of a pair."""
+    grains, contacts = np.array([1, 2, 4, 5]), np.array([0, 1, 6, 4])
+    assert modes_of(grains, contacts, springs_of(sand.Contact())).tolist() == [0, 1, 18, 24]
+    smooth = sand.Contact(slide_factor=0, roll_factor=0, twist_factor=0)
+    assert modes_of(grains, contacts, springs_of(smooth)).tolist() == [0, 1, 6, 4]
+    assert springs_of(sand.Contact(roll_factor=0)) == 4
+
+
+def at_contact(position, contact, velocity=(0.0, 0.0, 0.0)):
+    """Silica grains that touch, a few steps after the start."""
+    sim = sand.Simulation(sand.Grains(position, R, "silica", velocity=velocity), [contact])
+    sim.run(steps=3)
+    assert (cluster_labels(len(position), sim.contacts["pair"]) == 0).all()
+    return sim
+
+
+@pytest.mark.compiled("contacts")
+def test_fewer_modes_have_more_energy_each():
+    """A tetrahedron that swells with 1.5 E_b holds together as 18 modes share this, not as six of them do."""
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / math.sqrt(3.0)
+    numbers = contact("silica", R)
+    edge = math.sqrt(8.0 / 3.0)  # of corners at distance 1
+    position = corners * (2.0 * R - numbers.rest_overlap) / edge
+    mass = float(grain(radius=R, material="silica").mass[0])
+    velocity = corners * math.sqrt(2.0 * 1.5 * numbers.break_energy / (4.0 * mass))
+    smooth = sand.Contact(slide_factor=0, roll_factor=0, twist_factor=0)
+    for model, settled in ((sand.Contact(), True), (smooth, False)):
+        assert are_settled(at_contact(position, model, velocity), np.zeros(4, int)) is settled
 
 
 def test_time_of_a_swing():

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import sand
-from sand.basics.state import BROKEN, CLOCK, IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP, LEAST_CLOCK
+from sand.basics.state import BROKEN, CHANGED, CLOCK, IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP, LEAST_CLOCK
 from sand.contact.dmt import LAW as DMT
 from sand.contact.impact import impact_share
 from sand.contact.jkr import LAW as JKR
@@ -203,14 +203,17 @@ def test_a_grain_pressed_between_walls_is_warned_of():
         assert len(found) == warned and all(text.startswith(OVERLAP) for text in found)
 
 
-def test_a_clock_of_an_earlier_version_goes_on_from_zero():
-    """A checkpoint without the extremes, as in tests/reference, is read; they begin at 0."""
+def test_a_clock_of_an_earlier_version_goes_on():
+    """A checkpoint without the extremes, as in tests/reference, is read: they begin at 0, times of events at its time.
+
+    With events at 0 a collision that is resumed would count as at rest for all the time before.
+    """
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], "1 um", "silica"), [sand.Contact()])
     state = sim.regular_state
     saved = {name: array.copy() for name, array in state.to_arrays().items()}
     saved["clock"] = np.arange(1.0, LEAST_CLOCK + 1.0)
     state.from_arrays(saved)
-    assert state.clock.tolist() == [*saved["clock"], *[0.0] * (len(CLOCK) - LEAST_CLOCK)]
+    assert state.clock.tolist() == [*saved["clock"], *[0.0] * (CHANGED - LEAST_CLOCK), state.time, state.time]
 
 
 # --- spins ---------------------------------------------------------------------------------------------------------

@@ -42,6 +42,18 @@ def test_rolling_energy_of_kataoka():
     assert row.roll_energy == pytest.approx(by_hand, rel=1e-12, abs=0.0)
 
 
+def test_material_file_of_seizinger():
+    """Materials/Silicate.mat of their program: r₀ [cm], ρ [g/cm³], γ [erg/cm²], ν, E [dyn/cm²], ξ_c [cm], and factors.
+
+    Not what the program takes without a file, 25 erg/cm² and factors of 1.
+    """
+    row = ROWS[SEIZINGER]
+    found = row.radius, row.density, row.surface_energy, row.poisson_ratio, row.young_modulus, row.rolling_limit
+    expected = (6e-5 * 1e-2, 2.65 * 1e3, 20 * 1e-3, 0.17, 5.4e11 * 0.1, 2e-7 * 1e-2)
+    assert found == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert contact_settings(SEIZINGER) == {"roll_factor": 8.0, "slide_factor": 2.5}
+
+
 def test_factor_of_rolling():
     """A contact with `roll_factor` m needs m times the work against friction: k_r R ξ_c is the moment, rolled by π."""
     row, factor = ROWS[SEIZINGER], contact_settings(SEIZINGER)["roll_factor"]
