@@ -452,4 +452,4 @@ def test_resume_of_a_sweep_with_failed_runs(case, capsys):
     content = SweepJob(path, "out", VARY).run()
     write_json(Path("out/sweep.json"), {**content, "done": 11, "failed": 1})
     assert main(["resume", "out"]) == 3
-    assert "1 of its 12 runs failed: to compute them again, call sand sweep with --retry" in capsys.readouterr().out
+    assert "1 of its 12 runs failed: to compute them again, sand sweep with --retry" in capsys.readouterr().out
