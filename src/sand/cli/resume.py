@@ -87,9 +87,8 @@ def _job(kind: str, folder: Path, case: Path, how: dict[str, Any]) -> int | None
     file, module, name, command = JOBS[kind]
     if (folder / file).exists():
         content = {**read_json(folder / file), "folder": str(folder)}
-        failed = content.get("failed", 0) if kind == "sweep" else 0
         text = f"{folder} is finished; its results are in {folder / (SWEEP_CSV if kind == 'sweep' else file)}"
-        if failed:
+        if failed := content.get("failed"):  # of a sweep
             text += f"; {failed} of its {content['runs']} runs failed: to compute them again, sand sweep with --retry"
         report.answer(content, text, [], as_json=how["as_json"], quiet=how["quiet"])
         return PHYSICS if failed else None
