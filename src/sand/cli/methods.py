@@ -198,7 +198,7 @@ def _collision(case: Any, summary: dict[str, Any]) -> Sentences:
 
     for name, body in (("target", case.target), ("projectile", case.projectile)):
         yield f"The {name} was: {section(body)}."
-    yield f"They collided with {section(case.impact, 'seeds', 'out')}; b is the sum of the outer radii."
+    yield f"They collided with {section(case.impact, 'seeds', 'out')}; b, c: sums of outer, characteristic radii."
     used = [case.target.material, case.projectile.material, *case.materials]
     yield from _common(case, used, summary, case.physics()[0])
 

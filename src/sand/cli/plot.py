@@ -185,6 +185,8 @@ def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
     from ..results import Sweep
 
     sweep = Sweep(folder)
+    if not len(sweep.done["run"]):
+        raise BadInput(f"{folder} has no run that is done, and nothing to draw")
     if what is None:
         return sweep.shown
     allowed = [*sweep.results, *([GROWTH] if set(OF_GROWTH).issubset(sweep.table) else [])]
@@ -193,6 +195,8 @@ def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
         raise BadInput(
             f"--what {GROWTH} would average over {', '.join(mixed)}; give columns, such as growth_efficiency"
         )
+    if GROWTH in what and not {"impact.speed", "speed"} & sweep.table.keys() and GROWTH in allowed:
+        raise BadInput(f"--what {GROWTH} needs a sweep over impact.speed; give columns, such as growth_efficiency")
     if wrong := [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in what if name not in allowed]:
         raise BadInput(wrong)
     return what

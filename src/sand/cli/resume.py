@@ -12,9 +12,10 @@ import click
 
 from ..basics.errors import BadInput
 from ..basics.threads import set_threads
-from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, SWEEP, read_json
+from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, SWEEP, SWEEP_CSV, read_json
 from . import options, parsing, report
 from .collide import collide
+from .exits import PHYSICS
 from .grow import grow
 from .scatter import scatter
 from .sweep import sweep
@@ -86,9 +87,11 @@ def _job(kind: str, folder: Path, case: Path, how: dict[str, Any]) -> int | None
     file, module, name, command = JOBS[kind]
     if (folder / file).exists():
         content = {**read_json(folder / file), "folder": str(folder)}
-        text = f"{folder} is finished; its results are in {folder / file}"
+        text = f"{folder} is finished; its results are in {folder / (SWEEP_CSV if kind == 'sweep' else file)}"
+        if failed := content.get("failed"):  # of a sweep
+            text += f"; {failed} of its {content['runs']} runs failed: to compute them again, sand sweep with --retry"
         report.answer(content, text, [], as_json=how["as_json"], quiet=how["quiet"])
-        return None
+        return PHYSICS if failed else None
     if kind == "scatter":
         del how["threads"]  # a flight uses one thread
     made = getattr(import_module(f"sand.experiments.{module}"), name)

@@ -261,6 +261,8 @@ def key_error(model: type, content: Mapping[str, Any], key: str) -> str | None:
             names = keys_at(model, tuple(parts[:k])) or list(node)
         else:
             return f"{key}: {place} is no table"
+        if name not in names and place == "materials" and not names:
+            return f"{key}: the case has no table [materials.{name}]; add it to the case file"
         if name not in names:
             where = f"[{place}] has" if place else "there are the tables"
             return f"{key}: there is no such key; {where}: {', '.join(names)}"

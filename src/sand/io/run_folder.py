@@ -86,7 +86,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
     ------
     BadInput
         If the folder is not empty, or another process writes to it; with `overwrite` if it holds files, but none shows
-        that a run or job of SAND wrote them.
+        that a run or job of SAND wrote them, or a sweep.
     FilesFailed
         If it cannot be created or written to.
     """
@@ -102,6 +102,8 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     f"folder {folder} exists and is not empty; give another one, remove it, "
                     "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
+            if (folder / SWEEP_CSV).exists():
+                raise BadInput(f"{folder} holds a sweep, which is not replaced: give another folder, or remove it")
             found = files_of_runs(folder)
             if found and not shows_a_run(folder):
                 names = ", ".join(path.name for path in found)

@@ -38,7 +38,8 @@ def sweep_figure(table: Mapping[str, np.ndarray], keys: Sequence[str], what: str
     x_key = max(keys, key=lambda key: distinct[key], default="seed")
     x, unit = _numbers(table[x_key])
     others = [key for key in keys if key != x_key and distinct[key] > 1]
-    groups = [", ".join(f"{key.rpartition('.')[2]} = {table[key][k]}" for key in others) for k in range(len(x))]
+    short = {key: [f"{v:.4g}" if isinstance(v, float) else str(v) for v in table[key].tolist()] for key in others}
+    groups = [", ".join(f"{key.rpartition('.')[2]} = {short[key][k]}" for key in others) for k in range(len(x))]
     column = table[what]
     words = sorted(set(column.tolist())) if column.dtype.kind in "Ub" else [""]
     with plot_style():

@@ -125,6 +125,7 @@ def test_changed_content():
         ("angle.of", "there is no such key; there are the tables: target, projectile, impact, materials, forces, "),
         ("impact", "is a table; give one of its keys: speed, "),
         ("forces.dipoles.cutoff", "the case has no table [forces.dipoles]; add it to the case file"),
+        ("materials.ice.density", "the case has no table [materials.ice]; add it to the case file"),
         ("impact.speed.x", "impact.speed is no table"),
     ],
 )

@@ -16,6 +16,7 @@ from sand.experiments import sweep_job, sweep_row, sweep_table
 from sand.experiments.sweep_cases import Expected, SweptCollision
 from sand.experiments.sweep_job import SweepJob
 from sand.io.lock import FolderLock
+from sand.io.run_folder import make_folder, write_json
 from sand.io.sweep_files import CLAIM, COST
 
 CASE = """
@@ -317,7 +318,7 @@ def test_resume_and_info(case, capsys):
     assert main(["info", "out"]) == 0
     assert "finished: 12 of 12 done, 0 failed" in capsys.readouterr().out
     assert main(["resume", "out"]) == 0
-    assert "out is finished; its results are in out/sweep.json" in capsys.readouterr().out
+    assert "out is finished; its results are in out/sweep.csv" in capsys.readouterr().out
 
 
 def test_python_call_open_and_plot(case):
@@ -430,3 +431,26 @@ def test_growth_of_a_sweep_is_drawn(case, monkeypatch, capsys):
     capsys.readouterr()
     assert main(["plot", "sizes", "--what", "growth"]) == 2
     assert "would average over target.grains; give columns" in capsys.readouterr().err
+    assert main([*words, "--vary", "impact.impact_parameter=0 b,0.5 b", "--out", "parameters"]) == 0
+    capsys.readouterr()
+    assert main(["plot", "parameters", "--what", "growth"]) == 2
+    assert "needs a sweep over impact.speed" in capsys.readouterr().err
+
+
+def test_others_do_not_replace_a_sweep(case, capsys):
+    """A run or collision with --overwrite leaves the table of a sweep as it is."""
+    path, _ = case
+    SweepJob(path, "out", VARY).run()
+    before = Path("out/sweep.csv").read_bytes()
+    with pytest.raises(BadInput, match="out holds a sweep, which is not replaced: give another folder, or remove it"):
+        make_folder("out", overwrite=True)
+    assert Path("out/sweep.csv").read_bytes() == before and Path("out/case.toml").exists()
+
+
+def test_resume_of_a_sweep_with_failed_runs(case, capsys):
+    """A finished sweep of which runs failed is named as such, with the exit code of a failed run."""
+    path, _ = case
+    content = SweepJob(path, "out", VARY).run()
+    write_json(Path("out/sweep.json"), {**content, "done": 11, "failed": 1})
+    assert main(["resume", "out"]) == 3
+    assert "1 of its 12 runs failed: to compute them again, sand sweep with --retry" in capsys.readouterr().out
