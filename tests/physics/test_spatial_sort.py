@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore:grains overlap too deeply",
 )
 
-LIST_ARRAYS = ("order", "packed_position", "packed_moment", "squared_distance", "packed_grain", "block_sums", "cell_of")
+LIST_ARRAYS = ("order", "packed_position", "packed_moment", "near", "packed_grain", "block_sums", "cell_of")
 """Long-range arrays that belong to the pair list or are filled by each sum."""
 SORT_EVERY = 700
 """Steps between two sorts in these tests."""

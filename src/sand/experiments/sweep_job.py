@@ -276,6 +276,9 @@ class SweepJob(Job):
             raise BadInput(f"{self.folder} is a file; give another folder with --out")
         if not files.is_used(self.folder):
             return
+        if not path.exists() and (self.folder / files.LOCK).exists():
+            with writing(self.folder, patience=PATIENCE):  # wait for another process that is about to write it
+                pass
         content = files.read_toml(path) if files.was_written_by_sand(path) else {}
         if "sweep" not in content:
             kind = f"a job or run of `sand {command_for(content)}`" if command_for(content) else "other files"

@@ -274,7 +274,7 @@ def build_grid(long_range, sorted_position, anchor, span, reach):
 def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
     """Append the sorted indices of all neighbours of s within the reach to `neighbour`, after the first `used` entries.
 
-    `squared_distance` serves as a buffer.
+    `near` serves as a buffer.
 
     Parameters
     ----------

@@ -271,7 +271,7 @@ def test_contacts_alone_have_no_room_for_other_forces():
         far, contacts = sim.state.long_range, sim.state.contacts
         assert far.force.size == far.torque.size == far.anchor.size == far.start.size == 0
         assert far.packed_position.size == far.packed_moment.size == far.packed_grain.size == 0
-        assert far.squared_distance.size == far.order.size == 64
+        assert far.near.size == far.order.size == 64
         assert contacts.damping.shape == (12, contacts.twist.size if damping == "critical" else 0)
         assert len(contacts.lost) == (6 if damping == "critical" else 4)
         near = sim.state.pair_list
