@@ -19,7 +19,7 @@ CAPABILITIES = {
     "loops over contacts by what they did in the last step, with displacements that these keep; sums of dense packings "
     "side by side; cells of neighbour lists that are shifted across a periodic wall as a whole": 273,
     "end of a collision when its outcome is decided, kinds of outcomes, averages over impact parameters": 445,
-    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 1265,
+    "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 1274,
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,

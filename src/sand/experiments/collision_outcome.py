@@ -210,6 +210,8 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
     counts = np.bincount(labels)
     largest, heaviest = labels == order[0], masses[order[:2]].tolist()
     m1, m2 = float(target.mass.sum()), float(projectile.mass.sum())
+    equal = np.ptp(grains.mass) == 0.0  # numbers of grains are exact: 1 where bodies stick, 0 where they miss
+    sizes = (len(target), len(projectile), int(counts[order[0]])) if equal else (m1, m2, heaviest[0])
     made, broken, bodies = int(row["made"]), int(row["broken"]), (target, projectile)
     touching = [body.touching(Box.open())[0] for body in bodies]
     joined = np.vstack((touching[0], touching[1] + len(target)))
@@ -226,7 +228,7 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
         grains_before=(len(target), len(projectile)),
         largest_remnant=float(masses[order[0]] / masses.sum()),
         second_remnant=float([*heaviest, 0.0][1] / masses.sum()),
-        growth_efficiency=growth_efficiency(m1, m2, heaviest[0]),
+        growth_efficiency=growth_efficiency(*sizes),
         made=made,
         moved=int(row["moved"]),
         broken=broken,

@@ -40,7 +40,7 @@ from .sweep_design import (
     value_read,
     without_keys,
 )
-from .sweep_row import Row, named, new_row, run_row, texts_of
+from .sweep_row import Row, kind_of, named, new_row, run_row, texts_of
 from .sweep_table import NOTES, PATIENCE, SweepTable
 
 MOST_LOSSES = 3
@@ -193,7 +193,7 @@ class SweepJob(Job):
                     found.append(self.kind(changed_content(self.content, row.values), place).expected(row.seed))
                 except BadInput as error:
                     errors.problems += error.at(place).problems
-        self.notes = texts_of(noted)
+        self.notes = list({kind_of(text): text for text in texts_of(noted)[::-1]}.values())[::-1]
         for text in self.notes[:NOTES]:
             warn(text)
         errors.done()

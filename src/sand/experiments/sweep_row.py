@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 import warnings
 from collections.abc import Iterator, Sequence
@@ -43,6 +44,11 @@ def new_row(command: str, case: dict[str, Any], row: Row, state: str, message: s
     content = {"command": command, "case": case, "keys": row.values, "seed": row.seed, STATE: state}
     known = {"message": message, "results": {}, "seconds": 0.0, "cpu_seconds": 0.0, "notes": [], "version": version()}
     return {**content, **known, "run": row.name, **more}
+
+
+def kind_of(text: str) -> str:
+    """Text of a warning without its numbers: the same for all runs that it concerns."""
+    return re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "#", text)
 
 
 def texts_of(noted: Sequence[warnings.WarningMessage]) -> list[str]:

@@ -14,7 +14,7 @@ from ..io.lock import writing
 from ..io.sweep_files import DONE, FAILED, STATE, flat, read_rows, write_sweep
 from .job import Progress
 from .sweep_design import value_read
-from .sweep_row import Row, named, version
+from .sweep_row import Row, kind_of, named, version
 
 TABLE_EVERY, TABLE_COST = 30.0, 0.02
 """Shortest wall time [s] between two tables of an unfinished sweep, and the largest part of the time that they take."""
@@ -57,10 +57,11 @@ class SweepTable:
         parquet: bool,
     ):
         self._folder, self._rows, self._defaults = folder, rows, defaults
-        self._progress, self._workers, self._shown, self._parquet = progress, workers, shown, parquet
+        self._progress, self._workers, self._parquet = progress, workers, parquet
         self.known: dict[str, dict[str, Any]] = {}
         self.busy: set[str] = set()  # runs that other processes compute
-        self.notes: Counter[str] = Counter()
+        self._shown = {kind_of(text) for text in shown}
+        self.notes: dict[str, list[str]] = {}  # warnings of runs by their kind
         self._written, self._took = time.monotonic(), 0.0
         self._place = {row.name: k for k, row in enumerate(rows)}
         self._states: Counter[str] = Counter()  # of the runs of the design
@@ -92,7 +93,9 @@ class SweepTable:
             self.busy.add(row.name)
             return
         self._take(row.name, found)
-        self.notes.update(text for text in found.get("notes", []) if text not in self._shown)
+        for text in found.get("notes", []):
+            if (kind := kind_of(text)) not in self._shown:
+                self.notes.setdefault(kind, []).append(text)
         line = f"  run {row.name} failed ({named(row)}): {found['message']}" if found[STATE] == FAILED else ""
         self._show(line)
         now = time.monotonic()
@@ -146,8 +149,9 @@ class SweepTable:
             content = {"folder": str(self._folder), **count, "failures": failed, "version": version()}
             if not count["left"]:
                 files.write_json(self._folder / files.SWEEP, content)
-        for text, number in self.notes.most_common(NOTES):
-            warn(f"in {number} run{'s' * (number > 1)}: {text}")
+        for texts in sorted(self.notes.values(), key=len, reverse=True)[:NOTES]:
+            example = ", for example" if len(set(texts)) > 1 else ""
+            warn(f"in {len(texts)} run{'s' * (len(texts) > 1)}{example}: {texts[0]}")
         return content
 
     def _state(self, row: Row) -> str | None:

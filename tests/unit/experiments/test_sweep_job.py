@@ -4,6 +4,7 @@ import csv
 import json
 import threading
 import time
+import warnings
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -178,6 +179,24 @@ def test_failed_runs(case, capsys):
         SweptCollision.run = real
     assert sorted(calls) == [13.0, 13.0, 14.0, 14.0]
     assert [r["state"] for r in rows("out")] == ["done"] * 6
+
+
+def test_warnings_that_differ_in_numbers_are_one_note(case, monkeypatch):
+    """Each run warns of its own speed, and one of something else: two notes, with the numbers of runs."""
+    path, _ = case
+    real = SweptCollision.run
+
+    def run(self, seed, folder, observers=()):
+        warnings.warn(f"grains at {1.1 * self.case.impact.speed} m/s are fast", UserWarning, stacklevel=1)
+        if seed == 5 and self.case.impact.speed == 2.0 and self.case.target.grains == 3:
+            warnings.warn("the step is long", UserWarning, stacklevel=1)
+        return real(self, seed, folder, observers)
+
+    monkeypatch.setattr(SweptCollision, "run", run)
+    with pytest.warns(UserWarning) as noted:
+        swept(path)
+    texts = [str(one.message) for one in noted]
+    assert texts[0].startswith("in 12 runs, for example: grains at ") and texts[1:] == ["in 1 run: the step is long"]
 
 
 def test_a_full_disk_stops_the_sweep(case):
