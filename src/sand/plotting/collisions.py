@@ -24,8 +24,8 @@ LOOKS = dict(
     )
 )
 """Colour and marker of each kind."""
-ASIDE = 0.03
-"""Shift of the marks of one seed beside those of the one before, in units of the speed."""
+ASIDE, WIDEST = 0.03, 0.12
+"""Shift of the marks of one seed beside those of the one before, and largest one of all, in units of the speed."""
 NEGLIGIBLE = 1e-3
 """Mean share of the impact energy below which a loss is only named."""
 
@@ -98,7 +98,7 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
     )
     kinds, seeds = np.array([row["kind"] for row in collisions]), np.array([row["seed"] or 0 for row in collisions])
     number = np.unique(seeds, return_inverse=True)[1]
-    beside = speed * (1.0 + ASIDE * (number - 0.5 * number.max()))
+    beside = speed * (1.0 + min(ASIDE, WIDEST / max(number.max(), 1)) * (number - 0.5 * number.max()))
     with plot_style():
         figure = RunFigure(figsize=(9.0, 3.8), dpi=DPI, layout="constrained")
         left, right = figure.subplots(1, 2)
@@ -110,9 +110,9 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
         averages = [_average(growth[speed == v], share[speed == v], seeds[speed == v]) for v in np.unique(speed)]
         mean, low, high = (np.array([getattr(one, name) for one in averages]) for name in ("mean", "low", "high"))
         left.plot(np.unique(speed), mean, color=TEXT_COLOUR, linewidth=1.2)
-        left.errorbar(
-            np.unique(speed), mean, np.nan_to_num([mean - low, high - mean]), color=TEXT_COLOUR, fmt="none", capsize=2
-        )
+        known = np.isfinite(low)  # without equally many impact parameters for each seed there is no interval
+        limits = np.array([mean - low, high - mean])[:, known]
+        left.errorbar(np.unique(speed)[known], mean[known], limits, color=TEXT_COLOUR, fmt="none", capsize=2)
         left.set(xlabel="speed [m/s]", ylabel="growth efficiency $f$; line: average over $b$", ylim=(None, 1.1))
         right.set(xlabel="speed [m/s]", ylabel="impact parameter / sum of outer radii", ylim=(-0.05, None))
         for axes in (left, right) if speed.max() > 3.0 * speed.min() else ():
