@@ -135,7 +135,7 @@ COUNTS = (
     Count("functions with more than 8 positional parameters", lambda: len(parameters()), 0, 8),
     Count("most positional parameters", lambda: max(parameters().values(), default=0), 8, 10),
     Count("attributes that Simulation sets", attributes_of_simulation, 14, 15),
-    Count("pairs of folders of which one imports the other", pairs_of_folders, 197, 200),
+    Count("pairs of folders of which one imports the other", pairs_of_folders, 196, 200),
     Count("files that name rigid clusters outside their own", lambda: len(files_that_name(RIGID, "rigid")), 3, 3),
     Count("files that name walls outside their own", lambda: len(files_that_name(WALL, "components")), 3, 3),
     Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN, "components")), 3, 3),
