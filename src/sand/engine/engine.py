@@ -230,7 +230,7 @@ class Engine(CompiledState):
         self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
-        """Take steps not beyond `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed.
+        """Take steps until `until` [s], or `most_steps` steps and those that complete a started r-RESPA cycle.
 
         Components are brought up to date (`update`) before the first step, after the last one, and after the first step
         or cycle that ends at or after their `next_time`.

@@ -203,8 +203,9 @@ class BodySteps(GrainSteps):
 
         The driver of bodies returns in a step for what it cannot do:
 
-        * `HAS_TO_WAKE`: bodies may touch, or the loads of their contacts are near a limit.  They wake; the same step is
-          chosen again, now not longer than `RigidLimits.longest_awake`.
+        * `HAS_TO_WAKE`: bodies may touch, or the loads of their contacts are near a limit.  They wake, unless a closer
+          look shows that contacts stay at rest; the same step is chosen again, with awake clusters not longer than
+          `RigidLimits.longest_awake`.
         * `SUBSTEPS`: quick bodies take substeps to the end of the step.
         * `AWAKE_STEPS`: bodies have arrived; the grains of awake clusters take contact steps to the same time.
         * `AWAKE_LOADS`: loads at the end of the step are summed; awake clusters get their kick, or come to rest.
