@@ -45,8 +45,8 @@ class Component:
     `at_start`, `stages` and `heavy`, `add_arrays`, `begin`.  While the engine runs it calls `update`, `next_time` and
     `contacts_changed`, between regular steps.  The ledger has `columns` and `losses` of the components that the user
     gave, and asks `row` for the values of both (energies stored in its contacts are added to those of all contacts by a
-    stage of `Hook.ENERGIES`).  A change asks `problems_of_motion` and `problems_of_arrays`, continues with what is `kept`, and calls `saved_for_change` and
-    `changed`; case.toml has `parameters` and `materials`.
+    stage of `Hook.ENERGIES`).  A change asks `problems_of_motion` and `problems_of_arrays`, continues with what is
+    `kept`, and calls `saved_for_change` and `changed`; case.toml has `parameters` and `materials`.
 
     Attributes
     ----------
