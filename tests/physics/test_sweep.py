@@ -28,6 +28,7 @@ kind = "grain"
 radius = "0.1 um"
 [impact]
 speed = "4 m/s"
+end = "rest"
 [forces.contact]
 """
 GAS = """
@@ -146,6 +147,7 @@ STAND_INS = {
 """Programs of a cluster, as shell scripts: `srun` starts two tasks of one job, `sbatch` notes what is submitted."""
 
 
+@pytest.mark.validate
 @pytest.mark.compiled("contacts")
 @pytest.mark.skipif(os.name == "nt", reason="the script is one of a POSIX shell")
 def test_the_script_for_slurm_arrays(place):

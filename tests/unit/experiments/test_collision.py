@@ -80,11 +80,11 @@ def aggregates(seed):
 @pytest.mark.compiled("contacts", "small")
 def test_any_executor_gives_the_same_numbers():
     """In this process, in threads and in processes: the same results in the order of the seeds."""
-    here = collide_many(aggregates, [3, 1, 2], speed=2.0)
+    here = collide_many(aggregates, [3, 1, 2], speed=2.0, end="rest")
     assert [r.seed for r in here] == [3, 1, 2]
     assert here[0] != here[1]
     with ThreadPoolExecutor(2) as pool:
-        assert collide_many(aggregates, [3, 1, 2], pool, speed=2.0) == here
+        assert collide_many(aggregates, [3, 1, 2], pool, speed=2.0, end="rest") == here
 
 
 CASE = """
@@ -97,6 +97,7 @@ kind = "grain"
 radius = "0.1 um"
 [impact]
 speed = "2 m/s"
+end = "rest"
 seeds = [1, 2]
 [forces.contact]
 """
