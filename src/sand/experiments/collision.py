@@ -36,11 +36,11 @@ from .parting import can_tell, cannot_touch, forces_at_distance
 from .settled import are_settled
 
 QUIET = 30.0
-"""Time without contacts formed, slipped or broken after which they are at rest, in units of `Approach.unit_of_time`."""
+"""Time in which no contact forms, slips or breaks after which all are at rest, in units of `Approach.unit_of_time`."""
 LONGEST = 4000.0
 """Longest time of a collision after the earliest contact, in the same units."""
 USUAL = 600.0
-"""Time of a usual collision."""
+"""Time after the earliest contact at which a collision usually ends, in the same units."""
 LOOK_EVERY = 10
 """Checks of the condition of a run, every `EVERY` regular steps, between two looks whether a collision has ended."""
 ENDS = ("outcome", "rest")
@@ -64,11 +64,11 @@ class Ending(Settings):
     Parameters
     ----------
     end : str or float, optional
-        "outcome": when the fragments are apart for good and hold together; "rest": when contacts no longer change; or
-        a time [s].
+        "outcome": when no two fragments can touch again and none is expected to break; "rest": when contacts no longer
+        change; or a time [s].
     frames : int, optional
-        Number of frames, and rows of the ledger, of a collision of the usual length; each doubling of the time adds
-        half of it.
+        Number of frames, and of rows of the ledger, until the time at which a collision usually ends, or until `end`
+        if that is a time; each further doubling of the time adds half as many.
     """
 
     end: Annotated[Any, Reading(_end)] = "outcome"

@@ -55,7 +55,7 @@ class Reproduction(SweepJob):
     folder : str or Path or None, optional
         Output folder, by default the name.
     small : bool, optional
-        Whether the small version is computed, which shows that everything works, but no physics.
+        Whether the small version is computed, a test of the installation whose results mean nothing physically.
     known : bool, optional
         Whether rows of the table that comes with SAND are taken as they are.
     retry : bool, optional
