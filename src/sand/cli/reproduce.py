@@ -62,7 +62,7 @@ def _listed(job: Any) -> tuple[str, dict[str, Any]]:
         "known": len(job.known),
         "core_hours": hours,
     }
-    known = f"; {len(job.known)} are known, which took {hours:.2g} core-hours" if job.known else ""
+    known = f"; {len(job.known)} come with SAND, which took {hours:.2g} core-hours" if job.known else ""
     return f"{job.figure.title} ({'; '.join(job.figure.references)}): {len(job.names)} runs{known}", about
 
 

@@ -139,7 +139,7 @@ class Reproduction(SweepJob):
             done = Compared("runs that are done", "", f"{len(cells)} of {total}, {seconds / 3600.0:.2g} core-hours", "")
             write_table(place / COMPARISON, [one._asdict() for one in (done, *compared)])
             part = "" if len(cells) == total else f"; {len(cells)} of {total} runs"
-            small = "; small version, which shows no physics" if self.small else ""
+            small = "; small version, not for comparison" if self.small else ""
             save(panels_figure(self.figure.panels(rows), f"{self.figure.title}{small}{part}"), place / FIGURE)
         results = [one._asdict() for one in compared]
         return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results}
