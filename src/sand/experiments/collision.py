@@ -32,7 +32,7 @@ from ..simulation.condition import EVERY, GIVEN
 from ..simulation.serialise import changed_tables
 from ..simulation.simulation import Simulation
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
-from .parting import can_tell, cannot_touch, forces_at_distance
+from .parting import cannot_touch, forces_at_distance, has_bound
 from .settled import are_settled
 
 QUIET = 30.0
@@ -252,10 +252,10 @@ def why_ended(simulation: Simulation, start: Approach, ending: Ending = Ending()
     made, touched = state.count[MADE], state.count[[MADE, BROKEN, SLIPPED]].any()
     across = float(np.ptp(start.grains.position, axis=0).max())
     last = float(max(state.clock[CHANGED], state.clock[SLID])) if made else start.flight + across / start.speed
-    is_at_rest, knows = time - last >= QUIET * start.unit_of_time, can_tell(simulation)
-    if is_at_rest and (ending.end == "rest" or not knows):
+    is_at_rest, is_bounded = time - last >= QUIET * start.unit_of_time, has_bound(simulation)
+    if is_at_rest and (ending.end == "rest" or not is_bounded):
         return "contacts no longer change"
-    if not knows or (ending.end == "rest" and touched):
+    if not is_bounded or (ending.end == "rest" and touched):
         return ""
     labels = cluster_labels(len(start.grains), simulation.contacts["pair"])
     apart = cannot_touch(simulation, labels)
