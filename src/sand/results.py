@@ -355,7 +355,7 @@ class Sweep:
 
     @property
     def shown(self) -> list[str]:
-        """The columns that `sand plot` draws: the outcome, and the most telling result."""
+        """The columns that `sand plot` draws: the outcome, and the first result of `SHOWN`."""
         telling = [name for name in SHOWN if name in self.table]
         return [name for name in ("outcome", *telling[:1]) if name in self.table]
 

@@ -13,18 +13,18 @@ __all__ = ["KINDS", "collision_kind", "fragment_numbers", "growth_efficiency"]
 
 KINDS = {
     "miss": "no contact formed",
-    "bouncing": "two bodies with the masses of before",
-    "sticking": "one body, with the contacts of before",
-    "restructuring": "one body, whose contacts changed",
+    "bouncing": "two bodies with the same masses as before",
+    "sticking": "one body, few of whose contacts changed",
+    "restructuring": "one body, many of whose contacts changed",
     "mass transfer": "the heavier body lost no mass, the lighter one left fragments",
     "erosion": "the heavier body lost mass, and kept more than half of all",
     "fragmentation": "no body has more than half of all mass",
 }
 """Kinds, from the gentlest to the most violent."""
 NEGLIGIBLE = 0.05
-"""Mass that does not count, in units of the lighter body."""
+"""Mass that is neglected, in units of the mass of the lighter body."""
 ROUNDING = 1e-9
-"""Growth efficiency that is one of rounding."""
+"""Allowance for rounding of a growth efficiency."""
 CHANGED = 0.1
 """Share of contacts that formed or broke beyond which a body that sticks is restructured."""
 
@@ -54,7 +54,7 @@ def collision_kind(
     """Kind of an outcome, one of `KINDS`.
 
     With the masses M_t ≥ M_p of target and projectile, M = M_t + M_p, M_1 ≥ M_2 of the two largest fragments, and
-    ε = 0.05 M_p, which does not count, the first of these that holds:
+    ε = 0.05 M_p, a mass that is neglected, it is the first of these whose definition holds:
 
         miss           no contact formed
         sticking       M_1 ≥ M − ε, and at most a tenth of the contacts changed
@@ -71,7 +71,7 @@ def collision_kind(
     fragments : sequence of float
         Masses of all fragments, in any order and the same unit.
     changed : float
-        Contacts that formed and broke, less the first one, over those of before; 0 if there were none.
+        Number of contacts that formed or broke, without the first one, over that before; 0 if there were none.
     touched : bool, optional
         Whether any contact formed.
     """

@@ -56,7 +56,7 @@ class Efficiency(NamedTuple):
 
 
 class Threshold(NamedTuple):
-    """Speed at which the mean growth efficiency falls through 0."""
+    """Speed at which the mean growth efficiency first falls below 0."""
 
     mass_ratio: float
     filling: float
@@ -159,8 +159,8 @@ def _groups(given: Collisions) -> list[tuple[tuple[float, float, float], np.ndar
 def efficiencies(given: Collisions) -> list[Efficiency]:
     """Averages over the collisions of each mass ratio, filling factor and speed, with the weights.
 
-    `stick` and `excavated` keep the mean change of mass: stick − fragment × excavated is the mean of f. What remains
-    to 1 of stick + fragment is the probability of bouncing.
+    `stick` and `excavated` preserve the mean change of mass: stick − fragment × excavated is the mean of f. The
+    probability of bouncing is 1 − stick − fragment.
     """
     rows, growth = [], given.growth
     for (ratio, filling, speed), chosen in _groups(given):
@@ -176,7 +176,7 @@ def efficiencies(given: Collisions) -> list[Efficiency]:
 
 
 def thresholds(rows: Sequence[Efficiency]) -> list[Threshold]:
-    """Fragmentation speed of each mass ratio and filling factor: where the mean of f first falls through 0.
+    """Fragmentation speed of each mass ratio and filling factor: where the mean of f first falls below 0.
 
     Between two speeds of the table f is linear in the logarithm of the speed.
     """
@@ -239,7 +239,7 @@ class FragmentSlope(NamedTuple):
 def fragment_slope(given: Collisions, largest: bool = False) -> FragmentSlope:
     """Exponent γ of the numbers of fragments of m grains, n(m) ∝ m^γ, 1 ≤ m ≤ m_max, by maximum likelihood.
 
-    The likelihood is that of whole numbers up to the largest fragment in use, ln L = γ Σ ln m − n ln Σ_k k^γ.
+    The likelihood is that of whole numbers up to the largest fragment that is counted, ln L = γ Σ ln m − n ln Σ_k k^γ.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ class ImpactAverage(NamedTuple):
     """Average ∫ f 2b db/b_max² of a quantity f of collisions."""
 
     mean: float
-    error: float  # standard error; NaN where it cannot be told
+    error: float  # standard error; NaN where the values do not determine it
     low: float  # 95 % interval, Student's t
     high: float
     collisions: int
@@ -81,17 +81,17 @@ def impact_average(
     If every seed has every impact parameter, the average of each seed is one independent value; the interval is that
     of their mean. If seeds differ between impact parameters, each of these is a stratum with independent values, of
     which it needs two: the variance is Σ w² s²/n, with the degrees of freedom of Welch and Satterthwaite. With
-    impact parameters that were drawn at random all values count alike, and those of one seed together as one.
+    impact parameters drawn at random all values have equal weight, and those of one seed are one independent value.
 
-    The intervals are those of normally distributed means. For shares of rare outcomes, such as one bounce of ten
-    collisions, take an interval of a probability (Wilson) instead.
+    The intervals assume normally distributed means. For the probability of a rare outcome, such as one bounce in ten
+    collisions, use an interval of a probability (Wilson 1927) instead.
 
     Parameters
     ----------
     values : array_like
         f of each collision (n,), finite; True and False for the probability of an outcome.
     b : array_like
-        Their impact parameters (n,), in units of `most`; those that are to be the same must be equal.
+        Their impact parameters (n,), in units of `most`; values of the same one must be exactly equal.
     seeds : array_like
         Their seeds (n,).
     most : float or None, optional
@@ -102,8 +102,8 @@ def impact_average(
     Raises
     ------
     BadInput
-        If columns have different lengths, values are not finite, or impact parameters are out of range, or lengths
-        without `most`.
+        If columns have different lengths, values are not finite, or impact parameters are out of range, or are
+        lengths and `most` is missing.
     """
     columns = [np.asarray(each, float) for each in (values, b, seeds)]
     if len({each.shape for each in columns}) != 1 or columns[0].ndim != 1 or not columns[0].size:

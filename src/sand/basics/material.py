@@ -128,14 +128,14 @@ COMMON["quartz"] = SILICA.but(name="quartz")
 class PaperPreset(NamedTuple):
     """The material of a paper, and what the paper changed in the contact model.
 
-    The numbers were recalled, not read in the paper, where `read` does not say otherwise.
+    The numbers were not checked in the paper, unless `read` says so.
     """
 
     material: Material  # its name is that of the preset
     radius: float  # of the grains [m]
     contact: dict[str, Any]  # settings of `sand.Contact` that are not the default
     source: str
-    read: str  # what was read of the source or of another one
+    read: str  # what was read in the paper, or in another source
 
 
 _MEMORY = "from memory"
@@ -224,7 +224,7 @@ def contact_settings(preset: str) -> dict[str, Any]:
 
 
 def listed_presets() -> str:
-    """Names of presets for messages and comments; one of papers stands for all of them."""
+    """Names of presets for messages and comments; of those of papers one, as an example."""
     return f"{', '.join(COMMON)}, or of a paper, such as '{PAPERS[-1].material.name}' (docs: Materials)"
 
 

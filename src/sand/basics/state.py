@@ -69,8 +69,8 @@ CLOCK = (
 EXTREMES, SUMS = (LARGEST_LOAD, LARGEST_OVERLAP, CHANGED, SLID), (SOME_AWAKE, CORRECTED)
 """Entries that are the largest, or latest, of all parts of the grains, and that add up over parts."""
 LEAST_CLOCK = LARGEST_OVERLAP
-"""Fewest entries of the clock in a checkpoint: those that earlier versions did not have begin at 0, but the times of
-the last events at its time, because nothing is known of the contacts before."""
+"""Fewest entries of the clock in a checkpoint. Entries that a checkpoint of an earlier version lacks are set to 0, but
+CHANGED and SLID to the time of the checkpoint, because the last events before it are unknown."""
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken

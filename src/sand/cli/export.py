@@ -64,7 +64,7 @@ def _index(text: str) -> tuple[str, complex] | None:
 @click.option("--to", "form", required=True, type=click.Choice(list(SUFFIXES)), help="Format of the files.")
 @click.option("--out", metavar="PATH", type=options.FILE, help="Path without suffix (default: 'trajectory' in DIR).")
 @options.frames
-@click.option("--spacing", metavar="D", help="Spacing of dipoles (adda, ddscat): a length, by default 10 a grain.")
+@click.option("--spacing", metavar="D", help="Spacing of dipoles, adda and ddscat (default: 1/10 of a diameter).")
 @click.option("--index", metavar="M=N+Ki", multiple=True, help="Refractive index of a material, for mstm.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.reading

@@ -133,7 +133,7 @@ def of_forces(forces: Iterable[Any] | None) -> Iterable[str]:
 
 
 def of_steps(stepping: Any, taken: Mapping[str, Any]) -> str:
-    """A sentence on the integrator, and on the steps taken, of which the summary of a run tells."""
+    """A sentence on the integrator, and on the steps taken, from the summary of a run."""
     about = summary(type(stepping)).rstrip(".").partition("; ")[0]
     text = f"The integrator is {stepping.name} ({about}): {settings(stepping, 'method')}"
     if taken.get("steps"):

@@ -12,7 +12,7 @@ from . import options, parsing, report
 
 @parsing.command("reproduce", short_help="Compute a figure of a paper, and compare it with the paper.")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("--small", is_flag=True, help="A small version, in seconds: shows that all works, but no physics.")
+@click.option("--small", is_flag=True, help="A small version, in seconds: a test of the installation, not of physics.")
 @click.option("--known", is_flag=True, help="Take rows of the table that comes with SAND; compute only the others.")
 @click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the name).")
 @click.option("--retry", is_flag=True, help="Compute runs that failed again.")
@@ -62,7 +62,7 @@ def _listed(job: Any) -> tuple[str, dict[str, Any]]:
         "known": len(job.known),
         "core_hours": hours,
     }
-    known = f"; {len(job.known)} are known, which took {hours:.2g} core-hours" if job.known else ""
+    known = f"; {len(job.known)} come with SAND, which took {hours:.2g} core-hours" if job.known else ""
     return f"{job.figure.title} ({'; '.join(job.figure.references)}): {len(job.names)} runs{known}", about
 
 

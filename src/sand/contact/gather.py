@@ -21,7 +21,7 @@ LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
 """Contact counts of this number and more, separately as grain 1 and as grain 2, share a class."""
 DENSE_FROM = 3
 """Number of contacts over number of grains, half the mean coordination number, from which most grains have equally
-many contacts, so that sorting brings nothing; the two sides of contacts are then summed in loops of their own."""
+many contacts, so that sorting saves no time; the two sides of contacts are then summed in loops of their own."""
 
 
 @loop

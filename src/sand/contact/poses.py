@@ -29,7 +29,7 @@ def pose_at(grains, contacts, span, c, twist):
 def pose_apart(grains, contacts, separation, c, twist):
     """As `pose_at`, for given x1 − x2 [m]."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    n, distance, inverse = direction_of(separation)  # first: processors wait longest for its root and division
+    n, distance, inverse = direction_of(separation)  # first: its square root and division have the longest latency
     n1 = turned(load4(grains.orientation, i), load(contacts.pointer1, c))
     n2 = turned(load4(grains.orientation, j), load(contacts.pointer2, c))
     return Pose(n, distance, inverse, n1, n2, twist)

@@ -32,15 +32,15 @@ from ..simulation.condition import EVERY, GIVEN
 from ..simulation.serialise import changed_tables
 from ..simulation.simulation import Simulation
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
-from .parting import can_tell, cannot_touch, forces_at_distance
+from .parting import cannot_touch, forces_at_distance, has_bound
 from .settled import are_settled
 
 QUIET = 30.0
-"""Time without contacts formed, slipped or broken after which they are at rest, in units of `Approach.unit_of_time`."""
+"""Time in which no contact forms, slips or breaks after which all are at rest, in units of `Approach.unit_of_time`."""
 LONGEST = 4000.0
 """Longest time of a collision after the earliest contact, in the same units."""
 USUAL = 600.0
-"""Time of a usual collision."""
+"""Time after the earliest contact at which a collision usually ends, in the same units."""
 LOOK_EVERY = 10
 """Checks of the condition of a run, every `EVERY` regular steps, between two looks whether a collision has ended."""
 ENDS = ("outcome", "rest")
@@ -64,11 +64,11 @@ class Ending(Settings):
     Parameters
     ----------
     end : str or float, optional
-        "outcome": when the fragments are apart for good and hold together; "rest": when contacts no longer change; or
-        a time [s].
+        "outcome": when no two fragments can touch again and none is expected to break; "rest": when contacts no longer
+        change; or a time [s].
     frames : int, optional
-        Number of frames, and rows of the ledger, of a collision of the usual length; each doubling of the time adds
-        half of it.
+        Number of frames, and of rows of the ledger, until the time at which a collision usually ends, or until `end`
+        if that is a time; each further doubling of the time adds half as many.
     """
 
     end: Annotated[Any, Reading(_end)] = "outcome"
@@ -252,10 +252,10 @@ def why_ended(simulation: Simulation, start: Approach, ending: Ending = Ending()
     made, touched = state.count[MADE], state.count[[MADE, BROKEN, SLIPPED]].any()
     across = float(np.ptp(start.grains.position, axis=0).max())
     last = float(max(state.clock[CHANGED], state.clock[SLID])) if made else start.flight + across / start.speed
-    is_at_rest, knows = time - last >= QUIET * start.unit_of_time, can_tell(simulation)
-    if is_at_rest and (ending.end == "rest" or not knows):
+    is_at_rest, is_bounded = time - last >= QUIET * start.unit_of_time, has_bound(simulation)
+    if is_at_rest and (ending.end == "rest" or not is_bounded):
         return "contacts no longer change"
-    if not knows or (ending.end == "rest" and touched):
+    if not is_bounded or (ending.end == "rest" and touched):
         return ""
     labels = cluster_labels(len(start.grains), simulation.contacts["pair"])
     apart = cannot_touch(simulation, labels)

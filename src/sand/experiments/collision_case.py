@@ -105,11 +105,11 @@ class ImpactSection(Section):
     seeds: Seeds = Field(default_factory=lambda: [1])
     """One collision is run for each seed."""
     end: Annotated[Any, declared(Ending)["end"].setting] = "outcome"
-    """`outcome`: when the fragments are apart for good and hold together; `rest`: when contacts no longer change; or a
-    time [s]."""
+    """`outcome`: when no two fragments can touch again and none is expected to break; `rest`: when contacts no longer
+    change; or a time [s]."""
     frames: Annotated[int, declared(Ending)["frames"].setting] = FRAMES
-    """Number of frames, and rows of the ledger, of a collision of the usual length; each doubling of its time adds half
-    of it."""
+    """Number of frames, and of rows of the ledger, until a collision usually ends, or until `end` if that is a time;
+    each further doubling of the time adds half as many."""
     out: PathName | None = None
     """Folder of the results."""
 

@@ -83,7 +83,8 @@ class Collision:
     Attributes
     ----------
     outcome : str
-        "stick" (one body), "bounce" (two bodies of the same grains as before), "miss", or "fragment".
+        "stick" (one body), "bounce" (two bodies of the same grains as before), "miss" (no contact formed), or
+        "fragment" (all else).
     kind : str
         One of `analysis.collision_kinds.KINDS`, by the masses of the fragments.
     speed, impact_parameter : float
@@ -93,7 +94,7 @@ class Collision:
     fragments : tuple of int
         Numbers of grains of the final bodies, by decreasing mass.
     largest_remnant, second_remnant : float
-        Masses of the largest and the second body over the total mass.
+        Masses of the largest and the second largest body over the total mass.
     growth_efficiency : float
         f = (M_largest − M_target)/M_projectile, see `analysis.collision_kinds.growth_efficiency`.
     reach : float

@@ -70,7 +70,7 @@ def _of_material(name: str, material: str, speeds: list[str]) -> PaperFigure:
     return PaperFigure(
         name,
         f"Head-on collisions of equal aggregates of {material} (BCCA)",
-        ("Wada, Tanaka, Suyama, Kimura & Yamamoto 2007, ApJ 661, 320", "the same 2008, ApJ 677, 1296"),
+        ("Wada, Tanaka, Suyama, Kimura & Yamamoto 2007, ApJ 661, 320", "the same authors 2008, ApJ 677, 1296"),
         compare_compression,
         compression_panels,
         {"target.grains": 8, "projectile.grains": 8},

@@ -45,8 +45,8 @@ def forces_at_distance(simulation: Simulation) -> list[Force]:
     return [force for force in simulation.forces if not isinstance(force, Contact)]
 
 
-def can_tell(simulation: Simulation) -> bool:
-    """Whether there is a bound: external forces, a gas, forces of the user, walls and a box may bring bodies back."""
+def has_bound(simulation: Simulation) -> bool:
+    """Whether the bound holds: with external forces, a gas, forces of the user, walls or a box bodies may come back."""
     items = (each.items for each in simulation._system.given.values())
     known = all(force.name in WORK for force in forces_at_distance(simulation))
     return simulation.box.is_open and not any(items) and known
@@ -62,7 +62,7 @@ def cannot_touch(simulation: Simulation, labels: np.ndarray) -> str:
     labels : ndarray
         The body of each grain (N,), integers 0…K−1.
     """
-    if not can_tell(simulation):
+    if not has_bound(simulation):
         return ""
     if not labels.any():
         return "one body is left"

@@ -55,7 +55,7 @@ class Reproduction(SweepJob):
     folder : str or Path or None, optional
         Output folder, by default the name.
     small : bool, optional
-        Whether the small version is computed, which shows that everything works, but no physics.
+        Whether the small version is computed, a test of the installation whose results mean nothing physically.
     known : bool, optional
         Whether rows of the table that comes with SAND are taken as they are.
     retry : bool, optional
@@ -139,7 +139,7 @@ class Reproduction(SweepJob):
             done = Compared("runs that are done", "", f"{len(cells)} of {total}, {seconds / 3600.0:.2g} core-hours", "")
             write_table(place / COMPARISON, [one._asdict() for one in (done, *compared)])
             part = "" if len(cells) == total else f"; {len(cells)} of {total} runs"
-            small = "; small version, which shows no physics" if self.small else ""
+            small = "; small version, not for comparison" if self.small else ""
             save(panels_figure(self.figure.panels(rows), f"{self.figure.title}{small}{part}"), place / FIGURE)
         results = [one._asdict() for one in compared]
         return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results}

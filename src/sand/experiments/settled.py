@@ -22,7 +22,7 @@ from ..simulation.simulation import Simulation
 HORIZON = 10.0
 """A collision is decided if no contact is expected to break until this multiple of its time."""
 MOST_BREAKS = 1e-4
-"""Expected number of contacts that break until then; small, because the energy is not quite shared at random."""
+"""Largest expected number of contacts that break until then; small, because modes do not exchange energy freely."""
 
 
 @checked
@@ -39,7 +39,7 @@ def expected_breaks(energy: Any, breaking: Any, modes: Any, attempts: Any) -> np
     modes : ndarray
         s, number of modes, see `modes_of`, (K,).
     attempts : ndarray
-        A, number of vibrations of all its contacts in the time that is asked for, (K,).
+        A, number of vibrations of all its contacts in the time for which breaks are counted, (K,).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(energy > breaking, 1.0 - np.asarray(breaking) / energy, 0.0)
@@ -51,7 +51,7 @@ def modes_of(grains: Any, contacts: Any, springs: int) -> np.ndarray:
     """Number of modes that share the energy of each body: 6N − 6, but no more than it has springs.
 
     Without springs against sliding, rolling or twisting there are fewer modes, and more of the energy for each. In a
-    pair the motion along the line of the centres is apart from all others: 1.
+    pair the motion along the line of centres is separate from all others: 1.
 
     Parameters
     ----------

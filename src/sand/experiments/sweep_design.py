@@ -129,8 +129,8 @@ class SweepSection(Section):
     """Section [sweep]: keys of the case that change from run to run, their values, seeds and results."""
 
     vary: Annotated[dict[str, Any], Reading(flat_keys)] = Field(default_factory=dict)
-    """Keys with their values: a list, one value, or a range with so many values: `lin(1 um, 3 um, 5)`, evenly spaced,
-    `log(10 m/s, 200 m/s, 10)`, by their logarithm, `square(0 b, 1 b, 6)`, by their square."""
+    """Keys with their values: a list, one value, or a range with the number of values: `lin(1 um, 3 um, 5)`, spaced
+    evenly, `log(10 m/s, 200 m/s, 10)`, evenly in the logarithm, `square(0 b, 1 b, 6)`, evenly in the square."""
     together: Annotated[list[Any], Reading(several)] = Field(default_factory=list)
     """Tables of keys that change together, each with equally many values: [[sweep.together]]."""
     seeds: Annotated[Any, Reading(_seeds)] = None

@@ -168,8 +168,8 @@ class SweepJob(Job):
     def expected(self, left: Sequence[Row]) -> Expected:
         """Set up some runs in memory, which finds further errors, and estimate the cost of all that are left.
 
-        A random sample in which every value occurs, at least `SET_UP` runs: their mean time and disk space stands for
-        those of the others.
+        A random sample in which every value occurs, at least `SET_UP` runs: their mean time and disk space are
+        taken for all others.
 
         Returns
         -------
@@ -321,7 +321,7 @@ class SweepJob(Job):
             table.busy.clear()
 
     def _lost(self, rows: Sequence[Row], dead: Mapping[int, str]) -> list[str]:
-        """Names of the runs that dead processes were computing, by the numbers of these; says so."""
+        """Names of the runs that dead processes were computing, by the ids of these; warns."""
         begun = [row.name for row in rows if (self.folder / RUNS / row.name / CLAIM).exists()]
         lost = [name for name in begun if holder(self.folder / RUNS / name, CLAIM) in dead]
         how = ", ".join(dict.fromkeys(dead.values())) or "for an unknown reason"

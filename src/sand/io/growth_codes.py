@@ -1,4 +1,4 @@
-"""Collision models for codes of dust growth: tables for DustPy, lines of setup.par for mcdust; cgs units, as they have.
+"""Collision models for codes of dust growth: tables for DustPy, lines of setup.par for mcdust, in their cgs units.
 
 DustPy 1.0 takes `ini.dust.vFrag` [cm/s], `erosionMassRatio`, `excavatedMass` (in masses of the smaller body) and
 `fragmentDistribution` (γ of n(m) ∝ m^γ), and probabilities `dust.p.stick` and `dust.p.frag`, whose sum is below 1 where

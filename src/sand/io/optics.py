@@ -28,7 +28,7 @@ MOST_DIPOLES = 200_000_000
 ACROSS = 10
 """Default number of dipoles across the smallest grain."""
 MARGIN = 1e-9
-"""Relative margin of comparisons of lengths, so that rounding does not decide."""
+"""Relative margin of comparisons of lengths, above rounding errors."""
 MICRON = 1e-6
 
 

@@ -200,7 +200,7 @@ class Centre(NamedTuple):
 def append_range(long_range, sorted_position, span, folded, centre, cells, used):
     """Append the sorted indices of the neighbours of a `Centre` in a range of cells; returns the new length, or FULL.
 
-    Whether pairs are close is computed first, as integers, in a loop that vectorises.  Then each index is written, and
+    A loop that vectorises first computes as integers whether pairs are within reach.  Then each index is written, and
     the length is increased by that integer: without branches.  Separations of i and j have equal magnitudes to the last
     bit, because sums of coordinates and box lengths are exact: both rows contain the pair, or neither.
     """

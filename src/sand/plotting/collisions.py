@@ -25,7 +25,7 @@ LOOKS = dict(
 )
 """Colour and marker of each kind."""
 ASIDE, WIDEST = 0.03, 0.12
-"""Shift of the marks of one seed beside those of the one before, and largest one of all, in units of the speed."""
+"""Shift of the marks of a seed from those of the seed before, and the largest shift, as fractions of the speed."""
 NEGLIGIBLE = 1e-3
 """Mean share of the impact energy below which a loss is only named."""
 
@@ -125,9 +125,9 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
 def _average(growth: np.ndarray, share: np.ndarray, seeds: np.ndarray) -> Any:
     """Average of the growth efficiency at one speed.
 
-    Outer radii differ between seeds, and so do shares of one length: the shares of a seed are numbered by their order,
-    if all seeds have equally many, and each is that of the mean over seeds. The last one stands for as much beyond it
-    as before it, up to the sum of the outer radii.
+    Outer radii differ between seeds, so that one length is another share of them for each seed. If all seeds have
+    equally many shares, these are numbered in increasing order, and each is replaced by the mean over seeds of those
+    with its number. The last share gets as much of b² beyond it as before it, up to the sum of the outer radii.
     """
     order = np.lexsort((share, seeds))
     numbers = np.unique(seeds, return_counts=True)[1]

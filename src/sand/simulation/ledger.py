@@ -28,8 +28,8 @@ KINETIC = "translation", "rotation"
 MAGNETIC = "magnetic"
 """A column that every ledger has, with or without dipoles."""
 RUNAWAY = 0.5
-"""Change of the total energy, relative to all energies at the start and now and all that was put in, at which a run is
-stopped."""
+"""Change of the total energy at which a run is stopped, relative to the sum of the magnitudes of all energies at the
+start and now and of the energy that was put in."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 INTERNAL = "internal"
 """Column of the kinetic energy of clusters beyond their rigid motion; a part of the kinetic energies."""
@@ -178,10 +178,10 @@ class Ledger(LedgerColumns):
         self.frame_times = [row["time"] for row in self.rows] if frame_times is None else frame_times.tolist()
 
     def runs_away(self, row: dict[str, float]) -> bool:
-        """Whether the energy error exceeds half of all energies in this row and the first one, and of what was put in.
+        """Whether the energy error exceeds `RUNAWAY` times the energies in this row, the first one, and those put in.
 
-        Dissipation has no share in this scale: what is dissipated was one of these before, unless it is an error.  Only
-        this row and the first one count, so that the result does not depend on how often rows are written.
+        Dissipated energy is not part of this sum: it was one of these before, unless it is an error.  Only
+        this row and the first one are used, so that the result does not depend on how often rows are written.
         """
         if not self.rows:
             return False

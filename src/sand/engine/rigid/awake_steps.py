@@ -74,7 +74,7 @@ class AwakeSteps:
         """List the grains of awake clusters, and their contacts."""
         awake = state.bodies.asleep == 0
         grains, columns = np.flatnonzero(awake), contacts_of(state, awake)
-        # what was made for these grains and contacts serves again
+        # what was made for these grains and contacts is used again
         self.grains = self.grains if np.array_equal(grains, self.grains) else grains
         self.columns = self.columns if np.array_equal(columns, self.columns) else columns
 
