@@ -96,17 +96,15 @@ class SweptCase:
         raise NotImplementedError
 
 
-NO_RESULTS = (
-    *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices", "wall_seconds"),
-    *("ns_per_grain_step", "versions", "source_digest", "sand"),
-)
-"""Entries of the summary of a run that are no results, and those that begin with "wall_"."""
-
-
 class SweptRun(SweptCase):
     """A case of `sand run`, or of `sand grow`, each box of which is such a run; see `SweptCase`."""
 
     GIVEN = ("run.seed", "run.out", "grow")
+    NO_RESULTS = (
+        *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices"),
+        *("ns_per_grain_step", "versions", "source_digest", "sand"),
+    )
+    """Entries of the summary that are no results; nor are those that begin with "wall_"."""
 
     def __init__(self, content: dict[str, Any], name: str):
         own = {key: table for key, table in content.items() if key != "grow"}
@@ -146,9 +144,8 @@ class SweptRun(SweptCase):
             raise BadInput(f"stopped by physics: {result}")
         if result.outcome is Outcome.WALL_TIME:
             raise BadInput(f"the wall time of its condition, {run.stop}, is used up")
-        ledger = simulation.ledger.with_row(simulation._log_row())
-        summary = summary_of(simulation, result, ledger)
-        kept = {k: v for k, v in summary.items() if k not in NO_RESULTS and not k.startswith("wall_")}
+        summary = summary_of(simulation, result)
+        kept = {k: v for k, v in summary.items() if k not in self.NO_RESULTS and not k.startswith("wall_")}
         return kept | ({"outcome": Outcome.CONDITION_MET.name.lower()} if met else {})
 
 
@@ -187,8 +184,6 @@ class SweptCollision(SweptCase):
 
 class SweptSequence(SweptCollision):
     """A case of sequential collisions, which only a sweep reads; its results are lists over the collisions."""
-
-    SHOWN = ()
 
     def __init__(self, content: dict[str, Any], name: str):
         problems = material_errors(content, ("target",), "silica")

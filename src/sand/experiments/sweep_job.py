@@ -117,7 +117,7 @@ class SweepJob(Job):
         name, errors = str(self.path), ErrorCollector()
         model = self.kind.model(self.content)
         given = self.kind.GIVEN
-        keys = [key for table in ({**self.section.vary}, *self.section.together) for key in table]
+        keys = [key for table in (self.section.vary, *self.section.together) for key in table]
         for key in keys:
             if key in given or key.partition(".")[0] in given:
                 errors.problems.append(f"{name}: {key}: give seeds as --seeds, the folder as --out, or in [sweep]")
