@@ -178,8 +178,9 @@ class Design:
             )
         errors.done()
         number = section.samples or math.prod(len(next(iter(group.values()))) for group in self.groups)
+        number *= len(section.seeds or [0])
         if number > MOST_RUNS:
-            raise BadInput(f"{number:.2g} combinations are more than {MOST_RUNS:.0e}; give fewer values")
+            raise BadInput(f"{number:.2g} runs are more than {MOST_RUNS:.0e}; give fewer values, or fewer seeds")
 
     def _group(self, table: Mapping[str, Any], whole: Callable[[str], bool]) -> dict[str, Any]:
         """Values of keys that change together: lists, or for a random design ranges."""

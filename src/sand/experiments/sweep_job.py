@@ -29,6 +29,7 @@ from .executors import results_of
 from .job import Job, Progress, ignored
 from .sweep_cases import CASES, Expected
 from .sweep_design import (
+    DESIGNS,
     EVERY,
     Design,
     SweepSection,
@@ -351,6 +352,8 @@ def _replaced(own: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
         kept = [table for table in _tables_of(own) if not keys & table.keys()]
         given["vary"] = {k: v for table in [*kept, *new] if len(table) == 1 for k, v in table.items()}
         given["together"] = [table for table in [*kept, *new] if len(table) > 1]
+    if "samples" in given and own.get("design", EVERY) == EVERY:
+        given.setdefault("design", DESIGNS[1])
     return {**own, **given}
 
 

@@ -340,6 +340,19 @@ def test_resume_and_info(case, capsys):
     assert "out is finished; its results are in out/sweep.csv" in capsys.readouterr().out
 
 
+def test_options_keep_the_random_design_of_the_case(case, capsys):
+    """`--samples` and `--design-seed` change only these; without a design in the case it is a Latin hypercube."""
+    path, _ = case
+    vary = '[sweep.vary]\n"impact.speed" = "lin(2 m/s, 4 m/s)"\n'
+    path.write_text(f'{CASE}[sweep]\ndesign = "sobol"\nsamples = 4\n{vary}')
+    for words in (["--samples", "8"], ["--design-seed", "3"]):
+        assert main(["sweep", str(path), *words, "--out", words[1], "--quiet"]) == 0
+    text = [Path(folder, "case.toml").read_text() for folder in "83"]
+    assert all('design = "sobol"' in one for one in text) and "samples = 8" in text[0] and "design_seed = 3" in text[1]
+    path.write_text(CASE + "[sweep]\n" + vary)
+    assert SweepJob(path, settings={"samples": 8}).section.design == "latin hypercube"
+
+
 def test_python_call_open_and_plot(case):
     """The call, with the content of a case in place of a file; what `sand.open` and `sand plot` make of the folder."""
     import tomllib
@@ -381,7 +394,8 @@ def test_parquet(case):
         (["--vary", "impact.speed=1", "--vary", "impact.speed=2"], ("--vary impact.speed is given twice; give all",)),
         (["--vary", "impact.speed"], ("--vary 'impact.speed' must be KEY=VALUES",)),
         (["--seeds", "x"], ("--seeds 'x' must be whole numbers",)),
-        (["--vary", "impact.speed=1", "--design-seed", "3"], ("--design-seed is for random designs: give --samples",)),
+        (["--seeds", "10000000"], ("seeds = 10000000 must be a number of seeds",)),
+        (["--vary", "impact.speed=1", "--design-seed", "3"], ("sweep: design_seed = 3 is not used by design = 'every",)),
         (["--vary", "impact.speed=1", "--out", "case.toml"], ("case.toml is a file; give another folder with --out",)),
         (
             ["--vary", "impact.speed=1", "--out", "."],
