@@ -395,7 +395,10 @@ def test_parquet(case):
         (["--vary", "impact.speed"], ("--vary 'impact.speed' must be KEY=VALUES",)),
         (["--seeds", "x"], ("--seeds 'x' must be whole numbers",)),
         (["--seeds", "10000000"], ("seeds = 10000000 must be a number of seeds",)),
-        (["--vary", "impact.speed=1", "--design-seed", "3"], ("sweep: design_seed = 3 is not used by design = 'every",)),
+        (
+            ["--vary", "impact.speed=1", "--design-seed", "3"],
+            ("sweep: design_seed = 3 is not used by design = 'every",),
+        ),
         (["--vary", "impact.speed=1", "--out", "case.toml"], ("case.toml is a file; give another folder with --out",)),
         (
             ["--vary", "impact.speed=1", "--out", "."],
