@@ -20,6 +20,7 @@ from ..simulation.outcome import Outcome
 from ..simulation.run_writer import summary_of
 from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
+from .growth_case import GrowSection
 from .sequential import SequenceCase
 
 SEQUENCE = ("outcome", "impact_energy", "contacts_before", "contacts_after", "gyration_after", "time", "steps", "drift")
@@ -109,8 +110,9 @@ class SweptRun(SweptCase):
     def __init__(self, content: dict[str, Any], name: str):
         own = {key: table for key, table in content.items() if key != "grow"}
         self.case = check_case(own, name)
-        boxes = content.get("grow")
-        self.seeds = list(boxes["seeds"]) if isinstance(boxes, dict) and "seeds" in boxes else [self.case.run.seed]
+        self.seeds = [self.case.run.seed]
+        if "grow" in content:
+            self.seeds = validate(GrowSection, content["grow"], name, table="grow").seeds
 
     @staticmethod
     def model(content: dict[str, Any]) -> type:

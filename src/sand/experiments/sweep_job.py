@@ -131,6 +131,7 @@ class SweepJob(Job):
             raise error.at(f"{name}: sweep") from None
         self.seeds = self.section.seeds or errors.take(self._seeds, next(design.combinations()), instead=[0])
         self.content = without_keys(self.content, list(given))
+        self.command = command_for(self.content) or ""  # of boxes of sand grow: run, as that of case.toml
         self.defaults = self._defaults(keys)
         found: dict[str, Row] = {}
         for values in design.combinations():

@@ -353,6 +353,20 @@ def test_options_keep_the_random_design_of_the_case(case, capsys):
     assert SweepJob(path, settings={"samples": 8}).section.design == "latin hypercube"
 
 
+def test_boxes_of_growth(case, capsys):
+    """Each box is a run: those of the written case have the same names, and no run is computed twice."""
+    given = "[grains]\nnumber = 4\nradius = '0.1 um'\n[box]\nperiodic = '4 um'\n[run]\nuntil = '1 ns'\n[grow]\nseeds = "
+    path = Path("grow.toml")
+    path.write_text(given + "[3, 5]")
+    job = SweepJob(path, "out", {"vary": {"grains.number": [4, 5]}})
+    job.begin()
+    again = SweepJob("out/case.toml", "out", resume=True)
+    assert job.seeds == [3, 5] and [row.name for row in again.rows] == [row.name for row in job.rows]
+    path.write_text(given + "3")
+    assert main(["sweep", "grow.toml", "--vary", "grains.number=4,5"]) == 2
+    assert "grow.toml: grow.seeds = 3 must be " in capsys.readouterr().err
+
+
 def test_python_call_open_and_plot(case):
     """The call, with the content of a case in place of a file; what `sand.open` and `sand plot` make of the folder."""
     import tomllib
