@@ -56,10 +56,13 @@ class SweptCase:
         The case, checked.
     seeds : list of int
         Its seeds.
+    NAME : str
+        What is varied, for people.
     GIVEN : tuple of str
         Keys of seeds and of the folder, which the sweep gives itself.
     """
 
+    NAME: ClassVar[str]
     GIVEN: ClassVar[tuple[str, ...]]
     case: Any
     seeds: list[int]
@@ -100,7 +103,7 @@ class SweptCase:
 class SweptRun(SweptCase):
     """A case of `sand run`, or of `sand grow`, each box of which is such a run; see `SweptCase`."""
 
-    GIVEN = ("run.seed", "run.out", "grow")
+    NAME, GIVEN = "sand run", ("run.seed", "run.out", "grow")
     NO_RESULTS = (
         *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices"),
         *("ns_per_grain_step", "versions", "source_digest", "sand"),
@@ -154,7 +157,7 @@ class SweptRun(SweptCase):
 class SweptCollision(SweptCase):
     """A case of `sand collide`; see `SweptCase`."""
 
-    GIVEN = ("impact.seeds", "impact.out")
+    NAME, GIVEN = "sand collide", ("impact.seeds", "impact.out")
 
     def __init__(self, content: dict[str, Any], name: str):
         problems = material_errors(content, ("target", "projectile"), "silica")
@@ -186,6 +189,8 @@ class SweptCollision(SweptCase):
 
 class SweptSequence(SweptCollision):
     """A case of sequential collisions, which only a sweep reads; its results are lists over the collisions."""
+
+    NAME = "sequential collisions"
 
     def __init__(self, content: dict[str, Any], name: str):
         problems = material_errors(content, ("target",), "silica")
@@ -219,7 +224,7 @@ class SweptSequence(SweptCollision):
 class SweptScattering(SweptCase):
     """A case of `sand scatter` with one cross-section; see `SweptCase`."""
 
-    GIVEN = ("measure.seed", "measure.out")
+    NAME, GIVEN = "sand scatter", ("measure.seed", "measure.out")
     NO_RESULTS = ("profile", "interval", "seconds", "seed", "speed")
 
     def __init__(self, content: dict[str, Any], name: str):
