@@ -32,7 +32,7 @@ class Expected(NamedTuple):
 
     seconds: float | None  # wall time [s]
     memory: float  # [bytes]
-    disk: float | None  # of all its files [bytes]
+    disk: float | None  # of all its files but the row [bytes]
 
 
 class SweptCase:
@@ -203,14 +203,14 @@ class SweptSequence(SweptCollision):
         return with_integrator(SequenceCase, content)
 
     def expected(self, seed: int) -> Expected:
-        """Twice the cost of the last collision, estimated for chains: each one before it costs half as much."""
+        """Twice the cost of the last collision, estimated for chains: each one before costs half as much; no files."""
         case, body = self.case, self.case.body(seed)
         count = len(body) * 2 ** (case.sequence.collisions - 1)
         long = chain(count, radius=float(body.radius.mean()), material=body.materials[0])
         start = approach(long, long, speed=case.impact.speed, impact_parameter=0.0, along="x", seed=seed)
         cost = prepare(start, *case.physics()).expected_cost(expected_end(start, case.ending()))
         seconds = _without_figure(cost)
-        return Expected(None if seconds is None else 2.0 * seconds, cost.memory, cost.disk)
+        return Expected(None if seconds is None else 2.0 * seconds, cost.memory, 0.0)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
         """Simulate all collisions; nothing is kept of an interrupted run."""

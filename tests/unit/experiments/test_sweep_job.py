@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 import threading
 import time
 import warnings
@@ -272,17 +273,23 @@ def test_a_worker_that_dies_is_replaced(case):
     with pytest.warns(UserWarning, match="a worker process died"):
         content = swept(path, {"vary": {"impact.speed": [7]}}, folder="lost", executor=Breaking("lost", 5, 9))
     assert content["failed"] == 1 and "the process that computed it died 3 times" in str(content["failures"])
+    said = []
+    with pytest.warns(UserWarning, match="a worker process died"):
+        SweepJob(path, "said", {"seeds": [5, 6]}).run(
+            Breaking("said", 5, 9), progress=lambda *given: said.append(given)
+        )
+    assert len([line for *_, line in said if line]) == 1
 
 
 def test_dry_run_and_cost(case, capsys):
-    """The runs are listed and their cost is said: 12 runs of 2 s by 2 workers, 2 × 100 MB, 12 × 3 MB."""
+    """The runs are listed and their cost is said: 12 runs of 2 s by 2 workers, 2 × 100 MB, 12 × 3 MB and their rows."""
     path, computed = case
     words = ["sweep", str(path), "--vary", "impact.speed=lin(2,4,3)", "--vary", "target.grains=3,6", "--workers", "2"]
     assert main([*words, "--dry-run"]) == 0
     out = capsys.readouterr().out
     assert computed == [] and not Path("case-sweep").exists()
     assert "impact.speed = 2.0, target.grains = 3, seed = 4" in out and "12, 12 left" in out
-    assert "about 12 s by 2 workers" in out and "about 200 MB" in out and "about 36 MB" in out
+    assert "about 12 s by 2 workers" in out and "about 200 MB" in out and "about 36.1 MB" in out
     assert main([*words, "--dry-run", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert len(found["runs"]) == 12 and found["expected"]["seconds"] == pytest.approx(24.0, abs=1e-9)
@@ -394,6 +401,18 @@ def test_parquet(case):
     table = parquet.read_table("out/sweep.parquet")
     assert table.num_rows == 12 and table["impact.speed"].to_pylist()[0] == 2.0
     assert table["lost_breaking"].null_count == 12
+
+
+def test_parquet_goes_on(case, monkeypatch):
+    """A table that is there is written again, also without the option; without pyarrow nothing is computed."""
+    path, computed = case
+    SweepJob(path, "out", VARY).begin()
+    Path("out/sweep.parquet").touch()
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    for folder, parquet in (("out", False), ("new", True)):
+        with pytest.raises(BadInput, match="--parquet needs "):
+            swept(path, folder=folder, parquet=parquet)
+    assert computed == []
 
 
 @pytest.mark.parametrize(
