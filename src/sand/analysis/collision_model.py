@@ -17,6 +17,7 @@ from ..basics.arguments import checked
 from ..basics.errors import BadInput, did_you_mean
 from ..basics.units import si
 from .collision_kinds import growth_efficiency
+from .fits import falls_below
 
 
 class Collisions(NamedTuple):
@@ -193,14 +194,10 @@ def thresholds(rows: Sequence[Efficiency]) -> list[Threshold]:
 
 def _crossing(speed: np.ndarray, f: np.ndarray) -> float:
     """Speed at which f first becomes negative; 0 if it is so at the lowest one, infinite if at none."""
-    below = np.flatnonzero(f < 0.0)
-    if not len(below):
-        return math.inf
-    k = int(below[0])
-    if k == 0:
+    if f[0] < 0.0:
         return 0.0
-    part = f[k - 1] / (f[k - 1] - f[k])
-    return float(speed[k - 1] * (speed[k] / speed[k - 1]) ** part)
+    found = falls_below(speed, f, 0.0)
+    return math.inf if math.isnan(found) else found
 
 
 def rate_average(speed: Any, value: Any, rms: Any) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Fits of power laws, with jackknife errors over independent boxes, and intervals of means.
+"""Fits of power laws, with jackknife errors over independent boxes, intervals of means, and falls below a level.
 
 Data of one box are correlated; the jackknife therefore omits whole boxes.
 """
@@ -173,3 +173,20 @@ def separation(first: np.ndarray, second: np.ndarray) -> float:
     if abs(difference) <= rounding:
         return 0.0
     return float(difference / error) if error > rounding else float(np.copysign(np.inf, difference))
+
+
+def falls_below(x: np.ndarray, y: np.ndarray, level: float) -> float:
+    """First x at which y falls below a level, by linear interpolation of y over ln x; NaN if it does not.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        (V,), x > 0 and increasing; points whose y is NaN are left out.
+    """
+    known = np.isfinite(y)
+    u, f = np.log(x[known]), y[known] - level
+    below = np.flatnonzero((f[1:] < 0.0) & (f[:-1] >= 0.0))
+    if not below.size:
+        return np.nan
+    k = int(below[0])
+    return float(np.exp(u[k] + (u[k + 1] - u[k]) * f[k] / (f[k] - f[k + 1])))

@@ -332,7 +332,7 @@ def _sweep_case(path: Path, start: tuple[str, str]) -> Description:
     job = SweepJob(path)
     expected = job.expected(job.rows)
     keys = [(key, f"{len({str(row.values[key]) for row in job.rows})} values") for key in job.keys]
-    rows = [("runs", f"{len(job.rows)} of sand {job.command}"), *keys, *costs_of(expected, len(job.rows), 1), start]
+    rows = [("runs", f"{len(job.rows)} of {job.kind.NAME}"), *keys, *costs_of(expected, len(job.rows), 1), start]
     content = {"kind": "sweep case", "case": files.read_toml(path), "runs": len(job.rows)}
     return "a valid case of a sweep", rows, content | {"cost": expected._asdict()}
 

@@ -193,13 +193,16 @@ def _of_collisions(folder: Path, path: Path) -> Sentences:
 
 
 def _collision(case: Any, summary: dict[str, Any]) -> Sentences:
-    """Sentences on a case of `sand collide`."""
+    """Sentences on a case of `sand collide`, or of sequential collisions."""
     from .method_text import section
 
-    for name, body in (("target", case.target), ("projectile", case.projectile)):
+    bodies = {name: body for name in ("target", "projectile") if (body := getattr(case, name)) is not None}
+    for name, body in bodies.items():
         yield f"The {name} was: {section(body)}."
+    if len(bodies) == 1:
+        yield f"It collided with a copy of itself, and so did what grew from it: {section(case.sequence)}."
     yield f"They collided with {section(case.impact, 'seeds', 'out')}; b, c: sums of outer, characteristic radii."
-    used = [case.target.material, case.projectile.material, *case.materials]
+    used = [*(body.material for body in bodies.values()), *case.materials]
     yield from _common(case, used, summary, case.physics()[0])
 
 
@@ -250,11 +253,11 @@ def _of_sweep(folder: Path, path: Path) -> Sentences:
             for name, values in varied.items()
         ]
         done = f"{int((table[STATE] == DONE).sum())} of {len(table[STATE])} runs"
-        yield f"A sweep of sand {command} varied {', '.join(texts)} (SI units); {done} were done."
+        yield f"A sweep of {swept.NAME} varied {', '.join(texts)} (SI units); {done} were done."
     else:
-        yield f"No run of a sweep of sand {command} has ended."
+        yield f"No run of a sweep of {swept.NAME} has ended."
     yield "All else, and values that are not varied, are those of this case:"
-    if command == "collide":
+    if command in ("collide", "sequence"):
         yield from _collision(swept.case, {})
     elif command == "scatter":
         yield from _scattering(swept.case, swept.case.flights())

@@ -23,13 +23,7 @@ from . import options, parsing, report
 @options.threads
 @options.output
 def command(
-    name: str | None,
-    out: str | None,
-    small: bool,
-    known: bool,
-    retry: bool,
-    threads: int | None,
-    **how: Any,
+    name: str | None, out: str | None, small: bool, known: bool, retry: bool, threads: int | None, **how: Any
 ) -> int | None:
     """Compute the figure NAME of a paper; without NAME, list all figures.
 

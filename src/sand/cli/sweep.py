@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -34,18 +34,12 @@ def _varied(_context: click.Context, _option: click.Parameter, texts: tuple[str,
 
 def _seeds(context: click.Context, option: click.Parameter, text: str | None) -> Any:
     """Read '3' as a number of seeds, and all else as a list of them.  Raises BadInput."""
-    if text is not None and text.isdecimal() and len(text) < 7:
+    if text is not None and text.isdecimal() and len(text) < 19:
         return int(text)
     return options.read_seeds(context, option, text)
 
 
-def _check(values: Mapping[str, Any]) -> Iterator[str]:
-    """Options of which one has no meaning without the other."""
-    if values["design_seed"] is not None and values["samples"] is None:
-        yield "--design-seed is for random designs: give --samples"
-
-
-@parsing.command("sweep", short_help="Run a case for many values of its keys, into one table.", check=_check)
+@parsing.command("sweep", short_help="Run a case for many values of its keys, into one table.")
 @click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
 @click.option(
     "--vary",
@@ -61,7 +55,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @click.option(
     "--design",
     type=click.Choice(["latin hypercube", "sobol", "halton", "random"]),
-    help="The random design (default: latin hypercube).",
+    help="The random design (default: that of the case, or latin hypercube).",
 )
 @click.option("--design-seed", type=options.SEED, metavar="S", help="Seed of the random design (default 0).")
 @click.option("--files", type=click.Choice(["all", "none"]), help="Files that are kept of each run (default: all).")
@@ -94,8 +88,6 @@ def command(
     settings = how.pop("vary") | {
         name: how.pop(name) for name in ("seeds", "samples", "design", "design_seed", "files")
     }
-    if settings["samples"] is not None and settings["design"] is None:
-        settings["design"] = "latin hypercube"
     job = SweepJob(case, out, settings, retry=retry, parquet=parquet)
     return sweep(job, dry_run=dry_run, threads=threads, **how)
 

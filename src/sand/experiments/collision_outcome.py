@@ -17,6 +17,7 @@ from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.state import LOST
 from ..basics.units import format_quantity
+from ..setup.encounters import outer_radius
 from ..simulation.simulation import Simulation
 from .settled import strength_of
 
@@ -50,7 +51,7 @@ class Approach(NamedTuple):
     @property
     def reach(self) -> float:
         """Sum of the outer radii of both bodies [m], beyond which no impact parameter can hit."""
-        return sum(_outer_radius(body) for body in (self.target, self.projectile))
+        return outer_radius(self.target) + outer_radius(self.projectile)
 
     def bodies(self) -> str:
         """The bodies in words, such as '64 + 3 grains of silica'."""
@@ -69,11 +70,6 @@ class Approach(NamedTuple):
         smallest = float(self.grains.radius.min())
         sound = max(math.sqrt(m.density / m.young_modulus) for m in self.grains.materials)
         return max(0.1 * smallest / self.speed, 30.0 * smallest * sound)
-
-
-def _outer_radius(body: Grains) -> float:
-    centre = np.average(body.position, axis=0, weights=body.mass)
-    return float((np.linalg.norm(body.position - centre, axis=1) + body.radius).max())
 
 
 @dataclass(frozen=True)

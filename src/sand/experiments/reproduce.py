@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from ..analysis.collision_kinds import growth_efficiency
 from ..basics.errors import BadInput, did_you_mean
 from ..contact.model import Contact
 from ..io.run_folder import COMPARISON, FIGURE, SWEEP_CSV, read_toml
@@ -164,7 +165,7 @@ class Reproduction(SweepJob):
             return [shared | _sizes(n, radius, *several) for n, *several in zip(columns[0], *columns[1:], strict=True)]
         target, projectile = case.target.grains, case.projectile.grains
         growth = {"bodies": f"{target} + {projectile} grains", "mass_ratio": target / projectile}
-        growth["growth_efficiency"] = (cells["largest"] - target) / projectile
+        growth["growth_efficiency"] = growth_efficiency(target, projectile, cells["largest"])
         sizes = _sizes(
             target + projectile,
             radius,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.fits import jackknife
+from ..analysis.fits import falls_below, jackknife
 
 
 class Interval(NamedTuple):
@@ -71,20 +71,3 @@ def seed_table(values: Mapping[tuple[Any, float], float]) -> SeedTable:
     for (seed, place), value in values.items():
         of_seeds[seeds.index(seed), x.index(place)] = value
     return SeedTable(np.array(x), of_seeds)
-
-
-def falls_below(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    """First x at which y falls below a level, by linear interpolation of y over ln x; NaN if it does not.
-
-    Parameters
-    ----------
-    x, y : ndarray
-        (V,), x > 0 and increasing; points whose y is NaN are left out.
-    """
-    known = np.isfinite(y)
-    u, f = np.log(x[known]), y[known] - level
-    below = np.flatnonzero((f[1:] < 0.0) & (f[:-1] >= 0.0))
-    if not below.size:
-        return math.nan
-    k = int(below[0])
-    return float(np.exp(u[k] + (u[k + 1] - u[k]) * f[k] / (f[k] - f[k + 1])))

@@ -20,6 +20,7 @@ from ..simulation.outcome import Outcome
 from ..simulation.run_writer import summary_of
 from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
+from .growth_case import GrowSection
 from .sequential import SequenceCase
 
 SEQUENCE = ("outcome", "impact_energy", "contacts_before", "contacts_after", "gyration_after", "time", "steps", "drift")
@@ -31,7 +32,7 @@ class Expected(NamedTuple):
 
     seconds: float | None  # wall time [s]
     memory: float  # [bytes]
-    disk: float | None  # of all its files [bytes]
+    disk: float | None  # of all its files but the row [bytes]
 
 
 class SweptCase:
@@ -55,10 +56,13 @@ class SweptCase:
         The case, checked.
     seeds : list of int
         Its seeds.
+    NAME : str
+        What is varied, for people.
     GIVEN : tuple of str
         Keys of seeds and of the folder, which the sweep gives itself.
     """
 
+    NAME: ClassVar[str]
     GIVEN: ClassVar[tuple[str, ...]]
     case: Any
     seeds: list[int]
@@ -96,23 +100,22 @@ class SweptCase:
         raise NotImplementedError
 
 
-NO_RESULTS = (
-    *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices", "wall_seconds"),
-    *("ns_per_grain_step", "versions", "source_digest", "sand"),
-)
-"""Entries of the summary of a run that are no results, and those that begin with "wall_"."""
-
-
 class SweptRun(SweptCase):
     """A case of `sand run`, or of `sand grow`, each box of which is such a run; see `SweptCase`."""
 
-    GIVEN = ("run.seed", "run.out", "grow")
+    NAME, GIVEN = "sand run", ("run.seed", "run.out", "grow")
+    NO_RESULTS = (
+        *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices"),
+        *("ns_per_grain_step", "versions", "source_digest", "sand"),
+    )
+    """Entries of the summary that are no results; nor are those that begin with "wall_"."""
 
     def __init__(self, content: dict[str, Any], name: str):
         own = {key: table for key, table in content.items() if key != "grow"}
         self.case = check_case(own, name)
-        boxes = content.get("grow")
-        self.seeds = list(boxes["seeds"]) if isinstance(boxes, dict) and "seeds" in boxes else [self.case.run.seed]
+        self.seeds = [self.case.run.seed]
+        if "grow" in content:
+            self.seeds = validate(GrowSection, content["grow"], name, table="grow").seeds
 
     @staticmethod
     def model(content: dict[str, Any]) -> type:
@@ -146,16 +149,15 @@ class SweptRun(SweptCase):
             raise BadInput(f"stopped by physics: {result}")
         if result.outcome is Outcome.WALL_TIME:
             raise BadInput(f"the wall time of its condition, {run.stop}, is used up")
-        ledger = simulation.ledger.with_row(simulation._log_row())
-        summary = summary_of(simulation, result, ledger)
-        kept = {k: v for k, v in summary.items() if k not in NO_RESULTS and not k.startswith("wall_")}
+        summary = summary_of(simulation, result)
+        kept = {k: v for k, v in summary.items() if k not in self.NO_RESULTS and not k.startswith("wall_")}
         return kept | ({"outcome": Outcome.CONDITION_MET.name.lower()} if met else {})
 
 
 class SweptCollision(SweptCase):
     """A case of `sand collide`; see `SweptCase`."""
 
-    GIVEN = ("impact.seeds", "impact.out")
+    NAME, GIVEN = "sand collide", ("impact.seeds", "impact.out")
 
     def __init__(self, content: dict[str, Any], name: str):
         problems = material_errors(content, ("target", "projectile"), "silica")
@@ -188,7 +190,7 @@ class SweptCollision(SweptCase):
 class SweptSequence(SweptCollision):
     """A case of sequential collisions, which only a sweep reads; its results are lists over the collisions."""
 
-    SHOWN = ()
+    NAME = "sequential collisions"
 
     def __init__(self, content: dict[str, Any], name: str):
         problems = material_errors(content, ("target",), "silica")
@@ -201,14 +203,14 @@ class SweptSequence(SweptCollision):
         return with_integrator(SequenceCase, content)
 
     def expected(self, seed: int) -> Expected:
-        """Twice the cost of the last collision, estimated for chains: each one before it costs half as much."""
+        """Twice the cost of the last collision, estimated for chains: each one before costs half as much; no files."""
         case, body = self.case, self.case.body(seed)
         count = len(body) * 2 ** (case.sequence.collisions - 1)
         long = chain(count, radius=float(body.radius.mean()), material=body.materials[0])
         start = approach(long, long, speed=case.impact.speed, impact_parameter=0.0, along="x", seed=seed)
         cost = prepare(start, *case.physics()).expected_cost(expected_end(start, case.ending()))
         seconds = _without_figure(cost)
-        return Expected(None if seconds is None else 2.0 * seconds, cost.memory, cost.disk)
+        return Expected(None if seconds is None else 2.0 * seconds, cost.memory, 0.0)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
         """Simulate all collisions; nothing is kept of an interrupted run."""
@@ -222,7 +224,7 @@ class SweptSequence(SweptCollision):
 class SweptScattering(SweptCase):
     """A case of `sand scatter` with one cross-section; see `SweptCase`."""
 
-    GIVEN = ("measure.seed", "measure.out")
+    NAME, GIVEN = "sand scatter", ("measure.seed", "measure.out")
     NO_RESULTS = ("profile", "interval", "seconds", "seed", "speed")
 
     def __init__(self, content: dict[str, Any], name: str):

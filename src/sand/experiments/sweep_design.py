@@ -178,9 +178,9 @@ class Design:
             )
         errors.done()
         number = section.samples or math.prod(len(next(iter(group.values()))) for group in self.groups)
+        number *= len(section.seeds or [0])
         if number > MOST_RUNS:
-            raise BadInput(f"{number:.2g} combinations are more than {MOST_RUNS:.0e}; give fewer values")
-        self.keys = keys
+            raise BadInput(f"{number:.2g} runs are more than {MOST_RUNS:.0e}; give fewer values, or fewer seeds")
 
     def _group(self, table: Mapping[str, Any], whole: Callable[[str], bool]) -> dict[str, Any]:
         """Values of keys that change together: lists, or for a random design ranges."""
@@ -222,8 +222,8 @@ class Design:
         if self.section.design == EVERY or not self.groups:
             yield from itertools.product(*(range(len(next(iter(group.values())))) for group in self.groups))
             return
+        numbers = [min((len(v) for v in group.values() if isinstance(v, list)), default=0) for group in self.groups]
         for row in _points(self.section, len(self.groups)).tolist():
-            numbers = [min((len(v) for v in group.values() if isinstance(v, list)), default=0) for group in self.groups]
             yield tuple(min(int(u * n), n - 1) if n else u for u, n in zip(row, numbers, strict=True))
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.errors import BadInput, ErrorCollector, shown, warn
+from ..basics.errors import BadInput, ErrorCollector, import_optional, shown, warn
 from ..basics.paths import user_path
 from ..config.case import with_absolute_files
 from ..config.commands import command_for
@@ -23,12 +23,13 @@ from ..config.key_errors import validate
 from ..io import run_folder as files
 from ..io.damage import digest_of
 from ..io.lock import holder, writing
-from ..io.sweep_files import CLAIM, DONE, FAILED, ROW, RUNS, STATE, read_row, read_rows, write_row
+from ..io.sweep_files import CLAIM, DONE, FAILED, PARQUET, ROW, RUNS, STATE, read_row, read_rows, write_row
 from ..results import Sweep
 from .executors import results_of
 from .job import Job, Progress, ignored
 from .sweep_cases import CASES, Expected
 from .sweep_design import (
+    DESIGNS,
     EVERY,
     Design,
     SweepSection,
@@ -48,7 +49,7 @@ MOST_LOSSES = 3
 SET_UP, MOST_SET_UP, SET_UP_SECONDS = 8, 64, 20.0
 """Runs that are set up before the first one is computed: at least, and at most; fewer after this wall time [s]."""
 ROW_BYTES = 12e3
-"""Disk space of a run of which only the row is kept [bytes]."""
+"""Disk space of the row of a run [bytes]."""
 
 
 class SweepJob(Job):
@@ -68,6 +69,8 @@ class SweepJob(Job):
         The case itself, where there is no file.
     retry : bool, optional
         Whether runs that failed are computed again.
+    parquet : bool, optional
+        Whether the table is written as Parquet, too, as it is in any case where the folder has such a table.
 
     Raises
     ------
@@ -104,7 +107,7 @@ class SweepJob(Job):
             raise BadInput(f"{path}: sweep = {shown(own)} must be a table, [sweep]")
         self.section = validate(SweepSection, _replaced(own, settings or {}), str(path), table="sweep")
         self.folder = user_path(folder or self.section.out or f"{self.path.stem}-sweep", "folder")
-        self.retry, self.parquet = retry, parquet
+        self.retry, self.parquet = retry, parquet or (self.folder / PARQUET).exists()
         self.command = command_for(self.content) or ""
         if self.command not in CASES:
             raise BadInput(f"{path} is no case that a sweep can vary; write one with sand new NAME --for sweep")
@@ -117,7 +120,7 @@ class SweepJob(Job):
         name, errors = str(self.path), ErrorCollector()
         model = self.kind.model(self.content)
         given = self.kind.GIVEN
-        keys = [key for table in ({**self.section.vary}, *self.section.together) for key in table]
+        keys = [key for table in (self.section.vary, *self.section.together) for key in table]
         for key in keys:
             if key in given or key.partition(".")[0] in given:
                 errors.problems.append(f"{name}: {key}: give seeds as --seeds, the folder as --out, or in [sweep]")
@@ -130,6 +133,7 @@ class SweepJob(Job):
             raise error.at(f"{name}: sweep") from None
         self.seeds = self.section.seeds or errors.take(self._seeds, next(design.combinations()), instead=[0])
         self.content = without_keys(self.content, list(given))
+        self.command = command_for(self.content) or ""  # of boxes of sand grow: run, as that of case.toml
         self.defaults = self._defaults(keys)
         found: dict[str, Row] = {}
         for values in design.combinations():
@@ -199,7 +203,7 @@ class SweepJob(Job):
         errors.done()
         share, keeps = len(left) / max(len(found), 1), self.section.files == "all"
         seconds = [one.seconds for one in found if one.seconds is not None]
-        disk = [one.disk for one in found if one.disk is not None] if keeps else [ROW_BYTES] * len(found)
+        disk = [ROW_BYTES + (one.disk or 0.0) * keeps for one in found if not (keeps and one.disk is None)]
         return Expected(
             share * math.fsum(seconds) if len(seconds) == len(found) else None,
             max((one.memory for one in found), default=0.0),
@@ -252,8 +256,10 @@ class SweepJob(Job):
         Raises
         ------
         BadInput
-            If the folder holds something else, or a sweep of another case.
+            If the folder holds something else, or a sweep of another case; or if Parquet cannot be written.
         """
+        if self.parquet:
+            import_optional("pyarrow.parquet", "--parquet")
         files.make_folder(self.folder, shared=True)
         with writing(self.folder, patience=PATIENCE):
             (self.folder / RUNS).mkdir(exist_ok=True)
@@ -315,6 +321,7 @@ class SweepJob(Job):
                     left = [row for row in left if row.name not in table.known]
                     for row in [row for row in left if losses[row.name] >= MOST_LOSSES]:
                         table.add(row, self._given_up(row))
+                        left.remove(row)
             if not table.busy or attempt + 1 == int(PATIENCE):
                 break
             time.sleep(1.0)  # processes whose parent was killed end soon
@@ -351,6 +358,8 @@ def _replaced(own: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
         kept = [table for table in _tables_of(own) if not keys & table.keys()]
         given["vary"] = {k: v for table in [*kept, *new] if len(table) == 1 for k, v in table.items()}
         given["together"] = [table for table in [*kept, *new] if len(table) > 1]
+    if "samples" in given and own.get("design", EVERY) == EVERY:
+        given.setdefault("design", DESIGNS[1])
     return {**own, **given}
 
 

@@ -50,20 +50,8 @@ CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
 PLOTS = "plots"
 """Subfolder of figures."""
 DERIVED = (
-    ".xyz",
-    ".dump",
-    ".data",
-    ".vtp",
-    ".pvd",
-    ".png",
-    ".pdf",
-    ".svg",
-    ".html",
-    ".csv",
-    ".json",
-    ".geom",
-    ".dat",
-    ".pos",
+    *(".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json"),
+    *(".geom", ".dat", ".pos"),
 )
 """Ends of the names of exports, figures and tables that are made from a run."""
 NAMED = 5

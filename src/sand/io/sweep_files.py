@@ -60,8 +60,13 @@ def flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         if isinstance(value, Mapping):
             cells |= flat(value, f"{prefix}{key}_")
         else:
-            cells[f"{prefix}{key}"] = " ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
+            cells[f"{prefix}{key}"] = cell_of(value)
     return cells
+
+
+def cell_of(value: Any) -> Any:
+    """A value as it is, or the values of a list as text."""
+    return " ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -86,10 +86,9 @@ def encounter(
     side = np.cross(np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.9 else np.array([1.0, 0.0, 0.0]), direction)
     side /= np.linalg.norm(side)
     centres = [np.average(b.position, axis=0, weights=b.mass) for b in (target, projectile)]
-    outer, characteristic = 0.0, 0.0
+    outer, characteristic = outer_radius(target) + outer_radius(projectile), 0.0
     for body, centre in zip((target, projectile), centres, strict=True):
         distance = np.linalg.norm(body.position - centre, axis=1)
-        outer += float((distance + body.radius).max())
         characteristic += float(np.sqrt(np.average(5.0 / 3.0 * distance**2 + body.radius**2, weights=body.mass)))
     offset = offset_of(impact_parameter, outer, characteristic)
     back = _clearance(
@@ -106,6 +105,12 @@ def encounter(
     velocities = [-(1 - share) * v * direction, share * v * direction]
     grains = combined([target, projectile], [np.zeros(3), shift], velocities)
     return Encounter(grains, len(target), float(gap / v))
+
+
+def outer_radius(body: Grains) -> float:
+    """Radius [m] of the smallest sphere about the centre of mass that holds all grains."""
+    centre = np.average(body.position, axis=0, weights=body.mass)
+    return float((np.linalg.norm(body.position - centre, axis=1) + body.radius).max())
 
 
 def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities: Sequence[np.ndarray]) -> Grains:

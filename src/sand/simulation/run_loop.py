@@ -257,7 +257,7 @@ class RunLoop:
             grains = tuple(sorted(np.argsort(np.add(*kinetic_energies(simulation.grains)))[-2:].tolist()))
         if outcome.is_physics:
             simulation._record_output()
-        ledger = simulation.ledger.with_row(simulation._log_row())
+        drift = simulation.present_ledger.drift
         simulation._warnings.take(simulation._engine)
         if is_mostly_awake(simulation):
             simulation._warnings.show(
@@ -268,9 +268,9 @@ class RunLoop:
                 "grains of two bodies overlapped before their touch was seen; halve step_fraction in [stepping]"
             )
         met = (self._ended_by or self._criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
-        result = Result(outcome, simulation.steps, simulation.time, ledger.drift, grains, met)
+        result = Result(outcome, simulation.steps, simulation.time, drift, grains, met)
         if simulation.writer:
-            simulation.writer.close(simulation, result, ledger)
+            simulation.writer.close(simulation, result)
         for observer in simulation.observers:
             observer.close(simulation, result)
         if outcome is Outcome.INTERRUPTED:

@@ -252,12 +252,12 @@ class RunWriter:
         if self._trajectory is not None:
             self._trajectory.rescue()
 
-    def close(self, simulation: Simulation, result: Result, ledger: Ledger) -> None:
+    def close(self, simulation: Simulation, result: Result) -> None:
         """Write checkpoint, summary and figure; a further `run` opens the trajectory again."""
         self.save(simulation)
         if self._trajectory is not None:
             self._trajectory.close()
-        summary = summary_of(simulation, result, ledger) | (self._ledger.described() if self._ledger else {})
+        summary = summary_of(simulation, result) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
         Signals.saving.discard(self)
         # no figure after an interruption: the user is waiting for the prompt, or the wall time ends
@@ -281,8 +281,9 @@ def _stamp(path: Path) -> tuple[str, int]:
     return path.name, path.stat().st_mtime_ns
 
 
-def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[str, Any]:
-    """Build the content of summary.json; `ledger` ends with a row of the present state."""
+def summary_of(simulation: Simulation, result: Result) -> dict[str, Any]:
+    """Build the content of summary.json."""
+    ledger = simulation.present_ledger
     last = ledger.rows[-1]
     grain_steps = result.steps * len(simulation.grains)
     return {

@@ -591,6 +591,12 @@ class Simulation(ReadOnlySettings):
             self._measured = StepTimer(self)
         return self._measured
 
+    @property
+    @exclusive
+    def present_ledger(self) -> Ledger:
+        """The ledger with a row of the present state as its last one."""
+        return self.ledger.with_row(self._log_row())
+
     def _log_row(self) -> dict[str, float]:
         return self.ledger.row_of(self._engine)
 

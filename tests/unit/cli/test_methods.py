@@ -114,6 +114,17 @@ def test_each_kind_of_folder(kind, tmp_path, capsys):
     assert all(line.strip() in [one.text() for one in ARTICLES] for line in cited)
 
 
+def test_a_sweep_of_sequential_collisions(tmp_path, capsys):
+    """There is one body; the table of the sweep may be missing."""
+    case = "[target]\nkind = 'chain'\ngrains = 2\nradius = '1 um'\n[impact]\nspeed = '3 m/s'\n"
+    case += "[sequence]\ncollisions = 4\n[sweep]\nseeds = 2"
+    assert main(["methods", str(folder_of(tmp_path / "x", case, {"sweep.json": {}}))]) == 0
+    text = capsys.readouterr().out
+    assert "No run of a sweep of sequential collisions has ended." in text
+    assert "The target was: kind = chain, grains = 2" in text and "projectile" not in text
+    assert "It collided with a copy of itself, and so did what grew from it: collisions = 4." in text
+
+
 def test_all_commands_that_fill_folders():
     """A command with tables of its own in case files is described, or refused in one line (below)."""
     assert set(KINDS) <= set(OWN_TABLES)

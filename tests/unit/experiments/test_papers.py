@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.analysis.fits import falls_below
 from sand.basics.material import material_named
 from sand.cli.main import main
 from sand.experiments import reproduce
@@ -22,7 +23,7 @@ from sand.experiments.paper_growth import (
     mass_ratio_panels,
 )
 from sand.experiments.reproduce import FIGURES, Reproduction, papers_folder
-from sand.experiments.seed_table import Interval, falls_below, seed_table
+from sand.experiments.seed_table import Interval, seed_table
 from sand.experiments.sequential import collide_in_sequence
 from sand.plotting.papers import panels_figure
 from sand.setup import bpca, grain

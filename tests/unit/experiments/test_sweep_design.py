@@ -74,7 +74,8 @@ def test_every_combination():
 
 def test_dotted_keys_of_toml():
     """`impact.speed = …` in [sweep.vary] is a table within a table; both forms are the same."""
-    assert design(vary={"impact": {"speed": [1], "along": ["x"]}}).keys == ["impact.speed", "impact.along"]
+    (values,) = design(vary={"impact": {"speed": [1], "along": ["x"]}}).combinations()
+    assert values == {"impact.speed": 1, "impact.along": "x"}
 
 
 @pytest.mark.parametrize("kind", ["latin hypercube", "sobol", "halton", "random"])
@@ -148,7 +149,8 @@ def test_keys_that_do_not_exist(key, message):
         ({"vary": {"a": "lin(1, x, 4)"}}, "'lin(1, x, 4)' must be lin(FIRST, LAST, NUMBER), such as log("),
         ({"together": [{"a": [1, 2], "b": [1]}]}, "keys that change together need equally many values; there are a 2"),
         ({"vary": {"a": [1]}, "together": [{"a": [1], "b": [2]}]}, "a: its values are given twice"),
-        ({"vary": {"a": list(range(1001)), "b": list(range(1001))}}, "1e+06 combinations are more than 1e+06"),
+        ({"vary": {"a": list(range(1001)), "b": list(range(1001))}}, "1e+06 runs are more than 1e+06; give fewer"),
+        ({"vary": {"a": [1, 2, 3]}, "seeds": 500_000}, "1.5e+06 runs are more than 1e+06; give fewer values, or"),
         ({"vary": {"a": [1]}, "design": "sobol"}, "samples is missing: design = 'sobol' needs a number"),
         ({"vary": {"a": [1]}, "samples": 8}, "samples = 8 is not used by design = 'every combination'; leave it out"),
         ({"vary": 3}, "vary = 3 must be a table of keys with their values"),

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 import threading
 import time
 import warnings
@@ -272,17 +273,23 @@ def test_a_worker_that_dies_is_replaced(case):
     with pytest.warns(UserWarning, match="a worker process died"):
         content = swept(path, {"vary": {"impact.speed": [7]}}, folder="lost", executor=Breaking("lost", 5, 9))
     assert content["failed"] == 1 and "the process that computed it died 3 times" in str(content["failures"])
+    said = []
+    with pytest.warns(UserWarning, match="a worker process died"):
+        SweepJob(path, "said", {"seeds": [5, 6]}).run(
+            Breaking("said", 5, 9), progress=lambda *given: said.append(given)
+        )
+    assert len([line for *_, line in said if line]) == 1
 
 
 def test_dry_run_and_cost(case, capsys):
-    """The runs are listed and their cost is said: 12 runs of 2 s by 2 workers, 2 × 100 MB, 12 × 3 MB."""
+    """The runs are listed and their cost is said: 12 runs of 2 s by 2 workers, 2 × 100 MB, 12 × 3 MB and their rows."""
     path, computed = case
     words = ["sweep", str(path), "--vary", "impact.speed=lin(2,4,3)", "--vary", "target.grains=3,6", "--workers", "2"]
     assert main([*words, "--dry-run"]) == 0
     out = capsys.readouterr().out
     assert computed == [] and not Path("case-sweep").exists()
     assert "impact.speed = 2.0, target.grains = 3, seed = 4" in out and "12, 12 left" in out
-    assert "about 12 s by 2 workers" in out and "about 200 MB" in out and "about 36 MB" in out
+    assert "about 12 s by 2 workers" in out and "about 200 MB" in out and "about 36.1 MB" in out
     assert main([*words, "--dry-run", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert len(found["runs"]) == 12 and found["expected"]["seconds"] == pytest.approx(24.0, abs=1e-9)
@@ -340,6 +347,33 @@ def test_resume_and_info(case, capsys):
     assert "out is finished; its results are in out/sweep.csv" in capsys.readouterr().out
 
 
+def test_options_keep_the_random_design_of_the_case(case, capsys):
+    """`--samples` and `--design-seed` change only these; without a design in the case it is a Latin hypercube."""
+    path, _ = case
+    vary = '[sweep.vary]\n"impact.speed" = "lin(2 m/s, 4 m/s)"\n'
+    path.write_text(f'{CASE}[sweep]\ndesign = "sobol"\nsamples = 4\n{vary}')
+    for words in (["--samples", "8"], ["--design-seed", "3"]):
+        assert main(["sweep", str(path), *words, "--out", words[1], "--quiet"]) == 0
+    text = [Path(folder, "case.toml").read_text() for folder in "83"]
+    assert all('design = "sobol"' in one for one in text) and "samples = 8" in text[0] and "design_seed = 3" in text[1]
+    path.write_text(CASE + "[sweep]\n" + vary)
+    assert SweepJob(path, settings={"samples": 8}).section.design == "latin hypercube"
+
+
+def test_boxes_of_growth(case, capsys):
+    """Each box is a run: those of the written case have the same names, and no run is computed twice."""
+    given = "[grains]\nnumber = 4\nradius = '0.1 um'\n[box]\nperiodic = '4 um'\n[run]\nuntil = '1 ns'\n[grow]\nseeds = "
+    path = Path("grow.toml")
+    path.write_text(given + "[3, 5]")
+    job = SweepJob(path, "out", {"vary": {"grains.number": [4, 5]}})
+    job.begin()
+    again = SweepJob("out/case.toml", "out", resume=True)
+    assert job.seeds == [3, 5] and [row.name for row in again.rows] == [row.name for row in job.rows]
+    path.write_text(given + "3")
+    assert main(["sweep", "grow.toml", "--vary", "grains.number=4,5"]) == 2
+    assert "grow.toml: grow.seeds = 3 must be " in capsys.readouterr().err
+
+
 def test_python_call_open_and_plot(case):
     """The call, with the content of a case in place of a file; what `sand.open` and `sand plot` make of the folder."""
     import tomllib
@@ -369,6 +403,18 @@ def test_parquet(case):
     assert table["lost_breaking"].null_count == 12
 
 
+def test_parquet_goes_on(case, monkeypatch):
+    """A table that is there is written again, also without the option; without pyarrow nothing is computed."""
+    path, computed = case
+    SweepJob(path, "out", VARY).begin()
+    Path("out/sweep.parquet").touch()
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    for folder, parquet in (("out", False), ("new", True)):
+        with pytest.raises(BadInput, match="--parquet needs "):
+            swept(path, folder=folder, parquet=parquet)
+    assert computed == []
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -381,7 +427,11 @@ def test_parquet(case):
         (["--vary", "impact.speed=1", "--vary", "impact.speed=2"], ("--vary impact.speed is given twice; give all",)),
         (["--vary", "impact.speed"], ("--vary 'impact.speed' must be KEY=VALUES",)),
         (["--seeds", "x"], ("--seeds 'x' must be whole numbers",)),
-        (["--vary", "impact.speed=1", "--design-seed", "3"], ("--design-seed is for random designs: give --samples",)),
+        (["--seeds", "10000000"], ("seeds = 10000000 must be a number of seeds",)),
+        (
+            ["--vary", "impact.speed=1", "--design-seed", "3"],
+            ("sweep: design_seed = 3 is not used by design = 'every",),
+        ),
         (["--vary", "impact.speed=1", "--out", "case.toml"], ("case.toml is a file; give another folder with --out",)),
         (
             ["--vary", "impact.speed=1", "--out", "."],
