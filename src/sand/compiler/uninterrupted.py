@@ -10,9 +10,6 @@ from typing import Any
 
 __all__ = ["uninterrupted"]
 
-_NAMES = ("SIGINT", "SIGTERM", "SIGBREAK", "SIGUSR1", "SIGUSR2", "SIGHUP", "SIGXCPU", "SIGALRM")
-_NUMBERS = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
-
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
@@ -31,7 +28,7 @@ def uninterrupted() -> Iterator[None]:
             arrived.append(number)
 
     if threading.current_thread() is threading.main_thread():
-        before |= {number: found for number in _NUMBERS if callable(found := signal.getsignal(number))}
+        before |= {number: found for number in signal.valid_signals() if callable(found := signal.getsignal(number))}
     try:
         for number in before:
             signal.signal(number, note)
