@@ -17,7 +17,10 @@ from .cadence import read_cadence
 from .observers import Observer
 from .updater import read_updaters
 
-ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
+ARGUMENTS = (
+    *("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out"),
+    *("stress",),
+)
 """Arguments of a simulation that are fixed once it is built."""
 RESULT_ATTRIBUTES = (
     *("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound"),

@@ -30,7 +30,7 @@ MAX_COUNTED = 20_000_000
 """Grains × frames whose clusters are counted if there is no ledger."""
 SAMPLED_FRAMES = 12
 """Number of frames, spread evenly over the run, from which ranges are computed."""
-PERCENTILES = ("speed", "spin", "kinetic_energy")
+PERCENTILES = ("speed", "spin", "kinetic_energy", "pressure")
 """Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
 EXTREMES = ("size", "radius", "coordination", "moment", "load")
 """Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""

@@ -39,7 +39,8 @@ from .dipole_loops import (
     separation_if,
 )
 from .ewald_formulas import real_part
-from .long_range_loops import LongRangeSums, all_blocks, listed_blocks
+from .ewald_virial import direct_virial, mesh_virial
+from .long_range_loops import LongRangeSums, all_blocks, listed_blocks, virial_of_pairs
 from .mesh_loops import MESH_DIPOLES, Mesh, add_mesh_field, add_mesh_forces, mesh_rounds, remove_self_waves
 
 
@@ -94,6 +95,7 @@ class EwaldParameters(NamedTuple):
     coefficients: tuple  # of B_s [1/m³] or A_s [1/m], that of the highest power first
     self_field: float  # about 4α³k/(3√π) [T/(A m²)] or 2αk/√π [V/C]: of a grain's own smeared dipole or charge, removed
     mean_field: float  # per total moment −4πk/(3V) in vacuum, 0 for tin foil [T/(A m²)]; per net charge −πk/(Vα²) [V/C]
+    alpha: float  # α [1/m]
     waves: Waves
     buffers: Buffers
 
@@ -107,6 +109,7 @@ class MeshEwaldParameters(NamedTuple):
     coefficients: tuple
     self_field: float
     mean_field: float
+    alpha: float
     mesh: Mesh
 
 
@@ -337,6 +340,14 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
         k = parameters.k if inside else 0.0
         return loads(apart, moment1, moment2, k, parameters.stretch, parameters.coefficients)
 
+    @loop
+    def real_pair(grains, span, parameters, i, j):
+        position1, position2 = load(grains.position, i), load(grains.position, j)
+        moment1, moment2 = load(grains.moment, i), load(grains.moment, j)
+        force, b1, b2, _ = pair_loads(position1, position2, span, moment1, moment2, parameters, True)
+        return force, cross(moment1, b1), cross(moment2, b2)
+
+    virial = virial_of_pairs(real_pair, listed)
     pack = pack_moments if listed else copy_moments
     blocks_of_pairs = listed_blocks if listed else all_blocks
     pair_block = listed_block_of(pair_loads) if listed else all_pairs_block_of(pair_loads)
@@ -364,6 +375,8 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
             bare_pair,
             arrays=COPIES,
             rounds=mesh_rounds(order, MESH_DIPOLES),
+            virial=virial,
+            reciprocal_virial=mesh_virial(True),
         )
 
     begin, block, blocks = with_waves(pack, pair_block, blocks_of_pairs, True)
@@ -376,4 +389,15 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
         add_own_and_mean_field(grains, parameters.self_field, parameters.mean_field)
         add_torques(grains, long_range, span, parameters)
 
-    return LongRangeSums(begin, block, end, blocks, None, energy_shares, bare_pair, arrays=COPIES)
+    return LongRangeSums(
+        begin,
+        block,
+        end,
+        blocks,
+        None,
+        energy_shares,
+        bare_pair,
+        arrays=COPIES,
+        virial=virial,
+        reciprocal_virial=direct_virial(True),
+    )
