@@ -32,7 +32,7 @@ RESERVED = frozenset(
         *("cluster", "size", "coordination", "speed", "kinetic_energy", "alignment", "field_alignment"),
         *("pressure", "virial", "stored_virial"),
         *("load", "mode", "energies", "losses", "contacts", "balance", "temperatures", "still", "frame"),
-        *("grain", "axis"),
+        *("grain", "axis", "along"),
         # columns of exported files
         *("species", "pos", "positions", "velo", "radii", "moments", "dipole", "charges", "type", "x", "y", "z"),
     }

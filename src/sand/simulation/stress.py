@@ -66,8 +66,8 @@ class Stress:
 
     def __repr__(self) -> str:
         diagonal = ", ".join(f"{axis}{axis} {format_quantity(self.total[a, a], 'Pa')}" for a, axis in enumerate("xyz"))
-        volume = format_quantity(self.volume, "m^3")
-        return f"<pressure {format_quantity(self.pressure, 'Pa')} ({diagonal}) in {volume}: {', '.join(self.parts)}>"
+        parts = ", ".join(self.parts)
+        return f"<pressure {format_quantity(self.pressure, 'Pa')} ({diagonal}) in {self.volume:.4g} m^3: {parts}>"
 
 
 def volume_of(engine: Engine, given: Any = None) -> float:

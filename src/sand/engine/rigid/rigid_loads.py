@@ -82,23 +82,24 @@ def virial_at_rest(state: State, force: np.ndarray, torque: np.ndarray) -> np.nd
         If a cluster at rest is joined to its own periodic image.
     """
     grains, bodies, found = state.grains.arrays, state.bodies, np.zeros((3, 3))
-    turns = np.array([matrix_of(bodies.orientation[:, first]) for first in range(len(bodies.first))])
-    offset = np.einsum("iab,bi->ia", turns[bodies.first], bodies.offset)
-    i, j = state.contacts.pair[:, : state.count[CONTACTS]].astype(np.int64)
+    order, sizes, offset = np.argsort(bodies.first, kind="stable"), np.bincount(bodies.first), np.zeros_like(force)
+    for own in np.split(order, np.cumsum(sizes[sizes > 0])[:-1]):
+        if len(own) == 1 or not bodies.asleep[own[0]]:
+            continue
+        offset[own] = s = (matrix_of(bodies.orientation[:, own[0]]) @ bodies.offset[:, own]).T
+        m, spin = grains.mass[own], grains.spin[:, own[0]]
+        inertia = (grains.inertia[own].sum() + (m @ s**2).sum()) * np.eye(3) - (s.T * m) @ s
+        moment = np.cross(s, force[own]).sum(axis=0) + torque[own].sum(axis=0)
+        turning = np.linalg.solve(inertia, moment - np.cross(spin, inertia @ spin))
+        moved = force[own].sum(axis=0) / m.sum() + np.cross(turning, s) + np.cross(spin, np.cross(spin, s))
+        found += s.T @ (m[:, None] * moved - force[own])
+    pair = state.contacts.pair[:, : state.count[CONTACTS]].astype(np.int64)
+    i, j = pair[:, bodies.asleep[pair[0]] == 1]
     apart = state.box.nearest((grains.position[:, i] - grains.position[:, j]).T)
-    around = np.abs(apart - offset[i] + offset[j]).max(axis=1, initial=0.0, where=(bodies.asleep[i] == 1)[:, None])
+    around = np.abs(apart - offset[i] + offset[j]).max(axis=1, initial=0.0)
     if (around > 0.5 * state.box.shortest).any():
         raise BadInput(
             f"stress: the cluster at rest of grain {i[np.argmax(around)]} is joined to its own periodic image, and the "
             "forces of its contacts are not known; use sand.Verlet()"
         )
-    order, sizes = np.argsort(bodies.first, kind="stable"), np.bincount(bodies.first)
-    for own in np.split(order, np.cumsum(sizes[sizes > 0])[:-1]):
-        if len(own) > 1 and bodies.asleep[own[0]]:
-            s, m, spin = offset[own], grains.mass[own], grains.spin[:, own[0]]
-            inertia = (grains.inertia[own].sum() + (m @ s**2).sum()) * np.eye(3) - (s.T * m) @ s
-            moment = np.cross(s, force[own]).sum(axis=0) + torque[own].sum(axis=0)
-            turning = np.linalg.solve(inertia, moment - np.cross(spin, inertia @ spin))
-            moved = force[own].sum(axis=0) / m.sum() + np.cross(turning, s) + np.cross(spin, np.cross(spin, s))
-            found += s.T @ (m[:, None] * moved - force[own])
     return found

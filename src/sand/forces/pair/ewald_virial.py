@@ -37,6 +37,22 @@ def _of_mean(grains: Any, parameters: Any, *, dipoles: bool) -> np.ndarray:
     return np.asarray((-0.5 if dipoles else 0.5) * parameters.mean_field * (total**2).sum() * np.eye(3))
 
 
+def _own_waves(grains: Any, vectors: np.ndarray, span: Any, parameters: Any, *, dipoles: bool) -> np.ndarray:
+    """What the summed waves give by the own charge or dipole of each grain, to be removed as in `ewald.own_field`.
+
+    The integral over the sphere q < Q that has the volume of the vectors is (k/3π) q_j² Q exp(−Q²/4α²) δ_ab of a charge
+    and (k/15π) (δ_ab μ² + 2 μ_a μ_b) Q³ exp(−Q²/4α²) of a dipole; it vanishes for all vectors.
+    """
+    volume = 1.0 / (span.inverse_x * span.inverse_y * span.inverse_z)
+    number = np.where(vectors[:, :2].any(axis=1), 2.0, 1.0).sum() + 1.0  # with opposites, along z given already, and 0
+    largest = (6.0 * math.pi**2 * number / volume) ** (1.0 / 3.0)
+    size = parameters.k / math.pi * math.exp(-((0.5 * largest / parameters.alpha) ** 2))
+    if not dipoles:
+        return np.asarray(size * largest / 3.0 * (grains.charge**2).sum() * np.eye(3))
+    square = grains.moment @ grains.moment.T
+    return np.asarray(size * largest**3 / 15.0 * (square.trace() * np.eye(3) + 2.0 * square))
+
+
 def _vectors(waves: Any, span: Any) -> tuple[np.ndarray, np.ndarray]:
     """Half of the wave vectors (K, 3) [1/m], as the loops sum them, and their weights (K,)."""
     n_x, n_y, number, first = waves.column
@@ -53,8 +69,8 @@ def direct_virial(dipoles: bool) -> Callable:
     """`LongRangeSums.reciprocal_virial` of a sum over wave vectors, of dipoles or of charges."""
 
     def virial(grains: Any, span: Any, parameters: Any) -> np.ndarray:
-        found = _of_mean(grains, parameters, dipoles=dipoles)
         vectors, weights = _vectors(parameters.waves, span)
+        found = _of_mean(grains, parameters, dipoles=dipoles)
         parts = max(1, len(vectors) * grains.mass.size // AT_ONCE)
         for q, weight in zip(np.array_split(vectors, parts), np.array_split(weights, parts), strict=True):
             wave = np.exp(1j * (q @ grains.position))
@@ -65,7 +81,7 @@ def direct_virial(dipoles: bool) -> Callable:
             else:
                 factor = wave @ grains.charge
             found += _tensor(0.5 * weight * np.abs(factor) ** 2, q, parameters.alpha)
-        return found
+        return found - _own_waves(grains, vectors, span, parameters, dipoles=dipoles)
 
     return virial
 
