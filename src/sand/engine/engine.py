@@ -83,7 +83,7 @@ class GrainSteps:
         return grains.force.copy(), grains.torque.copy()
 
     def virial_at_rest(self, engine: Engine) -> np.ndarray:
-        """Virial (3, 3) [J] of the contacts in clusters at rest, whose loads no contact steps compute; 0 without any."""
+        """Virial (3, 3) [J] of the contacts in clusters at rest, whose loads contact steps do not compute."""
         return np.zeros((3, 3))
 
     def summary(self, state: State) -> dict[str, Any]:

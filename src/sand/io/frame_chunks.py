@@ -20,7 +20,7 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | log/particles/id | identity of each grain; absent if it is the index, as long as no grain was removed |
 | log/particles/NAME | an own quantity of the user, in SI |
 | log/own | names and units of the own quantities, JSON as bytes: `{"temperature": "K"}`; absent without them |
-| log/particles/virial | shares of the grains in the virial of contacts and walls [J], rows xx, xy, … zz; only if asked for |
+| log/particles/virial | shares of grains in the virial of contacts and walls [J], rows xx, xy, … zz; with stress |
 | log/particles/at_rest | 1 for grains of clusters at rest, 0 for awake ones; only with rigid clusters |
 | log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |

@@ -292,8 +292,8 @@ class Simulation(ReadOnlySettings):
         `grain` and `wall` are indices of grains and of `walls`, `force` [N] and `torque` [N m] act on the grain.
         """
         self._begin()
-        table = self._engine.table_of(self.state)
-        return Contacts(*self._system.given["walls"].contact_table(self.state, self._engine.law, table))
+        walls: Any = self._system.given["walls"]
+        return Contacts(*walls.contact_table(self.state, self._engine.law, self._engine.table_of(self.state)))
 
     @property
     def driven(self) -> tuple[Driven, ...]:
@@ -394,9 +394,10 @@ class Simulation(ReadOnlySettings):
             `flux_density` (N, 3) [T] at the centres, from the other grains and from external fields. `virial` (N, 3, 3)
             [J], the share in the virial of contacts and walls (`stress`): of each contact, force times the arm from the
             point that divides the distance of the centres as the radii. Over the volume of the grain it is the mean
-            pressure tensor in it. All others are energies (N,) [J] that sum to the columns of the ledger: `kinetic` (translation and rotation), `contacts`
-            (half of each contact's elastic energy to each of its grains), and one for each long-range force (half of
-            each pair energy; −½ μ·B for dipoles) and each per-grain force, under the names of their columns.
+            pressure tensor in it. All others are energies (N,) [J] that sum to the columns of the ledger: `kinetic`
+            (translation and rotation), `contacts` (half of each contact's elastic energy to each of its grains), and one
+            for each long-range force (half of each pair energy; −½ μ·B for dipoles) and each per-grain force, under the
+            names of their columns.
         """
         state, grains, contacts = self.state, self.grains, self.contacts
         external = [

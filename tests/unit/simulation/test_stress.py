@@ -1,12 +1,9 @@
 """The stress of a simulation: numbers that follow from the tensor, volumes, refusals."""
 
 import numpy as np
-import pytest
 
-import sand
 from sand.analysis.quantities import measured
 from sand.basics.box import Box
-from sand.basics.errors import BadInput
 from sand.simulation.stress import PRESSURES, Stress
 
 

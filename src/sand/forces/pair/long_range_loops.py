@@ -111,6 +111,7 @@ def long_range_virial_for(sums: LongRangeSums) -> Stage:
 
     Its parameters are those of the loops, and the array (9,).
     """
+    assert sums.virial is not None
     virial = sums.virial
 
     @stage("the stress of pairs")
