@@ -89,12 +89,12 @@ def test_moduli_of_crystals():
 @pytest.fixture(scope="module")
 def packing():
     """Grains of two sizes that collided and stick: contacts across the boundaries that slid, rolled and twisted."""
-    gas = sand.setup.gas(100, 2e-6, radius=[1e-7, 1.4e-7] * 50, material=ICE, seed=4)
-    velocity = 3.0 * np.random.default_rng(4).normal(size=(100, 3))
+    gas = sand.setup.gas(100, 1.5e-6, radius=[1e-7, 1.4e-7] * 50, material=ICE, seed=4)
+    velocity = 1.5 * np.random.default_rng(4).normal(size=(100, 3))
     gas = sand.Grains(gas.position, gas.radius, ICE, velocity=velocity - velocity.mean(axis=0))
-    sim = sand.Simulation(gas, [sand.Contact()], box=2e-6, frame_every="1 s")
+    sim = sand.Simulation(gas, [sand.Contact()], box=1.5e-6, frame_every="1 s")
     with pytest.warns(match="contacts broke"):
-        sim.run(steps=2800)
+        sim.run(steps=3000)
     return sim
 
 
@@ -107,8 +107,8 @@ def test_stress_is_the_derivative_of_energies(packing):
     """
     stress, table = packing.stress(), packing.contacts
     pair, x = table["pair"].astype(int), packing.grains.position
-    across = np.abs(x[pair[:, 0]] - x[pair[:, 1]]).max(axis=1) > 1e-6
-    assert len(pair) > 60 and across.sum() > 5 and table["slide_force"].sum() > 0.1 * abs(table["normal_force"]).sum()
+    across = np.abs(x[pair[:, 0]] - x[pair[:, 1]]).max(axis=1) > 7.5e-7
+    assert len(pair) > 40 and across.sum() > 5 and table["slide_force"].sum() > 0.1 * abs(table["normal_force"]).sum()
     separation = packing.box.nearest(x[pair[:, 0]] - x[pair[:, 1]])
     size = np.abs(separation * table["force"]).sum()
     found = slopes(lambda stretch: math.fsum(contact_energies(strained(packing, stretch))), 1e-7)
@@ -223,7 +223,7 @@ def scattered(force, lengths=3 * [1.2e-6], number=60, **settings):
 
 def energy(sim):
     """Energy [J] of the only force."""
-    return sim.ledger.row_of(sim._engine)[sim.forces[0].column]
+    return sim.loads()["energy"][sim.forces[0].column]
 
 
 CUT = {
@@ -235,6 +235,7 @@ CUT = {
 
 
 @pytest.mark.compiled("dipoles", "listed")
+@pytest.mark.filterwarnings("ignore:.* the cut-off")
 @pytest.mark.parametrize("search", ["all pairs", "cells"])
 @pytest.mark.parametrize("name", CUT)
 def test_pair_forces_with_cutoff(name, search):
