@@ -395,9 +395,9 @@ class Simulation(ReadOnlySettings):
             [J], the share in the virial of contacts and walls (`stress`): of each contact, force times the arm from the
             point that divides the distance of the centres as the radii. Over the volume of the grain it is the mean
             pressure tensor in it. All others are energies (N,) [J] that sum to the columns of the ledger: `kinetic`
-            (translation and rotation), `contacts` (half of each contact's elastic energy to each of its grains), and one
-            for each long-range force (half of each pair energy; −½ μ·B for dipoles) and each per-grain force, under the
-            names of their columns.
+            (translation and rotation), `contacts` (half of each contact's elastic energy to each of its grains), and
+            one for each long-range force (half of each pair energy; −½ μ·B for dipoles) and each per-grain force, under
+            the names of their columns.
         """
         state, grains, contacts = self.state, self.grains, self.contacts
         external = [
