@@ -312,12 +312,12 @@ def test_mesh_against_wave_vectors(kind):
 
 
 @pytest.mark.compiled("dipoles")
+@pytest.mark.filterwarnings("ignore:without settling_time")
 def test_clusters_at_rest_carry_their_inertia():
     """A cluster that turns as a rigid body: W of its contacts is that of contact steps of the same cluster.
 
-    Its contacts pull the grains inwards: tr W = −Σ m |ω×s|², and with moments tr W = −2K − Σ s·F, from A and α of the
-    rigid motion.  In contact steps, damped until its contacts are at rest, W is that of their forces, to 1e-3 of it:
-    the cluster is deformed by 1e-4 of r.
+    Its contacts pull the grains inwards, and against their dipoles: tr W = −Σ m |ω×s|² − Σ s·F.  In contact steps W is
+    that of their forces, and oscillates by 4 % at 0.6 us and 0.6 % at 2 us, as the damped vibrations vanish: to 1 %.
     """
     body = sand.setup.bpca(8, radius=R, material=ICE, moment="1e-17 A m^2", seed=3)
     turn = np.array([2e5, -1e5, 3e5])
@@ -327,24 +327,26 @@ def test_clusters_at_rest_carry_their_inertia():
     contact, found = sand.Contact(damping="critical"), {}
     for name, stepping in (("contacts", sand.Verlet()), ("rigid", sand.RigidClusters())):
         sim = sand.Simulation(grains, [contact, sand.Dipoles()], stepping=stepping, frame_every="1 s")
-        sim.run(until="0.2 us")
+        sim.run(until="2 us")
         found[name] = sim.stress("1 um^3")
         if name == "rigid":
             assert sim.state.at_rest.all()
     size = np.abs(found["rigid"].parts["contacts"]).max()
     for part in ("contacts", "magnetic", "kinetic"):
-        np.testing.assert_allclose(found["rigid"].parts[part], found["contacts"].parts[part], rtol=0, atol=1e-3 * size)
+        np.testing.assert_allclose(found["rigid"].parts[part], found["contacts"].parts[part], rtol=0, atol=1e-2 * size)
+    assert found["rigid"].parts["contacts"].trace() < -0.9 * found["rigid"].parts["kinetic"].trace()
 
 
 def gas(out=None, stress=True):
     """Magnetic grains that stick, in a periodic box."""
     kind = {"radius": "10 nm", "material": "iron", "moment": "material", "temperature": "100 K"}
     grains = sand.setup.gas(20, "0.25 um", **kind, seed=11)
-    forces = [sand.Contact(), sand.Dipoles()]
+    forces = [sand.Contact(damping="critical"), sand.Dipoles()]
     return sand.Simulation(grains, forces, box="0.25 um", stress=stress, out=out, frame_every="2 ns")
 
 
 @pytest.mark.compiled("dipoles")
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate")
 def test_rows_and_frames(tmp_path):
     """With `stress` rows have the present tensor and frames the shares; the motion has the bits of a run without it."""
     sim, plain = gas(tmp_path / "run"), gas(stress=False)
