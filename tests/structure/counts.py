@@ -23,6 +23,8 @@ CAPABILITIES = {
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
+    "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
+    "grains in frames, pictures and page": 488,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8
