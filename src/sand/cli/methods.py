@@ -144,7 +144,7 @@ def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     for name, components in case.components().items():
         for one in components:
             yield f"A part of the simulation, {name}, had: {settings(one)}."
-    yield f"The end was {section(case.run, 'out', 'seed', 'frame_every', 'row_every', 'checkpoint_every')}."
+    yield f"The end was {section(case.run, 'out', 'seed', 'frame_every', 'row_every', 'checkpoint_every', 'stress')}."
 
 
 def _radii(folder: Path) -> str:
