@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from typing import Any, Self
 
 
+class Interruption(KeyboardInterrupt):
+    """The exception of `Interrupts`.
+
+    ``python -m`` ends a process by SIGINT, not with its exit code, if code that `exec` runs was left by an exception
+    whose type is KeyboardInterrupt itself, also where that was caught.
+    """
+
+
 class Interrupts:
     """Context manager in which signals raise KeyboardInterrupt and are recorded.
 
@@ -51,7 +59,7 @@ class Interrupts:
 
     def _raise(self, _number: int, _frame: Any) -> None:
         self.received = True
-        raise KeyboardInterrupt
+        raise Interruption
 
     def _report(self, unraisable: Any) -> None:
         """Hook for exceptions that Python cannot raise: KeyboardInterrupt is recorded and needs no message."""

@@ -22,10 +22,10 @@ from ..simulation.observers import Observer
 from ..simulation.signals import STOPS, Signals
 from . import report
 from .exits import WALL_TIME
-from .interrupts import BEGAN, Interrupts
+from .interrupts import BEGAN, Interruption, Interrupts
 
 
-class WallTimeUsed(KeyboardInterrupt):
+class WallTimeUsed(Interruption):
     """The wall time that the user allows is used up, and the work is saved."""
 
     exit_code = WALL_TIME
@@ -84,7 +84,7 @@ class InterruptObserver(Interrupts, Observer):
         try:
             super()._raise(number, frame)
         except KeyboardInterrupt:
-            raise (WallTimeUsed(self.why) if self.is_late else KeyboardInterrupt) from None
+            raise (WallTimeUsed(self.why) if self.is_late else Interruption) from None
 
     def _check(self) -> None:
         Signals.check()
@@ -93,7 +93,7 @@ class InterruptObserver(Interrupts, Observer):
     def see(self, simulation: Any, row: dict[str, float]) -> None:
         """Raise an exception that was lost."""
         if self.received:
-            raise KeyboardInterrupt
+            raise Interruption
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from numba.core.serialize import dumps, loads
 from ..basics.errors import warn
 from .cache import WRITABLE_BY_OTHERS, remade
 from .progress import Timeout, acquire_lock, free_lock
+from .uninterrupted import uninterrupted
 
 __all__ = ["CodeCache", "Entries", "described", "machine_code"]
 
@@ -178,7 +179,6 @@ class CodeCache(NullCache):
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Compiled code from the disk; None if there is none, while this process holds the lock of its file."""
-        rtsys.initialize(target)  # machine code may refer to its functions
         place = self._place(signature, target.codegen())
         found = self._load(place, target)
         if found is None and not self._locks:
@@ -188,11 +188,13 @@ class CodeCache(NullCache):
                 found = self._load(place, target)
         return found
 
+    @uninterrupted()
     def _load(self, place: tuple[str, str], target: Any) -> Any:
         content = self._entries.read(*place)
         if content is None:
             return None
         try:
+            rtsys.initialize(target)  # machine code may refer to its functions
             return CompileResult._rebuild(target, *loads(content))
         except MemoryError:
             raise

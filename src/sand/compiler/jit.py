@@ -25,6 +25,7 @@ from numba.extending import overload, register_jitable
 from .cache import cache_folders
 from .entries import CodeCache, Entries
 from .progress import CompilationListener, making_code
+from .uninterrupted import uninterrupted
 from .user_code import code_digest
 
 __all__ = ["COMPILED", "COMPILE_TIMES", "cache_folder", "caller", "compile_error", "compile_if_free", "compiled_form"]
@@ -226,6 +227,8 @@ def kernel(
     """
     options = _KERNEL | _COMMON | _NO_ALIASES | {"no_cpython_wrapper": not wrapper, "no_cfunc_wrapper": True}
     compiled = numba.njit(nogil=nogil, **options)(function)
+    if COMPILED:
+        compiled._compiler.compile = uninterrupted()(compiled._compiler.compile)
     _PURPOSES[id(compiled)] = purpose or f"'{function.__name__.replace('_', ' ')}'"
     if cached and COMPILED and (digest := code_digest(function)) is not None:
         _use_cache(compiled, function, f"{digest} {nogil} {wrapper}")
@@ -237,7 +240,7 @@ def compile_error(function: Callable, arguments: Iterable[Any]) -> str:
     if not COMPILED:
         return ""
     try:
-        numba.njit(error_model="numpy")(function).compile(tuple(map(numba.typeof, arguments)))
+        uninterrupted()(numba.njit(error_model="numpy")(function).compile)(tuple(map(numba.typeof, arguments)))
     except numba.core.errors.NumbaError as error:
         text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
         lines = [line.strip() for line in text.splitlines() if line.strip()]

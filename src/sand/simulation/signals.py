@@ -57,7 +57,7 @@ class Signals:
             self.received = number
         elif number == signal.SIGINT:  # other signals may come from several programs
             self._restore()
-            raise KeyboardInterrupt
+            signal.raise_signal(number)
 
     def _restore(self) -> None:
         for number, handler in self._before.items():

@@ -18,6 +18,7 @@ from sand.io.checkpoint import newest_checkpoint
 from sand.io.table import GrowingOutcomes
 
 from ...physics.setups import struck_chain
+from ...systems import stops_others
 
 pytestmark = pytest.mark.compiled("contacts")
 COLLISION = """
@@ -278,6 +279,25 @@ def test_interrupted_while_modules_are_imported(workdir, module, words):
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (ended.returncode, ended.stderr, ended.stdout) == (130, "sand: interrupted\n", "")
+
+
+@stops_others
+def test_the_exit_code_after_an_interrupt_in_a_string(workdir):
+    """Ctrl-C in code that `exec` runs, as in imports of dataclasses, leaves the exit code of `python -m` as it is."""
+    program = (
+        "import sys\n"
+        "import sand.cli.program\n"
+        "from sand.cli.main import main\n"
+        "def command(words, interrupted):\n"
+        "    try:\n"
+        "        exec('import signal, time; signal.raise_signal(signal.SIGINT); time.sleep(5.0)')\n"
+        "    except KeyboardInterrupt:\n"
+        "        return 3\n"
+        "sand.cli.program.run_command = command\n"
+        "sys.exit(main(['cite']))\n"
+    )
+    (workdir / "program.py").write_text(program)
+    assert subprocess.run([sys.executable, "-m", "program"]).returncode == 3
 
 
 def test_no_advice_if_the_folder_was_removed(workdir, capsys, monkeypatch):
