@@ -23,7 +23,7 @@ CAPABILITIES = {
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
     "undecided collisions and unfit ends, maps of outcomes, what a folder holds in words, all runs of an unfinished "
-    "sweep, values given twice": 262,
+    "sweep, values given twice": 267,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""

@@ -112,7 +112,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     "them, or make them again from the new results"
                 )
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder):
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=LOCK):
             pass
     except FilesFailed:
         raise
@@ -170,8 +170,8 @@ def _of_earlier_results(folder: Path) -> list[Path]:
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a folder exists and holds more than a lock file."""
-    return folder.is_dir() and any(one.name != LOCK for one in folder.iterdir())
+    """Whether a folder exists and holds more than a lock file, and the one by which `make_folder` finds it writable."""
+    return folder.is_dir() and any(not one.name.startswith(LOCK) for one in folder.iterdir())
 
 
 def replace_file(path: str | Path, content: bytes) -> None:

@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 import sys
+import tempfile
 import threading
 import time
 import warnings
@@ -161,6 +162,22 @@ def test_two_processes_in_one_folder(case):
     assert len(computed) == len(set(computed)) == 12
     swept(path, folder="whole")
     assert rows("out") == rows("whole")
+
+
+def test_another_process_has_just_made_the_folder(case, monkeypatch):
+    """A file by which it finds out whether it can write there does not count as one of others."""
+    path, _ = case
+    seen, real = [], tempfile.NamedTemporaryFile
+
+    def made(**how):
+        file = real(**how)
+        SweepJob(path, "out", VARY).refuse_others()
+        seen.append(file.name)
+        return file
+
+    monkeypatch.setattr(tempfile, "NamedTemporaryFile", made)
+    make_folder("out", shared=True)
+    assert len(seen) == 1
 
 
 def test_a_run_of_another_process_is_left_to_it(case, monkeypatch):
