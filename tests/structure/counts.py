@@ -24,6 +24,7 @@ CAPABILITIES = {
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
     "undecided collisions and unfit ends, maps of outcomes, what a folder holds in words, all runs of an unfinished "
     "sweep, values given twice": 267,
+    "signals that wait while code is compiled, linked or loaded": 28,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
