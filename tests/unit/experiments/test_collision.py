@@ -87,7 +87,7 @@ def test_a_time_that_is_no_good_end():
 
     The steps of an end at 5 s are those of the usual end in proportion to the times, as all have the same length.
     """
-    start = approach(*aggregates(0), speed=1.0, impact_parameter=0.0, along="x", seed=None)
+    start = approach(*two(0), speed=1.0, impact_parameter=0.0, along="x", seed=None)
     usual, latest = expected_end(start), latest_end(start)
     with pytest.warns(UserWarning) as noted:
         simulation = prepare(start, ending=Ending("5 s"))
