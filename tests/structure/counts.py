@@ -29,7 +29,7 @@ CAPABILITIES = {
     "all images in it": 484,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
-    "grains in frames, pictures and page": 488,
+    "grains in frames, pictures and page": 491,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8
