@@ -8,7 +8,7 @@ import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.box import Box
-from ..basics.clusters import closes_through_boundary, in_one_piece, labels_of
+from ..basics.clusters import closes_through_boundary, closing_lengths, in_one_piece, labels_of
 from ..basics.errors import BadInput, shown
 from ..basics.units import whole_number
 
@@ -132,9 +132,19 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box, refuse_percolat
 def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     """Which clusters (K,) percolate: a path along contacts leads from a grain to its own periodic image.
 
-    Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration. On a path that
-    closes within the box the separations of neighbours (nearest images) add up to 0, on one that percolates to a
-    multiple of the side of the box.
+    Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration.
+    `percolation_axes` has the parameters, and says along which axes.
+    """
+    return percolation_axes(position, pairs, box).any(axis=1)
+
+
+@checked
+def percolation_axes(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Axes (K, 3) along which each cluster percolates, as True and False.
+
+    True where a path along contacts leads from a grain to an image of itself that is displaced along this axis. On a
+    path that closes within the box the separations of neighbours (nearest images) add up to 0, on one that percolates
+    to multiples of the sides of the box.
 
     Parameters
     ----------
@@ -148,8 +158,8 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
     ends = checked_pairs(len(position), pairs)
     labels = labels_of(len(position), ends)
     whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
-    found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
-    found[labels[ends[closes_through_boundary(whole, ends, box), 0]]] = True
+    found = np.zeros((labels.max(initial=-1) + 1, 3), dtype=bool)
+    np.logical_or.at(found, labels[ends[:, 0]], closing_lengths(whole, ends, box) != 0)
     return found
 
 

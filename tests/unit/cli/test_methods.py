@@ -50,6 +50,11 @@ FOLDERS = {
     ),
     "grow": (GROW + CONTACT, {f"seed-{k}/summary.json": SUMMARY for k in (1, 2)} | {"growth.json": {}}),
     "scatter": (SCATTER, {"scattering.json": {"job": "cross-section", "sand": "0.0.7"}}),
+    "stretch": (
+        '[aggregate]\nkind = "rbd"\ngrains = 30\nradius = "0.1 um"\nmaterial = "iron"\n[stretch]\nrate = "2 m/s"\nto = 0.5\n'
+        f'by = "walls"\nseeds = [1, 2, 3]\n{CONTACT}',
+        {"laboratory.json": {"runs": [{}, {}], "sand": "0.0.7"}},
+    ),
     "sweep": (
         COLLIDE + '[sweep.vary]\n"impact.speed" = [2, 4]' + CONTACT,
         {
@@ -79,6 +84,12 @@ EXPECTED = {
         "density = 2650 kg/m^3",
     ],
     "grow": ["seeds 1, 2", "8 grains, a gas", "2 boxes have run", "was 1.5e-05 of"],
+    "stretch": [
+        "seeds 1 to 3; 2 are finished",
+        "The packing was: kind = rbd, grains = 30, radius = 100 nm, material = iron",
+        "to = 0.5, by = walls, along = auto",
+        "density = 7874 kg/m^3",
+    ],
     "sweep": [
         "A sweep of sand collide varied impact.speed = (2, 4), seed = (5) (SI units); 1 of 2 runs were done",
         "The target was: kind = chain, grains = 3, radius = 100 nm, material = silica",
