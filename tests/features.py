@@ -21,6 +21,7 @@ MARKS = "<!-- features -->\n", "<!-- end of features -->\n"
 FEATURES: dict[str, dict[str, Any]] = {
     "walls": {"walls": [sand.Wall([0, 0, "-0.5 um"], [0, 0, 1], "silica")]},
     "driven grains": {"driven": [sand.Driven([0])]},
+    "deformation": {"deformation": sand.Deformation("-1e4 1/s"), "box": "4 um"},
     "gas": {"forces": {"gas": sand.Gas("300 K", pressure="1 mbar")}},
     "bath": {"contact": {"damping": "critical", "bath_temperature": "300 K"}},
     "settling": {"contact": {"damping": "critical", "settling_time": "5 ns"}},
@@ -49,7 +50,7 @@ def simulation(*features: str) -> sand.Simulation:
         contact |= each.get("contact", {})
         stepping |= each.get("stepping", {})
         forces |= each.get("forces", {})
-        more |= {name: value for name, value in each.items() if name in ("walls", "driven", "box", "neighbours")}
+        more |= {name: value for name, value in each.items() if name in ("walls", "driven", "deformation", "box", "neighbours")}
     verlet = sand.Verlet(**stepping)
     bodies = any(each.get("rigid") for each in given)
     how = sand.RigidClusters(contact_stepping=verlet) if bodies else verlet

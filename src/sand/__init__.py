@@ -42,6 +42,7 @@ _MODULES = {
     "resume": "config.build",
     "open": "results",
     "Driven": "components.driven",
+    "Deformation": "components.deformation",
     "Observer": "simulation.observers",
     "Updater": "simulation.updater",
     "set_threads": "basics.threads",
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from .basics.material import Material as Material
     from .basics.ramps import Ramp as Ramp
     from .basics.threads import set_threads as set_threads
+    from .components.deformation import Deformation as Deformation
     from .components.driven import Driven as Driven
     from .components.walls import Wall as Wall
     from .config.build import resume as resume

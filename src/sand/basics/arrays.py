@@ -66,6 +66,8 @@ class PairList(NamedTuple):
     break_overlap: Annotated[np.ndarray, Array((USED,), "m", fewer=1)]
     # positions when the list was built; a buffer while it is built from cells
     anchor: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan", initial=np.inf)]
+    # lengths of the box when the list was built, 0 on open axes
+    built: Annotated[np.ndarray, Array((3,), "m", required=False)]
     # inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
     inner: Annotated[np.ndarray, Array((INNER,), dtype="u4", saved=False)]
     # remaining skins, largest speeds: indices in basics.state, explained in neighbours.skin
@@ -81,6 +83,8 @@ class LongRangeArrays(NamedTuple):
 
     # positions when the list was built
     anchor: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan", initial=np.inf, fewer=0)]
+    # lengths of the box when the list was built, 0 on open axes
+    built: Annotated[np.ndarray, Array((3,), "m", required=False)]
     order: Annotated[np.ndarray, Array(("sorted",), dtype="u4", names=(GRAINS,), saved=False)]  # grain
     start: Annotated[np.ndarray, Array(("grains + 1",), dtype="u4", saved=False)]  # first entry of rows in neighbour
     neighbour: Annotated[np.ndarray, Array(("neighbours",), dtype="u4", saved=False)]  # sorted indices
@@ -108,6 +112,24 @@ class LongRangeArrays(NamedTuple):
     path: Annotated[np.ndarray, Array((3, GRAINS), "m s", fewer=0)]
     # forces and flux densities of each block of a sum over all pairs
     block_sums: Annotated[np.ndarray, Array(("blocks", 3, "padded"), saved=False)]
+
+
+class CellArrays(NamedTuple):
+    """A box that is deformed, and what its deformation has done."""
+
+    # the words of basics.box.MovingSpan
+    span: Annotated[np.ndarray, Array((9,))]
+    # lengths at the start, 0 on open axes
+    start: Annotated[np.ndarray, Array((3,), "m")]
+    # rates that are prescribed: dL/dt / L, or dL/dt over the length at the start, or the largest ones
+    rate: Annotated[np.ndarray, Array((3,), "1/s")]
+    # pressure that the rates follow, and the present running means along each axis
+    goal: Annotated[np.ndarray, Array((1,), "Pa")]
+    pressure: Annotated[np.ndarray, Array((3,), "Pa")]
+    # virial W_aa of contacts at the end of the last step
+    virial: Annotated[np.ndarray, Array((3,), "J")]
+    # work of the boundaries on the grains, by the deformation along each axis
+    work: Annotated[np.ndarray, Array((3,), "J", summed=True)]
 
 
 class ClusterArrays(NamedTuple):

@@ -26,6 +26,20 @@ class Span(NamedTuple):
     inverse_z: float
 
 
+class MovingSpan(NamedTuple):
+    """As `Span`, of a box that is deformed, with its rates of strain dL/dt / L [1/s]: words of `State.cell.span`."""
+
+    x: float
+    y: float
+    z: float
+    inverse_x: float
+    inverse_y: float
+    inverse_z: float
+    rate_x: float
+    rate_y: float
+    rate_z: float
+
+
 def nearest_image(v, span):
     """Shortest periodic image of a separation v [m]; components along open axes are unchanged.
 
@@ -127,6 +141,11 @@ class Box:
             *(1.0 / v if v is not None else 0.0 for v in self.lengths),
         )
 
+    @property
+    def moving_span(self) -> MovingSpan:
+        """The box as a tuple for kernels that may deform it, at rest."""
+        return MovingSpan(*self.span, 0.0, 0.0, 0.0)
+
     def nearest(self, separation: np.ndarray) -> np.ndarray:
         """Shortest periodic images of separations (…, 3) [m]."""
         separation = si_array(separation, "m", "separation")
@@ -179,6 +198,11 @@ class Box:
         if self.is_open:
             return "open"
         return "periodic " + " x ".join("open" if v is None else format_quantity(v, "m") for v in self.lengths)
+
+
+def box_of(lengths: np.ndarray) -> Box:
+    """The box with lengths [m] that are the first three numbers of an array, 0 on open axes."""
+    return Box(tuple(length or None for length in lengths[:3].tolist()))  # type: ignore[arg-type]
 
 
 def as_box(value: Any) -> Box:

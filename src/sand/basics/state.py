@@ -26,6 +26,7 @@ from .array_groups import (
 )
 from .arrays import (
     BodyArrays,
+    CellArrays,
     ClusterArrays,
     ContactArrays,
     LongRangeArrays,
@@ -33,7 +34,7 @@ from .arrays import (
     body_arrays,
     cluster_arrays,
 )
-from .box import Box
+from .box import Box, box_of
 from .errors import BadInput
 from .grains import Grains
 from .material import Material
@@ -136,6 +137,8 @@ contact does not exist."""
 
 GROUPS = ("contacts", "pair_list", "long_range", "clusters", "bodies")
 """Groups of arrays of a state, besides its grains and the groups of components."""
+CELL = "cell"
+"""Name of the group of a box that may be deformed, of a component (`components.deformation`)."""
 SINGLE = ("clock", "count", "lost", "cutoff", "order")
 """Its other arrays."""
 IN_GROUPS, OTHERS = attrgetter(*GROUPS), attrgetter(*SINGLE)
@@ -146,7 +149,7 @@ class State:
     """Time, grains, contacts, box and counters of a simulation: everything that a restart needs."""
 
     grains: Grains
-    box: Box
+    fixed_box: Box  # the box, unless it is deformed
     contacts: ContactArrays
     pair_list: PairList
     long_range: LongRangeArrays
@@ -183,6 +186,16 @@ class State:
     def group_names(self) -> tuple[str, ...]:
         """Their names: parts of a simulation, and in checkpoints."""
         return "grains", *GROUPS, *self.of_components
+
+    @property
+    def cell(self) -> CellArrays | None:
+        """The box in memory, where it may be deformed; None where it may not."""
+        return self.of_components.get(CELL)
+
+    @property
+    def box(self) -> Box:
+        """Box at the time of the state."""
+        return self.fixed_box if self.cell is None else box_of(self.cell.span)
 
     @property
     def time(self) -> float:
@@ -241,7 +254,7 @@ class State:
 
     def take_settings(self, other: State) -> None:
         """Take over what another state has besides arrays."""
-        self.box, self.uniform_contacts = other.box, other.uniform_contacts
+        self.fixed_box, self.uniform_contacts = other.fixed_box, other.uniform_contacts
         vars(self.grains).update(vars(other.grains) | {"arrays": self.grains.arrays})
 
     def arrays(self) -> list[np.ndarray]:

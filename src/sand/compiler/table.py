@@ -242,6 +242,7 @@ class Table:
         self._names = {name: index for index, name in enumerate(names)}
         self._parts, self._rows = dict[str, Any](), dict[str, np.ndarray]()
         self._structures, self._keys = dict[str, Any](), dict[str, int]()
+        self._shared = dict[str, np.ndarray]()
         self._addresses = np.zeros(len(names), np.int64)
         self.address, self.stages = address_of(self._addresses), dict[Any, int]()
         self.calls = dict[Any, tuple[Any, ...]]()
@@ -271,10 +272,15 @@ class Table:
                     self.stages, self.calls = {}, {}
             self._addresses[self.index(name)] = address_of(self._rows[name])
 
+    def share(self, name: str, memory: np.ndarray) -> None:
+        """Let the numbers of a part, a tuple that is set, be those of an array, which stages may change."""
+        self._shared[name] = self._rows[name] = memory
+        self._addresses[self.index(name)] = address_of(memory)
+
     def snapshot(self) -> Table:
         """A copy that keeps its parts when those of this table are replaced; the arrays are the same."""
         other = Table(tuple(self._names))
-        other._parts, other._rows = dict(self._parts), dict(self._rows)
+        other._parts, other._rows, other._shared = dict(self._parts), dict(self._rows), dict(self._shared)
         other._structures, other._keys = dict(self._structures), dict(self._keys)
         other._addresses[:] = self._addresses
         return other
@@ -286,7 +292,7 @@ class Table:
         """
         parts = {name: self._parts[name] for name in but}
         rows = {name: self._rows[name] for name in but if name in self._rows}
-        self._parts, self._rows = other._parts | parts, other._rows | rows
+        self._parts, self._rows, self._shared = other._parts | parts, other._rows | rows, dict(other._shared)
         self._structures, self._keys = dict(other._structures), dict(other._keys)
         own = [self._names[name] for name in but]
         kept = self._addresses[own]
@@ -294,14 +300,14 @@ class Table:
         self._addresses[own] = kept
 
     def __getitem__(self, name: str) -> Any:
-        return self._parts[name]
+        memory = self._shared.get(name)
+        return self._parts[name] if memory is None else type(self._parts[name])(*memory.tolist())
 
     def __getattr__(self, name: str) -> Any:
         """A part, as in compiled code."""
-        try:
-            return self.__dict__["_parts"][name]
-        except KeyError:
-            raise AttributeError(name) from None
+        if name not in self.__dict__.get("_parts", ()):
+            raise AttributeError(name)
+        return self[name]
 
     def index(self, name: str) -> int:
         """Index of a part in the table."""

@@ -13,19 +13,20 @@ from ..basics.grains import Grains
 from ..engine.component import Component
 from ..forces.base import Force
 from .cluster_cutoff import ClusterCutoff
+from .deformation import DeformedBox, read_deformation
 from .driven import DrivenGrains, read_driven
 from .gas import GasKicks
 from .ramps import Ramps
 from .settling import Settling
 from .walls import Walls, read_walls
 
-COMPONENTS: tuple[type[Component], ...] = (ClusterCutoff, Ramps, Walls, GasKicks, DrivenGrains, Settling)
+COMPONENTS: tuple[type[Component], ...] = (ClusterCutoff, Ramps, Walls, GasKicks, DrivenGrains, Settling, DeformedBox)
 """All components, in the order in which they act at the same place.
 
 Between two cycles each grain moves in the gas, then driven grains return to their prescribed motion, and what settling
 finds is the motion of clusters, and that of their grains relative to it.
 """
-GIVEN = {"walls": read_walls, "driven": read_driven}
+GIVEN = {"walls": read_walls, "driven": read_driven, "deformation": read_deformation}
 """What reads a component that the user gives, by keyword of `sand.Simulation`, which is the table of case files."""
 
 

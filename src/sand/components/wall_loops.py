@@ -88,7 +88,7 @@ def _at_step_start(pose, velocity, spin, twist, dt):
 
 
 @loop
-def surfaces_at_wall(bodies, contacts, c, held):
+def surfaces_at_wall(bodies, contacts, c, held, span):
     """The two sides of contact c, for `bodies` = (grains, walls): `damping.surfaces_of_pair` for r2 → ∞."""
     grains, walls = bodies
     g, w = contacts.pair[0, c], contacts.pair[1, c]
@@ -225,7 +225,7 @@ def wall_loop(law: ContactLaw, damping: str) -> Callable:
         if overlap < -constants.break_overlap:
             s.lost[BREAKING] += release_loss(start, reached, present)
             broken = Break(pose, -constants.break_overlap - overlap, dot(velocity, pose.n), constants)
-            _push_apart(s, numbers, c, break_contact(bodies, contacts, s.lost, c, broken, dt))
+            _push_apart(s, numbers, c, break_contact(bodies, contacts, s.lost, c, broken, step))
             return 1
         if exceeds_limits(reached, pose.n, constants):
             target = after_slip(reached, pose.n, constants, step.settings.reset)

@@ -15,6 +15,7 @@ from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, did_you_mean
 from ..basics.material import NEAREST, PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
+from ..components.deformation import Deformation, DeformedBox
 from ..components.driven import Driven
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
@@ -240,7 +241,7 @@ else:
     )
 
 
-COMPONENTS: dict[str, type] = {"walls": WallSection, "driven": Driven}
+COMPONENTS: dict[str, type] = {"walls": WallSection, "driven": Driven, "deformation": Deformation}
 """The tables of components, and what reads them."""
 
 
@@ -256,10 +257,12 @@ class Case(Section):
     stepping: Stepping = Verlet()
     neighbours: Neighbours = Neighbours()
     driven: list[Driven] = Field(default_factory=list)
+    deformation: Deformation | None = None
 
-    def components(self) -> dict[str, list[Any]]:
+    def components(self) -> dict[str, Any]:
         """What the case has of each component, by its keyword of `sand.Simulation`."""
-        return {"walls": [wall.build(self.materials_by_name()) for wall in self.walls], "driven": self.driven}
+        walls = [wall.build(self.materials_by_name()) for wall in self.walls]
+        return {"walls": walls, "driven": self.driven, "deformation": self.deformation}
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the materials of the case, by name."""
@@ -323,6 +326,8 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     try:
         table = content.get("stepping")
         awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
+        box = DeformedBox(())
+        columns += [*box.columns(), *box.losses()] if "deformation" in content else []
         condition.check([*Ledger(awake=awake).columns, *columns, *wall_columns(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems

@@ -21,7 +21,7 @@ from ..forces.registry import FORCES
 from ..integrate.registry import INTEGRATORS
 from ..neighbours.search import Neighbours
 from ..setup.grain_classes import GrainClass
-from .case import COMPONENTS, BoxSection, GrainsSection, MaterialSection, RunSection
+from .case import COMPONENTS, BoxSection, Case, GrainsSection, MaterialSection, RunSection
 
 WIDTH = 110
 """Columns of comments."""
@@ -72,8 +72,13 @@ def run_tables() -> list[Table]:
         *force_tables(),
         *stepping_tables(),
         Table("[neighbours]", summary(Neighbours), keys_of(Neighbours)),
-        *(Table(f"[[{name}]]", _purpose(name, own), keys_of(own)) for name, own in COMPONENTS.items()),
+        *(Table(_head(name), _purpose(name, own), keys_of(own)) for name, own in COMPONENTS.items()),
     ]
+
+
+def _head(name: str) -> str:
+    """The head of the table of a component, of which a case has one or a list."""
+    return f"[{name}]" if Case.model_fields[name].default is None else f"[[{name}]]"
 
 
 def _purpose(name: str, section: type) -> str:

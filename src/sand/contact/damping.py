@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiler.jit import formula, loop
+from ..numerics.flow import relative_velocity
 from ..numerics.random import LOW_WORD, WORD_BITS, philox, uniform
 from ..numerics.vec import add, axpy, cross, dot, load, put, scale, sub
 from .losses import DAMPING_ROW, add_damping_energies
@@ -250,13 +251,13 @@ def measured_load(contacts, c):
 
 
 @loop
-def surfaces_of_pair(grains, contacts, c, held):
-    """The two sides of contact c between grains; `held` has its pose and constants."""
+def surfaces_of_pair(grains, contacts, c, held, span):
+    """The two sides of contact c between grains; `held` has its pose and constants, `span` is the box."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     share, pose = held.constants.derived.radius1 * held.constants.derived.inverse_sum, held.pose
-    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
     w1, w2 = load(grains.spin, i), load(grains.spin, j)
     separation = scale(pose.distance, pose.n)
+    velocity = relative_velocity(grains, i, j, separation, span)
     rolling = surface_rotation(w1, w2, share)
     motion = relative_motion(separation, velocity, rolling, w1, w2)
     return Surfaces(share, velocity, separation, rolling, motion, (grains.id[i], grains.id[j]))
@@ -283,7 +284,7 @@ class DampingVariant(NamedTuple):
 
 @functools.cache
 def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> DampingVariant:
-    """The dashpots of contacts with `surfaces_of(bodies, contacts, c, held)`, in one variant of the contact update."""
+    """The dashpots of contacts with `surfaces_of(bodies, contacts, c, held, span)`, in one variant of the update."""
     if damping == NONE:
         return NO_DAMPING
     thermal = damping == THERMAL
@@ -294,7 +295,7 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
 
         If it is not `active`, the stored loads stay those of the start of the step, and nothing is lost.
         """
-        share, velocity, separation, rolling, motion, ids = surfaces_of(bodies, contacts, c, held)
+        share, velocity, separation, rolling, motion, ids = surfaces_of(bodies, contacts, c, held, step.span)
         n = held.pose.n
         before = Motion(load_rows(contacts.damping, VELOCITY, c), load_rows(contacts.damping, SPIN, c))
         start = stored_load(contacts, c)
@@ -323,7 +324,7 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
 
     @loop
     def at_touch(bodies, contacts, lost, c, held, closing, elapsed, step):
-        motion = surfaces_of(bodies, contacts, c, held).motion
+        motion = surfaces_of(bodies, contacts, c, held, step.span).motion
         store_rows(contacts.damping, VELOCITY, c, motion.velocity)
         store_rows(contacts.damping, SPIN, c, motion.spin)
         store_rows(contacts.damping, FORCE, c, NO_LOAD.force)
@@ -337,14 +338,14 @@ def damping_loops(damping: str, surfaces_of: Callable = surfaces_of_pair) -> Dam
         return impulse
 
     @loop
-    def at_break(bodies, contacts, lost, c, broken, elapsed, dt):
+    def at_break(bodies, contacts, lost, c, broken, elapsed, step):
         # the loads of the start of the step acted for half a step in the velocity Verlet kick; along n, the impulse of
         # the break extends this to the time until the break, dt − elapsed
-        _, velocity, _, rolling, motion, _ = surfaces_of(bodies, contacts, c, broken)
+        _, velocity, _, rolling, motion, _ = surfaces_of(bodies, contacts, c, broken, step.span)
         start = stored_load(contacts, c)
-        losses = damping_losses(start, NO_LOAD, broken.pose.n, velocity, motion, rolling, dt)
+        losses = damping_losses(start, NO_LOAD, broken.pose.n, velocity, motion, rolling, step.dt)
         normal = dot(start.force, broken.pose.n)
-        add_damping_energies(lost, (-normal * broken.opening * (dt - elapsed), losses[1], losses[2], losses[3]))
+        add_damping_energies(lost, (-normal * broken.opening * (step.dt - elapsed), losses[1], losses[2], losses[3]))
         return normal
 
     return DampingVariant(update, single, at_touch, at_break)
@@ -372,7 +373,7 @@ def _no_touch(bodies, contacts, lost, c, held, closing, elapsed, step):
 
 
 @loop
-def _no_break(bodies, contacts, lost, c, broken, elapsed, dt):
+def _no_break(bodies, contacts, lost, c, broken, elapsed, step):
     return 0.0
 
 

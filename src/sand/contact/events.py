@@ -21,6 +21,7 @@ from ..basics.state import (
 )
 from ..compiler.jit import loop, rare
 from ..compiler.stage import Stage, stage
+from ..numerics.flow import relative_velocity
 from ..numerics.quaternion import turned_back
 from ..numerics.vec import accrue, dot, load, load4, nearest_image, put, scale, sub
 from . import tangential
@@ -70,13 +71,13 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
     break_contact, damp = breaking_loop(law, dashpots), dashpots.single
 
     @rare
-    def break_pair(grains, contacts, lost, c, pose, constants, dt):
-        """Break contact c in a step of dt [s]."""
+    def break_pair(grains, contacts, lost, c, pose, constants, step):
+        """Break contact c in a step (`update.PresentStep`)."""
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         overlap = grains.radius[i] + grains.radius[j] - pose.distance
-        opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
+        opening = dot(relative_velocity(grains, i, j, scale(pose.distance, pose.n), step.span), pose.n)
         broken = Break(pose, -constants.break_overlap - overlap, opening, constants)
-        apply_pair_impulse(grains, i, j, pose.n, break_contact(grains, contacts, lost, c, broken, dt))
+        apply_pair_impulse(grains, i, j, pose.n, break_contact(grains, contacts, lost, c, broken, step))
 
     @rare
     def update_flagged_contacts(grains, contacts, pair_list, count, lost, step):
@@ -99,11 +100,11 @@ def slip_and_break_loop(law: ContactLaw, damping: str) -> Callable:
             reached = displacements_of(pose, overlap, r1, r2, constants)
             y = radius_root(overlap, constants)
             if exceeds_limits(reached, pose.n, constants):
-                start = displacements_before(grains, contacts, c, pose, constants, step.dt)
+                start = displacements_before(grains, contacts, c, pose, constants, step)
                 present = scaled_stiffness(constants, y, step.settings.follow)
                 if overlap < -constants.break_overlap:
                     lost[BREAKING] += release_loss(start, reached, present)
-                    break_pair(grains, contacts, lost, c, pose, constants, step.dt)
+                    break_pair(grains, contacts, lost, c, pose, constants, step)
                     count[BROKEN] += 1
                     mark_separated(pair_list, count, i, j)
                     broken = True
@@ -241,7 +242,7 @@ def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
                 continue
             distance = math.sqrt(squared_distance)
             n, overlap = scale(1.0 / distance, separation), radii - distance
-            closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
+            closing = -dot(relative_velocity(grains, i, j, separation, step.span), n)
             formed = clock[TIME] + step.dt - time_since(overlap, closing, step.dt)
             c = add_contact(grains, contacts, count, step.span, step.settings, i, j, formed)
             pairing = load_pairing(step.settings.pairings, grains.material[i], grains.material[j])

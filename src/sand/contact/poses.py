@@ -1,6 +1,7 @@
 """Poses of contacts from the arrays of grains and contacts, and displacements at the start of a step."""
 
 from ..compiler.jit import loop
+from ..numerics.flow import relative_velocity
 from ..numerics.quaternion import turned, turned_by
 from ..numerics.vec import axpy, load, load4, nearest_image, scale, sub
 from . import tangential
@@ -36,28 +37,28 @@ def pose_apart(grains, contacts, separation, c, twist):
 
 
 @loop
-def twist_increment(grains, contacts, c, pose, dt):
-    """Increase of the twist [rad] in the step that led to this pose, from mid-step velocities and spins."""
+def twist_increment(grains, contacts, c, pose, step):
+    """Increase of the twist [rad] in the step (`update.PresentStep`) that led to this pose, from mid-step motion."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     turn = sub(load(grains.spin, i), load(grains.spin, j))
-    speed = sub(load(grains.velocity, i), load(grains.velocity, j))
-    return dt * tangential.twisting_rate(pose.n, turn, speed, pose.inverse_distance, dt)
+    speed = relative_velocity(grains, i, j, scale(pose.distance, pose.n), step.span)
+    return step.dt * tangential.twisting_rate(pose.n, turn, speed, pose.inverse_distance, step.dt)
 
 
 @loop
-def pose_at_step_end(grains, contacts, separation, c, dt):
-    """Relative pose at the end of a step of dt [s], with the twist accumulated in the step."""
+def pose_at_step_end(grains, contacts, separation, c, step):
+    """Relative pose at the end of a step (`update.PresentStep`), with the twist accumulated in the step."""
     pose = pose_apart(grains, contacts, separation, c, 0.0)
-    twist = contacts.twist[c] + twist_increment(grains, contacts, c, pose, dt)
+    twist = contacts.twist[c] + twist_increment(grains, contacts, c, pose, step)
     return Pose(pose.n, pose.distance, pose.inverse_distance, pose.n1, pose.n2, twist)
 
 
 @loop
-def displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt):
+def displacements_at_step_start(grains, contacts, c, pose, twist, constants, step):
     """Displacements at the start of the step that led to this pose; `twist` is the twist at that time."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
-    separation = axpy(-dt, relative_velocity, scale(pose.distance, pose.n))
+    separation, dt = scale(pose.distance, pose.n), step.dt
+    separation = axpy(-dt, relative_velocity(grains, i, j, separation, step.span), separation)
     n1 = turned_by(scale(-dt, load(grains.spin, i)), pose.n1)
     n2 = turned_by(scale(-dt, load(grains.spin, j)), pose.n2)
     start, r1, r2 = pose_of(separation, n1, n2, twist), grains.radius[i], grains.radius[j]
@@ -65,7 +66,7 @@ def displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt)
 
 
 @loop
-def displacements_before(grains, contacts, c, pose, constants, dt):
+def displacements_before(grains, contacts, c, pose, constants, step):
     """Displacements at the start of the step, for a contact whose stored twist is that at the end."""
-    twist = pose.twist - twist_increment(grains, contacts, c, pose, dt)
-    return displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt)
+    twist = pose.twist - twist_increment(grains, contacts, c, pose, step)
+    return displacements_at_step_start(grains, contacts, c, pose, twist, constants, step)

@@ -166,7 +166,7 @@ def kept_loop(law: ContactLaw) -> Callable:
             if contacts.kept[STEP_KEPT, c] != present:
                 constants = load_constants(contacts.constants, part.column + k)
                 pose = pose_at(grains, contacts, step.span, c, 0.0)
-                start = displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, step.dt)
+                start = displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, step)
                 _keep(contacts, c, start.slide, start.roll, present)
 
     @loop

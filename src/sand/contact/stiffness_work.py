@@ -18,13 +18,16 @@ def stiffness_work_loop(law: ContactLaw) -> Callable:
     constants_at, radius_root = column_loops(law).at, law.radius_root
 
     @rare
-    def log_stiffness_work(grains, contacts, count, lost, span, dt):
-        """Log the energy that stiffnesses following a(δ) removed from the springs of all contacts in this step."""
+    def log_stiffness_work(grains, contacts, count, lost, step):
+        """Log the energy that stiffnesses following a(δ) removed from the springs of all contacts in this step.
+
+        `step` is an `update.PresentStep`.
+        """
         for c in range(count[CONTACTS]):
             constants = constants_at(contacts, c)
-            pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+            pose = pose_at(grains, contacts, step.span, c, contacts.twist[c])
             r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
-            start = displacements_before(grains, contacts, c, pose, constants, dt)
+            start = displacements_before(grains, contacts, c, pose, constants, step)
             displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
             at_start = scaled_stiffness(constants, radius_root(start.overlap, constants), True)
             now = scaled_stiffness(constants, radius_root(displacements.overlap, constants), True)

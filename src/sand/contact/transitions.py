@@ -61,8 +61,8 @@ def breaking_loop(law: ContactLaw, dashpots: DampingVariant) -> Callable:
     at_break, damping_of_break = law.at_break, dashpots.at_break
 
     @loop
-    def break_contact(bodies, contacts, lost, c, broken, dt):
-        """Log the energy of contact c, which broke within the step of dt [s], and flag it as broken.
+    def break_contact(bodies, contacts, lost, c, broken, step):
+        """Log the energy of contact c, which broke within a step (`update.PresentStep`), and flag it as broken.
 
         The contact force just before the break ended a time τ before the end of the step, but velocity Verlet
         applied it for half a step: the difference is applied as an impulse.
@@ -72,13 +72,13 @@ def breaking_loop(law: ContactLaw, dashpots: DampingVariant) -> Callable:
         float
             Impulse on grain 1 along n [N s].
         """
-        elapsed = time_since(broken.stretched, broken.opening, dt)
+        elapsed = time_since(broken.stretched, broken.opening, step.dt)
         energy, force = at_break(broken.constants)
         lost[BREAKING] += energy
-        force += damping_of_break(bodies, contacts, lost, c, broken, elapsed, dt)
+        force += damping_of_break(bodies, contacts, lost, c, broken, elapsed, step)
         contacts.flag[c] = BROKEN_FLAG
         store_loads(contacts, c, (ZERO, ZERO, ZERO))
-        return force * (0.5 * dt - elapsed)
+        return force * (0.5 * step.dt - elapsed)
 
     return break_contact
 

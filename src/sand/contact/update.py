@@ -121,7 +121,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             c = part.first + k
             constants = load_constants(contacts.constants, part.column + k)
             r1, r2 = constants.derived.radius1, constants.derived.radius2
-            pose = pose_at_step_end(grains, contacts, apart(grains, contacts, step.span, c), c, step.dt)
+            pose = pose_at_step_end(grains, contacts, apart(grains, contacts, step.span, c), c, step)
             overlap = r1 + r2 - pose.distance
             y, valid = radius_root(overlap, constants)
             present = scaled_stiffness(constants, y, True) if follow else constants

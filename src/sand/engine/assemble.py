@@ -84,7 +84,7 @@ def build_engine(
     holding, verlet, errors = [each for each in extra if each.holds], stepping.contact_stepping, ErrorCollector()
     kind = KINDS.get(stepping.name, Kind)(holds=bool(holding))
     by_type = forces_by_type(forces, grains)
-    setup = Setup(grains, by_type, box, stepping, neighbours, fresh, saved)
+    setup = Setup(grains, by_type, box, stepping, neighbours, fresh, saved, extra)
     warnings = errors.take(check_system, grains, forces, box, fresh=fresh, instead=[])
     warnings += errors.take(kind.check, forces, neighbours, instead=[])
     errors.problems += [line for each in extra for line in each.problems(setup)]
@@ -113,7 +113,7 @@ def build_engine(
         force_dependent, kind=kind, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=uniform, limits=limits
     )
     parameters = StepParameters(
-        span=box.span,
+        span=box.moving_span if any(each.moves_box for each in extra) else box.span,
         search=found.search,
         respa=respa_settings(by_type, verlet, long_range, every_step=any(each.every_step for each in extra)),
         external_work=external_work(by_type.external, box),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..basics.arrays import OVER_ALLOCATION
+from ..basics.box import MovingSpan
 from ..basics.state import CONTACTS, PAIRS, State
 from ..basics.threads import cores, threads
 from ..compiler.ahead import compile_ahead
@@ -51,9 +52,11 @@ def _names(state: State) -> tuple[str, ...]:
 
 
 def _set_arrays(table: Table, state: State, present: tuple) -> None:
-    """Give a table the arrays of a state."""
+    """Give a table the arrays of a state, and its box if that is deformed."""
     for name, value in zip(_names(state), present, strict=True):
         table.set(name, value)
+    if state.cell is not None and isinstance(table["span"], MovingSpan):
+        table.share("span", state.cell.span)
 
 
 @dataclass

@@ -35,6 +35,7 @@ class Setup(NamedTuple):
     neighbours: Neighbours
     fresh: bool  # whether this is a new start; a resumed run may be in the middle of an impact
     saved: Mapping[str, np.ndarray] = MappingProxyType({})  # arrays of the checkpoint from which a run continues
+    components: Sequence[Any] = ()  # all components
     touching: np.ndarray = NO_PAIRS  # (C, 2) pairs in contact at a new start
 
 
@@ -65,6 +66,8 @@ class Component:
     watches_contacts : bool
         Whether `contacts_changed` is called; the driver then returns after each step in which a contact formed or
         broke.
+    moves_box : bool
+        Whether it deforms the box, whose `Span` is then a `MovingSpan` in `State.cell`.
     in_parts : bool
         Whether it also acts on grains of awake clusters within a step of rigid bodies.
     last_action : int or None
@@ -85,6 +88,7 @@ class Component:
     own_columns: ClassVar[bool] = False
     holds: ClassVar[bool] = False
     watches_contacts: ClassVar[bool] = False
+    moves_box: bool = False
     in_parts: ClassVar[bool] = False
     last_action: ClassVar[int | None] = None
     own_stages: ClassVar[HookStages] = {}
@@ -189,12 +193,16 @@ class Component:
         """Values of all its columns."""
         return {}
 
+    def means(self, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
+        """Those of its columns that are means since the row before, which the first row does not have."""
+        return {}
+
     def materials(self) -> list[Material]:
         """Materials that a case file has to define."""
         return []
 
-    def parameters(self) -> list[dict[str, Any]]:
-        """Its tables in a case file, SI."""
+    def parameters(self) -> Any:
+        """Its table in a case file, or a list of its tables, SI."""
         return [each.parameters() for each in self.items]
 
 

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..basics.box import Box, box_of
 from ..basics.grains import Grains
 from ..basics.spare_copy import SpareCopy
 from ..basics.state import (
@@ -200,6 +201,11 @@ class Engine(CompiledState):
         return stop
 
     @property
+    def box(self) -> Box:
+        """Box at the time of `state`."""
+        return (self.stored_state if self.stored_state.cell is None else self.state).box
+
+    @property
     def time(self) -> float:
         """Time of `state` [s]."""
         return self.stored_state.time if self._output_time is None else self._output_time
@@ -333,13 +339,15 @@ class Engine(CompiledState):
             each.begin(self)
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
+            state.long_range.built[...] = [length or 0.0 for length in state.box.lengths]
         self.rebuild_list()
         self.stepper.loaded(self)
 
     def rebuild_list(self) -> None:
         """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
         state, search = self.stored_state, self.parameters.search
-        while search.listed and rebuild_verlet_list(state.long_range, state.box.span, search.reach) == FULL:
+        span = state.box.span if state.cell is None else box_of(state.long_range.built).span
+        while search.listed and rebuild_verlet_list(state.long_range, span, search.reach) == FULL:
             state.grow_rows()
 
     def _list_lasts(self) -> bool:
@@ -347,5 +355,7 @@ class Engine(CompiledState):
         state = self.stored_state
         if not np.isfinite(state.long_range.anchor).all():
             return False
+        if state.cell is not None and (state.box != box_of(state.long_range.built)):
+            return True  # `neighbours.skin` looks at it before the next sum
         moved = state.box.nearest((state.grains.arrays.position - state.long_range.anchor).T)
         return bool((moved**2).sum(axis=1).max() <= (0.5 * self.parameters.search.margin) ** 2)

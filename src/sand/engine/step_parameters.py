@@ -158,6 +158,7 @@ def step_criteria(grains: Grains, stepping: Verlet, forces: ForcesByType, pair_g
         outer_field=math.fsum(f.flux_density_size() for f in forces.external),
         impact=IMPACT_DISPLACEMENT / stepping.steps_per_period,
         longest=min([IDLE * min(times), *steps]),
+        reach=2.0 * float(grains.radius.max()) + pair_gap,
     )
 
 

@@ -44,6 +44,7 @@ from ..compiler.stage import stage
 from ..contact.events import count_new_contacts
 from ..contact.update import load_contact_sums, log_contact_sums
 from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
+from ..numerics.flow import rate_of_strain
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from .force_calls import (
     add_external_loads,
@@ -110,7 +111,7 @@ def impulse_at_end(grains, long_range, span, clock, elapsed, dt):
 def drift_with_work(s, dt):
     """Half a kick and a drift; logs the work of external forces that depend on time or position.
 
-    Returns the largest displacement [m].
+    Returns the largest displacement [m], of which two make up for the approach of two grains within reach of a list.
     """
     start, end = s.clock[TIME], s.clock[TIME] + dt
     gained = 0.0
@@ -132,7 +133,8 @@ def drift_with_work(s, dt):
         gained += sum_external(s, end, WRAPPING)
         wrap_all(s.grains, s.span)
     s.lost[OUTSIDE] -= gained
-    return dt * math.sqrt(largest_speeds(s.queue, blocks)[0])
+    strained = 0.5 * s.search.reach * rate_of_strain(s.span)
+    return dt * (math.sqrt(largest_speeds(s.queue, blocks)[0]) + strained)
 
 
 @caller
@@ -247,10 +249,22 @@ def first_half(s):
 def update_lists(s):
     """Rebuild stale lists; returns the value of a `Stop`, and whether the pair list was stale."""
     stale = s.settings.on and list_is_stale(
-        s.grains, s.pair_list.anchor, s.span, 0.25 * s.criteria.pair_gap, s.pair_list.skin, PAIR_LIST_SKIN
+        s.grains,
+        (s.pair_list.anchor, s.pair_list.built),
+        s.span,
+        0.25 * s.criteria.pair_gap,
+        s.search.reach,
+        s.pair_list.skin,
+        PAIR_LIST_SKIN,
     )
     if s.search.listed and list_is_stale(
-        s.grains, s.long_range.anchor, s.span, 0.5 * s.search.margin, s.pair_list.skin, LONG_RANGE_SKIN
+        s.grains,
+        (s.long_range.anchor, s.long_range.built),
+        s.span,
+        0.5 * s.search.margin,
+        s.search.reach,
+        s.pair_list.skin,
+        LONG_RANGE_SKIN,
     ):
         stop = call_stage(s, StageNumber.VERLET_LIST)
         if stop != Stop.NONE.value:

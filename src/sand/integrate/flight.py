@@ -27,7 +27,7 @@ def refresh_verlet_list(s):
     """Rebuild the Verlet list once a quarter of its margin is used up; returns a `Stop`."""
     if not s.search.listed:
         return Stop.NONE.value
-    moved = largest_displacement(s.grains, s.long_range.anchor, s.span)
+    moved = largest_displacement(s.grains, s.long_range.anchor, s.long_range.built, s.span)
     # written so that an anchor at infinity (no list yet) counts as stale
     if not moved <= STALE_FRACTION * s.search.margin:
         return call_stage(s, StageNumber.VERLET_LIST)

@@ -8,6 +8,7 @@ import numpy as np
 from ..basics.box import Span
 from ..compiler.jit import formula, loop
 from ..contact.gather import GRAINS_AT_ONCE, gather
+from ..numerics.flow import after_step, flown, slowed, unless_still
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import axpy, dot, load, load4, nearest_image, put, put4, scale
@@ -75,6 +76,26 @@ def count_crossings(grains, i, position, span):
     grains.image[2, i] += np.int32(np.rint(position[2] * span.inverse_z))
 
 
+def _drifted(grains, i, v, dt, span):
+    return axpy(dt, v, load(grains.position, i)), span
+
+
+@unless_still(_drifted)
+def drifted(grains, i, v, dt, span):
+    """Position [m] of grain i after a drift of dt [s], and the box then.
+
+    In a box that is deformed, the velocity becomes that relative to the flow at the end.
+    """
+    put(grains.velocity, i, slowed(v, span, dt))
+    return flown(load(grains.position, i), v, span, dt), after_step(span, dt)
+
+
+@unless_still(lambda wrapped_later, span: UNBOUNDED if wrapped_later else span)
+def box_of_drift(wrapped_later, span):
+    """The box in which a drift wraps positions: none if they are wrapped later, see `wrap_all`."""
+    return span
+
+
 @functools.cache
 def drift_for(magnetic: bool) -> Callable:
     """The loop of the first half of a step; if `magnetic`, moments rotate with their grains."""
@@ -91,9 +112,9 @@ def drift_for(magnetic: bool) -> Callable:
             i = first + k
             v, w = kicked(grains, i, 0.5 * dt)
             fastest = max(fastest, magnitude_bits(dot(v, v)))
-            position = axpy(dt, v, load(grains.position, i))
-            put(grains.position, i, nearest_image(position, span))
-            count_crossings(grains, i, position, span)
+            position, box = drifted(grains, i, v, dt, span)
+            put(grains.position, i, nearest_image(position, box))
+            count_crossings(grains, i, position, box)
             q = turn(load4(grains.orientation, i), scale(dt, w))
             put4(grains.orientation, i, q)
             rotate_moment(grains, i, q)

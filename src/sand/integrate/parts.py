@@ -56,6 +56,7 @@ class Stop(IntEnum):
     AWAKE_STEPS = 13  # awake clusters have to take their contact steps
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep
     SUBSTEPS = 15  # some bodies have to take substeps within the step of all bodies
+    BOX_TOO_SMALL = 16  # two grains could touch through two images
 
 
 class ContactParameters(NamedTuple):

@@ -22,7 +22,7 @@ from ..neighbours.pair_list import ROW_FULL, PairSearch, build_inner_list, pair_
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
 from .hooks import FIRST_STAGE
-from .motion import UNBOUNDED, drift_for, gather_and_kick
+from .motion import box_of_drift, drift_for, gather_and_kick
 from .parts import DT, Stop
 from .step_control import find_limiting_grains, first_not_finite
 from .step_parts import first_too_fast
@@ -69,7 +69,7 @@ def drift_stage(magnetic: bool, long_vectors: bool) -> Stage:
         first = block * GRAINS_PER_BLOCK
         last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
         # positions are wrapped afterwards where the work of crossing a boundary is logged
-        box = UNBOUNDED if external_work.position_dependent else span
+        box = box_of_drift(external_work.position_dependent, span)
         v = drift_some(grains, np.uint64(first), np.uint64(last), box, scratch[DT])
         queue.speeds[block, 0] = float_from_bits(v)
         return 0
@@ -138,8 +138,8 @@ def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
     log_stiffness_work = stiffness_work_loop(law)
 
     @stage("the work of changing stiffnesses")
-    def stiffness_work(grains, contacts, clock, count, lost, span):
-        log_stiffness_work(grains, contacts, count, lost, span, clock[STEP])
+    def stiffness_work(grains, contacts, clock, count, lost, span, settings):
+        log_stiffness_work(grains, contacts, count, lost, PresentStep(span, settings, count[STEPS], clock[STEP]))
         return 0
 
     @stage("the slip and breaking of contacts", seconds=2.0)

@@ -26,6 +26,7 @@ from ..basics.state import (
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
 from ..forces.external_formulas import stiffness_of_field
+from ..numerics.flow import relative_velocity, squared_approach
 from ..numerics.simd import float_bits, float_from_bits
 from ..numerics.vec import dot, load, nearest_image, sub
 
@@ -65,6 +66,7 @@ class StepCriteria(NamedTuple):
     outer_field: float  # magnitude of the external flux density [T]
     longest: float  # largest step, if no other criterion applies [s]
     impact: float  # largest relative displacement of an impact in one step, in δ_c
+    reach: float = 0.0  # largest distance of grains in the pair list [m]
 
 
 @formula
@@ -138,8 +140,8 @@ def first_not_finite(grains):
 def pair_step(grains, pair_list, span, criteria, p):
     """Largest step [s] allowed by pair p of the list, approaching or in contact."""
     i, j = pair_list.pair[0, p], pair_list.pair[1, p]
-    relative = sub(load(grains.velocity, i), load(grains.velocity, j))
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+    relative = relative_velocity(grains, i, j, apart, span)
     distance = math.sqrt(dot(apart, apart))
     closing = -dot(relative, apart) / distance
     touching = pair_list.in_contact[p] == 1
@@ -157,10 +159,10 @@ def pair_step(grains, pair_list, span, criteria, p):
 
 
 @loop
-def _all_speeds_safe(pair_list, criteria):
+def _all_speeds_safe(pair_list, criteria, span):
     """Whether no two grains are fast enough (twice the largest speed) to need a step below that of the contacts."""
     impact = criteria.impact * pair_list.skin[SAFE_SPEED]
-    return 4.0 * pair_list.skin[SQUARED_SPEED] < impact * impact
+    return squared_approach(pair_list.skin[SQUARED_SPEED], criteria.reach, span) < impact * impact
 
 
 @loop
@@ -218,7 +220,7 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
             if not clock[CALM] > 0.0:
                 return 0.0
             clock[LONG_RANGE_LEVEL] = quantise_step(clock[LONG_RANGE_LEVEL], cycle, may_grow)
-        slow = not no_contacts and _all_speeds_safe(pair_list, criteria)
+        slow = not no_contacts and _all_speeds_safe(pair_list, criteria, span)
         wanted = clock[CALM] if slow else closing_step(grains, pair_list, count, span, criteria, clock[CALM])
         if not wanted > 0.0:
             return 0.0

@@ -19,6 +19,7 @@ from ..basics.arrays import CELLS_PER_GRAIN
 from ..basics.state import LISTED
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
+from ..numerics.flow import store_lengths
 from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import dot, load, nearest_image, put, sub
 
@@ -343,6 +344,7 @@ def build_verlet_list(grains, long_range, count, span, search):
     """Build the Verlet list from the present positions; returns 0, or FULL."""
     for i in range(grains.mass.size):
         put(long_range.anchor, i, load(grains.position, i))
+    store_lengths(long_range.built, span)
     if list_from_anchors(long_range, span, search.reach) == FULL:
         long_range.anchor[0, 0] = math.inf
         return FULL

@@ -15,6 +15,7 @@ import math
 from ..basics.state import INNER_SKIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED, SQUARED_SPEED, SQUARED_SPIN
 from ..compiler.jit import loop
 from ..contact.pair_types import pair_type_count
+from ..numerics.flow import carried, strain_since
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import dot, load, nearest_image, sub
 
@@ -81,28 +82,40 @@ def update_speeds(grains, pair_list):
 
 
 @loop
-def largest_displacement(grains, anchor, span):
+def largest_displacement(grains, anchor, built, span):
     """Largest distance [m] of a grain from its anchor; NaN for an anchor at infinity.
 
-    The displacement counts, not the length of the path: a grain that oscillates in an aggregate does not invalidate a
-    list.
+    In a box that is deformed, the flow carries the anchors since the lengths of the box were `built`.  The displacement
+    counts, not the length of the path: a grain that oscillates in an aggregate does not invalidate a list.
     """
     largest = float_bits(0.0)
     for i in range(grains.mass.size):
-        displacement = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
+        displacement = nearest_image(sub(load(grains.position, i), carried(load(anchor, i), built, span)), span)
         largest = max(largest, magnitude_bits(dot(displacement, displacement)))
     return math.sqrt(float_from_bits(largest))
 
 
 @loop
-def list_is_stale(grains, anchor, span, limit, skin, skin_index):
+def list_is_stale(grains, listed, span, limit, reach, skin, skin_index):
     """Whether a grain is farther than `limit` [m] from its anchor, so that the list must be rebuilt.
 
-    `skin_index` is the index of this list's remaining skin, which is updated.
+    The strain ε of a box that is deformed brings pairs at the reach [m] of the list closer by ε times the reach, as if
+    each grain had moved by half of that.
+
+    Parameters
+    ----------
+    listed : tuple of ndarray
+        Anchors (3, N) [m], and the lengths of the box (3,) [m], when the list was built.
+    skin : ndarray
+        Remaining skins; that of this list, with the index `skin_index`, is updated.
     """
     if skin[skin_index] > 0.0:
         return False
-    displacement = largest_displacement(grains, anchor, span)
+    anchor, built = listed
+    displacement, limit = (
+        largest_displacement(grains, anchor, built, span),
+        limit - 0.5 * reach * strain_since(built, span),
+    )
     skin[skin_index] = SKIN_SAFETY * limit - displacement
     # true also for NaN, from anchors at infinity (no list yet)
     return not displacement <= limit

@@ -17,6 +17,7 @@ from ..basics.own_quantities import own_values
 from ..basics.quantity_array import QuantityArray
 from ..basics.schema import BY_NAME, CHANGEABLE, stored
 from ..basics.units import has_unit_within, si
+from ..components.deformation import read_deformation
 from ..contact.model import Contact
 from ..engine.changed_state import joined, refuse_cut_contacts, scaled_positions, subset
 from ..engine.initial_contacts import overlapping_pairs, refuse_overlaps
@@ -27,7 +28,7 @@ from .settings import read_forces
 
 QUANTITIES = CHANGEABLE
 """Quantities of the grains that can be changed."""
-ASSIGNED = (*QUANTITIES, "forces", "box")
+ASSIGNED = (*QUANTITIES, "forces", "box", "deformation")
 """Attributes of a change that can be assigned."""
 MOST_ID = 2**32 - 1
 """Largest identity of a grain."""
@@ -52,6 +53,8 @@ class Change:
         The forces; `replace` exchanges one, and one that is left out acts no longer.
     box : Box
         The box; an assigned one (a `sand.Box`, or lengths) leaves all positions as they are.
+    deformation : Deformation or None
+        How the box is deformed, to be assigned; None in a simulation that had no deformation at its start.
     grains : Grains
         The grains, to be read: `position`, `radius`, …
     id : ndarray
@@ -67,18 +70,27 @@ class Change:
     own: dict[str, Any]
     forces: tuple[Force, ...]
     box: Box
+    deformation: Any
     grains: Grains
     kept: np.ndarray
-    _before: tuple[Grains, Box, tuple[Force, ...]]
+    _before: tuple[Grains, Box, tuple[Force, ...], Any]
     _pair: np.ndarray  # contacts (C, 2) before
     _next_id: int
     _errors: ErrorCollector  # of `remove` and `add`
     _is_scaled: bool
 
-    def __init__(self, grains: Grains, forces: Sequence[Force], box: Box, pair: np.ndarray, next_id: int):
+    def __init__(
+        self,
+        grains: Grains,
+        forces: Sequence[Force],
+        box: Box,
+        pair: np.ndarray,
+        next_id: int,
+        deformation: Any = None,
+    ):
         fixed: dict[str, Any] = {
             "grains": grains.copy(),
-            "_before": (grains, box, tuple(forces)),
+            "_before": (grains, box, tuple(forces), deformation),
             "kept": np.arange(len(grains)),
             "_pair": pair,
         }
@@ -88,7 +100,7 @@ class Change:
             object.__setattr__(self, name, value)
         for name in QUANTITIES:
             setattr(self, name, getattr(grains, name))
-        self.forces, self.box = tuple(forces), box
+        self.forces, self.box, self.deformation = tuple(forces), box, deformation
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Assign a quantity, the forces or the box.  Raises BadInput for another name or an invalid box."""
@@ -100,6 +112,8 @@ class Change:
             raise BadInput(f"a change has no '{name}' to assign; {did_you_mean(name, known)}")
         if name == "box":
             value = as_box(value)
+        elif name == "deformation":
+            value = self._checked_deformation(value)
         elif name in QUANTITIES:
             value = QuantityArray(value, BY_NAME[name].unit, name)
         object.__setattr__(self, name, value)
@@ -110,6 +124,14 @@ class Change:
         if name not in own:
             raise NoSuchAttribute(f"a change has no '{name}'; {did_you_mean(name, (*ASSIGNED, 'grains', 'id', *own))}")
         return own[name]
+
+    def _checked_deformation(self, value: Any) -> Any:
+        """A deformation in place of that at the start.  Raises BadInput."""
+        if self._before[3] is None and value is not None:
+            raise BadInput("deformation: the ledger of this run has no columns for it; start with sand.Deformation(0)")
+        if self._before[3] is not None and value is None:
+            raise BadInput("deformation = None would leave columns of the ledger empty; give sand.Deformation(0)")
+        return next(iter(read_deformation(value)), None)
 
     @property
     def id(self) -> np.ndarray:
@@ -125,9 +147,10 @@ class Change:
     @property
     def is_of_own(self) -> bool:
         """Whether nothing but own quantities can be different, so that the motion is as without the change."""
-        before, _, forces = self._before
+        before, _, forces, deformation = self._before
         same = all(np.array_equal(np.asarray(getattr(self, name)), getattr(before, name)) for name in QUANTITIES)
         kept = len(self.forces) == len(forces) and all(a is b for a, b in zip(self.forces, forces, strict=True))
+        kept = kept and self.deformation is deformation
         return bool(before.own_units) and same and kept and not self.regroups and not self._errors.problems
 
     def remove(self, which: Any) -> None:
@@ -316,7 +339,7 @@ class Change:
         grains.arrays.own[...] = np.array([self.own[name] for name in grains.own_units]).reshape(-1, len(grains))
         if self.regroups:
             errors.problems += outside_box(grains, self.box)
-            before, box, _ = self._before
+            before, box, *_ = self._before
             errors.take(refuse_cut_contacts, subset(before, self.kept), box, grains, self.box, self._pairs())
         errors.done()
         return grains

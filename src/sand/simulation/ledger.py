@@ -125,7 +125,9 @@ class Ledger(LedgerColumns):
         row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
         row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
         row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
-        return row | own
+        row |= own
+        before = self.rows[-1] if self.rows else None
+        return row | {name: mean for each in self._extra for name, mean in each.means(before, row).items()}
 
     def counts_of(self, engine: Engine) -> dict[str, float]:
         """The part of the row of the present state that needs no energies: step, time [s], contacts and clusters."""

@@ -30,7 +30,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
         Condition that ends the run.
     """
     of_grains = simulation.grains.materials  # first, in the order of their indices
-    extra = in_use(simulation._system.given)
+    extra, box = in_use(simulation._system.given), simulation._system.box
     materials = list({m.name: m for m in (*of_grains, *(m for each in extra for m in each.materials()))}.values())
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     if recipe["kind"] != "gas":  # a gas names the materials from which it is drawn
@@ -48,13 +48,11 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
     forces = {}
     for force in simulation.forces:
         long_range = isinstance(force, LongRangeForce)
-        forces[force.name] = dict(
-            force.resolved(simulation.start, simulation.box) if long_range else force.parameters()
-        )
-    lengths = ["open" if v is None else v for v in simulation.box.lengths]
+        forces[force.name] = dict(force.resolved(simulation.start, box) if long_range else force.parameters())
+    lengths = ["open" if v is None else v for v in box.lengths]
     return {
         "run": {k: v for k, v in run.items() if v is not None and v != float("inf")},
-        "box": {} if simulation.box.is_open else {"periodic": lengths},
+        "box": {} if box.is_open else {"periodic": lengths},
         "grains": recipe,
         "materials": {
             m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials

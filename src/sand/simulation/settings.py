@@ -17,7 +17,9 @@ from .cadence import read_cadence
 from .observers import Observer
 from .updater import read_updaters
 
-ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "out")
+ARGUMENTS = (
+    *("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "deformation", "out"),
+)
 """Arguments of a simulation that are fixed once it is built."""
 RESULT_ATTRIBUTES = (
     *("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound"),
@@ -30,6 +32,7 @@ QUANTITIES = tuple(field.name for field in FIELDS)
 CHANGES = {
     "forces": "change.replace(sand.Field('1 mT')) for each force that differs, or change.forces = (…)",
     "box": "change.box = '3 um', or change.scale_box(0.9)",
+    "deformation": "change.deformation = sand.Deformation('-1e4 1/s')",
     "grains": "change.velocity[…] = …, change.add(grains), change.remove([0])",
     **{name: f"change.{name}[…] = …" for name in CHANGEABLE},
 }

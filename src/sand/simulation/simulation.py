@@ -21,6 +21,7 @@ from ..basics.state import CONTACTS, OUTSIDE, State
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
 from ..components import components_of, read_components
+from ..components.deformation import Deformation, DeformedBox
 from ..components.driven import Driven
 from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
@@ -123,6 +124,9 @@ class Simulation(ReadOnlySettings):
         Initial contacts with their displacements, from `sand.setup.from_frame`.
     driven : Driven or Sequence[Driven], optional
         Grains with prescribed velocity and spin, such as `sand.Driven([0])`, which holds one.
+    deformation : Deformation or None, optional
+        How a periodic box is deformed, such as `sand.Deformation("-1e4 1/s")`; velocities of grains are then those
+        relative to its flow.
     restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
         Arrays and metadata of a checkpoint in `out` from which to continue; used by `sand.resume`.
 
@@ -133,7 +137,6 @@ class Simulation(ReadOnlySettings):
     """
 
     forces: tuple[Force, ...] = held_by("_system", "forces", "Forces of the simulation.")
-    box: Box = held_by("_system", "box", "Box.")
     stepping: Integrator = held_by("_system", "stepping", "Integrator.")
     neighbours: Neighbours = held_by("_system", "neighbours", "Settings of the neighbour search, as resolved.")
     seed: int | None = held_by("_system", "seed", "Seed of random forces.")
@@ -168,9 +171,11 @@ class Simulation(ReadOnlySettings):
         walls: Sequence[Wall] | Wall = (),
         contacts: StrainedContacts | None = None,
         driven: Any = (),
+        deformation: Deformation | None = None,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        forces, given, box = read_forces(forces), read_components(walls=walls, driven=driven), as_box(box)
+        given = read_components(walls=walls, driven=driven, deformation=deformation)
+        forces, box = read_forces(forces), as_box(box)
         seed = None if seed is None else seed_given(seed, bits=63)
         self._output = Output(observers, frame_every, () if updaters is None else updaters, row_every, checkpoint_every)
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
@@ -280,6 +285,25 @@ class Simulation(ReadOnlySettings):
     def driven(self) -> tuple[Driven, ...]:
         """The grains with prescribed motion."""
         return self._system.given["driven"].items
+
+    @property
+    def deformation(self) -> Deformation | None:
+        """How the box is deformed; None if it is not."""
+        return next(iter(self._system.given["deformation"].items), None)
+
+    @property
+    @exclusive
+    def box(self) -> Box:
+        """Box at `time`."""
+        return self._engine.box
+
+    @property
+    @exclusive
+    def strain_rate(self) -> np.ndarray:
+        """Present rates of strain A (3, 3) [1/s] of the box: velocities in the laboratory are velocity + A position."""
+        self._begin()
+        cell = self.state.cell
+        return np.zeros((3, 3)) if cell is None else np.diag(cell.span[6:])
 
     @property
     @exclusive
@@ -439,8 +463,9 @@ class Simulation(ReadOnlySettings):
         Yields
         ------
         Change
-            Arrays `velocity`, `spin`, `moment`, `charge` and own quantities (`change.own`), the `box`, and `remove`,
-            `add`, `scale_box`, `replace`. A change of own quantities alone leaves the motion as it is, bit by bit.
+            Arrays `velocity`, `spin`, `moment`, `charge` and own quantities (`change.own`), the `box`, its
+            `deformation`, and `remove`, `add`, `scale_box`, `replace`. A change of own quantities alone leaves the
+            motion as it is, bit by bit.
 
         Raises
         ------
@@ -463,8 +488,11 @@ class Simulation(ReadOnlySettings):
         present = tuple(as_chosen(force, self.start, self.box) for force in self.forces)
         pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
         system = self._system
-        change = Change(self.grains, present, self.box, pair, system.next_id)
+        change = Change(self.grains, present, self.box, pair, system.next_id, self.deformation)
         yield change
+        given = system.given
+        if change.deformation is not self.deformation:
+            given = given | {DeformedBox.name: DeformedBox((change.deformation,))}
         if change.is_of_own:
             own = change.checked_grains().arrays.own
             for grains in (self._engine.state.grains, self._engine.regular_state.grains, self.start):
@@ -472,7 +500,7 @@ class Simulation(ReadOnlySettings):
             if self.writer:
                 self.writer.changed(self)
             return
-        fixed = int(self.seed or 0), system.given
+        fixed = int(self.seed or 0), given
         engine, forces, given = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
         before = self._log_row()["total"]
         self._engine = engine

@@ -34,7 +34,7 @@ from sand.setup import GrainClass
 CLASSES = [
     *FORCES.values(),
     *INTEGRATORS.values(),
-    *(sand.Neighbours, sand.Material, sand.Wall, sand.Driven, sand.Ramp, GrainClass),
+    *(sand.Neighbours, sand.Material, sand.Wall, sand.Driven, sand.Deformation, sand.Ramp, GrainClass),
 ]
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
+from sand.components.deformation import Deformation
 from sand.components.driven import Driven
 from sand.config.build import simulation_of
 from sand.config.case import (
@@ -71,7 +72,7 @@ def test_every_key_is_there_with_its_meaning():
     expected = [{key.name for key in keys_of(kind)} for kind in (*MODELS[:5], *FORCES.values())]
     expected[2] -= {"classes"}
     expected += [{"method"} | {key.name for key in keys_of(kind)} for kind in INTEGRATORS.values()]
-    expected += [{key.name for key in keys_of(kind)} for kind in (Neighbours, WallSection, Driven)]
+    expected += [{key.name for key in keys_of(kind)} for kind in (Neighbours, WallSection, Driven, Deformation)]
     assert [{line.lstrip("#").split(" =")[0] for line in lines} for _, lines in tables] == expected
     assert [f"[forces.{name}]" for name in FORCES] == [name for name, _ in tables if name.startswith("[forces.")]
     before = ""

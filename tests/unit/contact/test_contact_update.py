@@ -71,7 +71,7 @@ def update_each(grains, contacts, near, count, lost, span, law, dt):
     for c in range(PAIRS):
         constants, (i, j) = columns.at(contacts, c), contacts.pair[:, c]
         pose = pose_at(grains, contacts, span, c, 0.0)
-        contacts.twist[c] += twist_increment(grains, contacts, c, pose, dt)
+        contacts.twist[c] += twist_increment(grains, contacts, c, pose, PresentStep(span, law, 0, dt))
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[i], grains.radius[j]
         found = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
@@ -214,15 +214,15 @@ def test_displacements_before_a_step():
     """Displacements at the start of a step equal those of grains that drift back, to 1e-12 of the largest."""
     grains, contacts, *_ = random_contacts(SILICA, Box.periodic(2.2e-7, None, 3e-7))
     span = Box.periodic(2.2e-7, None, 3e-7).span
-    back = copy.deepcopy(grains)
+    back, step = copy.deepcopy(grains), PresentStep(span, parameters_for(), 0, STEP)
     back.inertia[:] = 1.0
     drift_for(False)(back, np.uint64(0), np.uint64(2 * PAIRS), span, -STEP)  # no forces act
     found, expected = [], []
     for c in range(PAIRS):
         constants, radii = columns.load(contacts.constants, c), (grains.radius[c], grains.radius[c + PAIRS])
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        found.append(np.hstack(displacements_before(grains, contacts, c, pose, constants, STEP)))
-        twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, STEP)
+        found.append(np.hstack(displacements_before(grains, contacts, c, pose, constants, step)))
+        twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, step)
         then = pose_at(back, contacts, span, c, twist)
         expected.append(np.hstack(displacements_of(then, sum(radii) - then.distance, *radii, constants)))
     found, expected = np.array(found), np.array(expected)

@@ -77,7 +77,8 @@ def test_displacements_stay_within_the_skin(monkeypatch, blocks):
         sim.run(steps=steps)
         system, span = sim.state, sim.box.span
         for index, (group, name, limit) in limits.items():
-            displacement = largest_displacement(system.grains.arrays, getattr(getattr(system, group), name), span)
+            listed = getattr(system, group)
+            displacement = largest_displacement(system.grains.arrays, getattr(listed, name), listed.built, span)
             assert system.pair_list.skin[index] <= limit - displacement + 1e-12 * limit
             spared += system.pair_list.skin[index] > 0.0
         speeds = np.linalg.norm(sim.grains.velocity, axis=1).max(), np.linalg.norm(sim.grains.spin, axis=1).max()
@@ -108,7 +109,7 @@ def test_inner_list_is_rebuilt_in_time():
         if np.array_equal(
             sim.state.count[[MADE, BROKEN, REBUILT]], events
         ):  # otherwise the inner list is rebuilt again
-            displacement = largest_displacement(sim.state.grains.arrays, built, span)
+            displacement = largest_displacement(sim.state.grains.arrays, built, np.zeros(3), span)
             assert 0.0 < displacement < limit
             assert 0.0 < sim.state.pair_list.skin[INNER_SKIN] <= limit - displacement
             finished_run += 1
@@ -167,7 +168,7 @@ def test_nan_counts_as_the_largest_value(sign):
     anchor, span = arrays.position.copy(), sand.Box.open().span
     arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
     assert np.isnan(largest_squared_speeds(arrays)[0]) and np.isfinite(largest_squared_speeds(arrays)[1])
-    assert np.isnan(largest_displacement(arrays, anchor, span))
+    assert np.isnan(largest_displacement(arrays, anchor, np.zeros(3), span))
 
 
 @pytest.mark.compiled("contacts")

@@ -1,0 +1,211 @@
+"""A periodic box that is deformed, with velocities of grains relative to its flow: `sand.Deformation`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from ..basics.arguments import checked
+from ..basics.arrays import CellArrays
+from ..basics.errors import BadInput, shown
+from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
+from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
+from ..basics.state import CELL, State
+from ..basics.units import si
+from ..basics.vectors import components, three
+from ..contact.law import ContactLaw
+from ..engine.component import Component, Setup
+from ..engine.engine import Engine
+from ..integrate.hooks import HookStages
+from ..integrate.parts import ContactParameters
+from .deformation_stage import EXPONENTIAL, LAWS, PRESSURE, RATE, DeformationNumbers, deformation_stages
+
+AXES = "xyz"
+REFUSED = {
+    "walls": "walls",
+    "driven": "driven grains",
+    "settling": "settling_time of contacts",
+    "cluster_cutoff": "a cut-off that follows the clusters",
+}
+"""Components that do not work in a box that is deformed, and what sentences call them."""
+
+
+def _rates(value: Any, name: str) -> tuple[float, ...]:
+    """One rate [1/s] along all axes, or three."""
+    return three(value, "1/s", name) if components(value) is not None else (si(value, "1/s", name),) * 3
+
+
+def _not_zero(value: Any, name: str) -> float:
+    """A pressure [Pa] other than 0.  Raises BadInput."""
+    if number := si(value, "Pa", name):
+        return number
+    raise BadInput(f"{name} = {shown(value)} must not be 0, which has no scale for the rates; give a pressure in Pa")
+
+
+@checked
+@rampable
+@dataclass(frozen=True)
+class Deformation(Settings):
+    """A periodic box that is deformed: compressed, stretched, or led by a pressure.
+
+    Velocities of grains are those relative to the flow A x of the box, with its rates of strain A. In the laboratory
+    they are u + A x, and grains and box move by Newton's law.
+
+    Parameters
+    ----------
+    rate : float, str or sequence
+        Rates of strain [1/s], one for all axes or three: below 0 the box becomes smaller; or a `Ramp`.
+    law : str, optional
+        "exponential": dL/dt = rate L. "linear": dL/dt = rate L₀, with the length L₀ at the start, or after the last
+        change of the box. "pressure": dL/dt = rate L (P̄ − P)/\\|P\\|, at most rate L, so that the pressure comes to P.
+    pressure : float or str, optional
+        P [Pa], other than 0, with law = "pressure": above 0 in compression; or a `Ramp`. With three equal rates it is
+        the mean of the axes, otherwise that along each of them.
+    time : float or str, optional
+        Time [s] > 0 of the running mean P̄ of the pressure, with law = "pressure".
+
+    Raises
+    ------
+    BadInput
+        If a value has a wrong unit, or is out of range; one line each.
+    """
+
+    rate: Annotated[Any, Reading(_rates, unit="1/s"), RAMP]
+    law: Annotated[str, Word(*LAWS)] = EXPONENTIAL
+    pressure: Annotated[
+        Any, Reading(_not_zero, unit="Pa"), For("law", PRESSURE, needed="a pressure in Pa, such as '1 kPa'"), RAMP
+    ] = None
+    time: Annotated[Any, Number("s", above=0.0), For("law", PRESSURE, needed="a time in s, such as '10 ns'")] = None
+
+    name: ClassVar[str] = "deformation"
+
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """Rates below 0 that follow a pressure."""
+        if not wrong & {"rate", "law"} and self.law == PRESSURE and min(self.rate) < 0.0:
+            yield f"rate = {min(self.rate):g} 1/s must be at least 0 with law = 'pressure', whose sign follows P̄ − P"
+
+
+def read_deformation(value: Any) -> tuple[Deformation, ...]:
+    """A deformation, or None.  Raises BadInput."""
+    if value is not None and not isinstance(value, Deformation):
+        raise BadInput(f"deformation = {shown(value)}; give sand.Deformation('-1e4 1/s')")
+    return () if value is None else (value,)
+
+
+class DeformedBox(Component):
+    """A box that is deformed (`Deformation`), and the work of its boundaries."""
+
+    name = "deformation"
+    noun = "forces"
+    every_step = True
+    groups: ClassVar[Mapping[str, type]] = {CELL: CellArrays}
+
+    _lengths: np.ndarray
+
+    @property
+    def given(self) -> Deformation:
+        """What the user gave."""
+        deformation: Deformation = self.items[0]
+        return deformation
+
+    @property
+    def moves_box(self) -> bool:  # type: ignore[override]
+        """Whether any rate is ever other than 0; otherwise the steps are those of a box that keeps its shape."""
+        return bool(self.items) and any(any(each.rate) for each in forces_at_points(self.given))
+
+    def problems(self, setup: Setup) -> list[str]:
+        """As `Component.problems`."""
+        found, where = [], "cannot be used in a box that is deformed; leave one of them out"
+        for axis, length in zip(AXES, setup.box.lengths, strict=True):
+            if length is None:
+                found.append(f"axis {axis} of the box is open, but a box that is deformed has three periodic ones")
+        if self.moves_box:
+            others = [REFUSED[each.name] for each in setup.components if each.name in REFUSED]
+            others += [f"the force '{each.name}'" for each in setup.forces.long_range]
+            positions = [each for each in setup.forces.external if getattr(each, "position_dependent", False)]
+            others += [f"the force '{each.name}', whose energy depends on the position," for each in positions]
+            if setup.stepping.name != "verlet":
+                others.append(f"stepping = '{setup.stepping.name}'")
+            found += [f"{other} {where}" for other in others]
+        return [f"deformation: {line}" for line in found]
+
+    def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
+        """Stages of the deformation; none if all rates are 0."""
+        self._lengths = np.array(setup.box.lengths, np.float64)
+        if not self.moves_box:
+            return {}
+        shortest = 2.0 * (2.0 * float(setup.grains.radius.max()) + float(setup.grains.radius.min()))
+        return deformation_stages(DeformationNumbers(LAWS.index(self.given.law), self.given.time or 0.0, shortest))
+
+    def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
+        """Give a new state the box in memory."""
+        state.add_groups(self.groups, {})
+        state.cell.span[:] = state.fixed_box.moving_span  # type: ignore[union-attr]
+        state.cell.start[:] = self._lengths  # type: ignore[union-attr]
+
+    def begin(self, engine: Engine) -> None:
+        """Set rates and pressure of the present intervals of the ramps; A follows at the end of the next step."""
+        cell, given = engine.stored_state.cell, force_at(self.given, engine.stored_state.time)
+        cell.rate[:], cell.goal[0] = given.rate, given.pressure or 0.0
+
+    def next_time(self, engine: Engine) -> float:
+        """Next time [s] at which a ramp changes a rate or the pressure."""
+        ramps = ramps_of(self.given).values()
+        return min((ramp.next_change(engine.stored_state.time) for ramp in ramps), default=math.inf)
+
+    def update(self, engine: Engine) -> None:
+        """As `begin`."""
+        self.begin(engine)
+
+    def kept(self, kept: np.ndarray) -> Component:
+        """The same deformation."""
+        return DeformedBox(self.items)
+
+    def changed(self, arrays: dict[str, np.ndarray], *, regroups: bool) -> None:
+        """Take over the lengths of a box that the user has changed."""
+        if (arrays["cell/span"][:3] != self._lengths).any():
+            arrays["cell/start"] = self._lengths.copy()
+            arrays["cell/span"] = np.concatenate([self._lengths, 1.0 / self._lengths, arrays["cell/span"][RATE:]])
+
+    def columns(self) -> list[str]:
+        """Lengths of the box, filling factor, work of the boundaries and pressure."""
+        each = [f"{kind}_{axis}" for kind in ("box", "work") for axis in AXES]
+        return [*each[:3], "filling", *each[3:], *(f"mean_pressure_{axis}" for axis in AXES)]
+
+    def losses(self) -> list[str]:
+        """The energy that the boundaries took from the grains."""
+        return ["lost_box"]
+
+    def row(self, state: State) -> dict[str, float]:
+        """Values of the columns; the pressure is that of the present moment."""
+        cell, grains = state.cell, state.grains.arrays
+        lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
+        virial = cell.virial + (grains.mass * grains.velocity**2).sum(axis=1)
+        found = dict(zip(self.columns(), [*lengths, 0.0, *cell.work, *virial / volume], strict=True))
+        found |= {"filling": 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume}
+        return {name: float(value) for name, value in found.items()} | {"lost_box": -math.fsum(cell.work)}
+
+    def means(self, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
+        """The pressure P_aa = −ΔW_a / ∫ V dL_a / L_a since the row before, from the work W_a on the grains.
+
+        For rates in constant ratios, the integral is Δ ln L_a times the logarithmic mean of the volumes.
+        """
+        found: dict[str, float] = {}
+        if before is None:
+            return found
+        volumes = [math.prod(row[f"box_{axis}"] for axis in AXES) for row in (before, now)]
+        ratio = math.log(volumes[1] / volumes[0])
+        mean = (volumes[1] - volumes[0]) / ratio if abs(ratio) > 1e-6 else 0.5 * (volumes[0] + volumes[1])
+        for axis in AXES:
+            strain = math.log(now[f"box_{axis}"] / before[f"box_{axis}"])
+            if strain != 0.0:
+                found[f"mean_pressure_{axis}"] = (before[f"work_{axis}"] - now[f"work_{axis}"]) / (mean * strain)
+        return found
+
+    def parameters(self) -> dict[str, Any]:
+        """Its table in a case file, SI."""
+        return self.given.parameters()

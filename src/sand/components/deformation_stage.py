@@ -1,0 +1,115 @@
+"""Stages of a box that is deformed: its drift with the grains, the work of its boundaries, the step that it allows.
+
+With the rates of strain A_a = dL_a/dt / L_a and velocities u relative to the flow A x,
+
+    dx/dt = u + A x,    m du/dt = F − m A u,
+
+which is Newton's law for the velocities u + A x of the laboratory where L is linear in time; m x d²L/dt² / L is left
+out otherwise.  L is linear within a step.  The drift F = 1 + A dt of positions and lengths, with u ← F⁻¹ u and
+A ← A F⁻¹, is the exact flight between two kicks.  The boundaries do the work
+
+    d(K + U)/dt = −Σ A_a W_aa,    W_aa = Σ_grains m u_a² + Σ_contacts l_a f_a
+
+on the grains: the part of K, ½ Σ m u_a² (1 − F_a²) after the drift, is exact, and that of contacts is the mean of both
+ends of the step, as for all forces of velocity Verlet.
+"""
+
+from typing import NamedTuple
+
+from ..basics.state import CONTACTS
+from ..compiler.jit import loop
+from ..compiler.stage import stage
+from ..contact.virial import contact_virial
+from ..integrate.hooks import Hook, HookStages
+from ..integrate.parts import DT, LIMIT, Stop
+from ..integrate.step_control import quantise_step
+
+INVERSE, RATE = 3, 6
+"""First words of 1/L and A in `CellArrays.span`."""
+LARGEST_STRAIN = 1e-3
+"""Largest strain of an axis in one step; contacts and grains that approach see the flow as velocity."""
+LAWS = EXPONENTIAL, LINEAR, PRESSURE = "exponential", "linear", "pressure"
+"""What the rates are: constant, those of the length at the start, or the largest ones."""
+
+
+class DeformationNumbers(NamedTuple):
+    """Numbers of a deformation."""
+
+    law: int  # index in LAWS
+    time: float  # of the running mean of the pressure [s]
+    shortest: float  # least length of an axis [m], so that no two grains touch through two images
+
+
+@stage("the time step of a box that is deformed")
+def limit_strain(cell, scratch, parameters):
+    """Lower `scratch[LIMIT]` to a power of two of a second; returns `Stop.BOX_TOO_SMALL` where the box is."""
+    fastest = 0.0
+    for a in range(3):
+        if cell.span[a] < parameters.shortest:
+            return Stop.BOX_TOO_SMALL.value
+        fastest = max(fastest, abs(cell.span[RATE + a]))
+    if fastest * scratch[LIMIT] > LARGEST_STRAIN:
+        scratch[LIMIT] = quantise_step(1.0, LARGEST_STRAIN / fastest, True)
+    return Stop.NONE.value
+
+
+@loop
+def twice_kinetic_energy(grains, a):
+    """Σ m u_a² [J] along one axis."""
+    total = 0.0
+    for i in range(grains.mass.size):
+        total += grains.mass[i] * grains.velocity[a, i] * grains.velocity[a, i]
+    return total
+
+
+@stage("the deformation of the box")
+def deform(grains, cell, scratch):
+    """Deform the box as the drift has moved its grains; the work of the drift, and of contacts at its start."""
+    dt = scratch[DT]
+    for a in range(3):
+        rate = cell.span[RATE + a]
+        moved = (1.0 + 0.5 * dt * rate) * twice_kinetic_energy(grains, a)
+        cell.work[a] -= dt * rate * (moved + 0.5 * cell.virial[a])
+        cell.span[a] *= 1.0 + dt * rate
+        cell.span[INVERSE + a] /= 1.0 + dt * rate
+        cell.span[RATE + a] /= 1.0 + dt * rate
+    return 0
+
+
+@loop
+def follow_pressure(grains, cell, dt, time):
+    """Set A = rate × (P̄ − P)/|P|, within ± rate, for the running mean P̄ of the pressure over a time [s].
+
+    With three equal rates P̄ is the mean of the axes, otherwise that of each axis.
+    """
+    volume, own = cell.span[0] * cell.span[1] * cell.span[2], 0.0
+    for a in range(3):
+        present = (cell.virial[a] + twice_kinetic_energy(grains, a)) / volume
+        cell.pressure[a] += dt / (dt + time) * (present - cell.pressure[a])
+        own += cell.pressure[a] / 3.0
+    alike = cell.rate[0] == cell.rate[1] == cell.rate[2]
+    for a in range(3):
+        excess = (own if alike else cell.pressure[a]) / abs(cell.goal[0]) - (1.0 if cell.goal[0] > 0.0 else -1.0)
+        cell.span[RATE + a] = cell.rate[a] * min(1.0, max(-1.0, excess))
+
+
+@stage("the work of the box")
+def work_of_box(grains, contacts, cell, count, scratch, span, parameters):
+    """The work of contacts at the end of the step, and the rates of the next one."""
+    found = contact_virial(grains, contacts.pair, contacts.force, count[CONTACTS], span)
+    cell.virial[0], cell.virial[1], cell.virial[2] = found[0], found[4], found[8]
+    for a in range(3):
+        cell.work[a] -= 0.5 * scratch[DT] * cell.span[RATE + a] * cell.virial[a]
+        cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if parameters.law == 1 else 1.0)
+    if parameters.law == 2:
+        follow_pressure(grains, cell, scratch[DT], parameters.time)
+    return 0
+
+
+def deformation_stages(numbers: DeformationNumbers) -> HookStages:
+    """All stages of a deformation."""
+    return {
+        Hook.LIMIT_STEP: [(limit_strain, numbers)],
+        Hook.AFTER_DRIFT: [(deform, ())],
+        Hook.AFTER_KICK: [(work_of_box, numbers)],
+    }

@@ -1,0 +1,105 @@
+"""Motion in a box that is deformed, where velocities are those relative to the flow v = A x of the box.
+
+Two grains then part with u1 − u2 + A l, where l is the nearest image of x1 − x2.  In a box that keeps its shape, whose
+`Span` has no rates, nothing of the flow is part of the compiled code.
+"""
+
+import functools
+import math
+from collections.abc import Callable
+
+from ..basics.box import MovingSpan, Span
+from ..compiler.jit import compiled_form, formula, loop
+from .vec import axpy, load, sub
+
+
+def unless_still(still: Callable) -> Callable[[Callable], Callable]:
+    """Decorator of a function whose last argument is a box that moves; `still` replaces it where the box does not."""
+
+    def decorate(moving: Callable) -> Callable:
+        @functools.wraps(moving)
+        def either(*given):
+            return (still if isinstance(given[-1], Span) else moving)(*given)
+
+        @functools.wraps(moving)
+        def form(*types):
+            return still if types[-1].instance_class is Span else moving
+
+        compiled_form(either)(form)
+        return either
+
+    return decorate
+
+
+@unless_still(lambda velocity, separation, span: velocity)
+def with_flow(velocity, separation, span):
+    """u + A l [m/s] of a relative velocity u [m/s] and a separation l [m]."""
+    return (
+        velocity[0] + span.rate_x * separation[0],
+        velocity[1] + span.rate_y * separation[1],
+        velocity[2] + span.rate_z * separation[2],
+    )
+
+
+@unless_still(lambda span: 0.0)
+def rate_of_strain(span):
+    """Σ |A_a| [1/s], the largest rate at which two points may part or approach, over their distance."""
+    return abs(span.rate_x) + abs(span.rate_y) + abs(span.rate_z)
+
+
+@unless_still(lambda squared_speed, reach, span: 4.0 * squared_speed)
+def squared_approach(squared_speed, reach, span):
+    """Square of the largest speed [m/s] at which two grains within reach [m] approach, of that of a grain."""
+    return (2.0 * math.sqrt(squared_speed) + reach * rate_of_strain(span)) ** 2
+
+
+@unless_still(lambda built, span: 0.0)
+def strain_since(built, span):
+    """Σ |L/L₀ − 1| of the box since its lengths were L₀ = `built` (3,) [m]."""
+    strain = abs(span.x / built[0] - 1.0) if span.x > 0.0 else 0.0
+    strain += abs(span.y / built[1] - 1.0) if span.y > 0.0 else 0.0
+    return strain + (abs(span.z / built[2] - 1.0) if span.z > 0.0 else 0.0)
+
+
+@unless_still(lambda x, built, span: x)
+def carried(x, built, span):
+    """Where the flow has carried a point x [m] since the lengths of the box were `built` (3,) [m]."""
+    return (
+        x[0] * (span.x / built[0]) if span.x > 0.0 else x[0],
+        x[1] * (span.y / built[1]) if span.y > 0.0 else x[1],
+        x[2] * (span.z / built[2]) if span.z > 0.0 else x[2],
+    )
+
+
+@loop
+def relative_velocity(grains, i, j, separation, span):
+    """Velocity [m/s] of grain i relative to grain j, whose separation x_i − x_j [m] is that of nearest images."""
+    return with_flow(sub(load(grains.velocity, i), load(grains.velocity, j)), separation, span)
+
+
+@loop
+def store_lengths(built, span):
+    """Set an array (3,) to the lengths of the box [m]."""
+    built[0], built[1], built[2] = span.x, span.y, span.z
+
+
+@formula
+def after_step(span, dt):
+    """The deformed box a step of dt [s] later: L grows by L A dt, and A is that of the same dL/dt."""
+    x, y, z = 1.0 + dt * span.rate_x, 1.0 + dt * span.rate_y, 1.0 + dt * span.rate_z
+    return MovingSpan(
+        span.x * x, span.y * y, span.z * z, span.inverse_x / x, span.inverse_y / y, span.inverse_z / z,
+        span.rate_x / x, span.rate_y / y, span.rate_z / z,
+    )  # fmt: skip
+
+
+@formula
+def flown(x, v, span, dt):
+    """Where a grain at x [m] with the velocity v [m/s] relative to the flow is after dt [s]: x + dt (v + A x)."""
+    return axpy(dt, with_flow(v, x, span), x)
+
+
+@formula
+def slowed(v, span, dt):
+    """That velocity after dt [s], in which the velocity in the laboratory is constant."""
+    return v[0] / (1.0 + dt * span.rate_x), v[1] / (1.0 + dt * span.rate_y), v[2] / (1.0 + dt * span.rate_z)

@@ -1,0 +1,268 @@
+"""A box that is deformed: Newton's law in the laboratory, the work of its boundaries, and runs that are interrupted."""
+
+import copy
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand import components
+from sand.basics.state import BROKEN, MADE, STEP
+from sand.io.checkpoint import newest_checkpoint
+
+RADIUS = 1e-7
+ICE = sand.Material(
+    "soft ice", density="1000 kg/m^3", surface_energy="0.1 J/m^2", young_modulus="7 GPa", poisson_ratio=0.25,
+    rolling_limit="8 angstrom",
+)  # fmt: skip
+DAMPED = sand.Contact(damping="critical", damping_ratio=0.05)
+pytestmark = pytest.mark.compiled("deformation", "contacts")
+
+
+def arrays_of(sim):
+    """All arrays of the regular state, as bits."""
+    return {name: (array.shape, array.tobytes()) for name, array in sim.regular_state.to_arrays().items()}
+
+
+def colliding_bodies():
+    """Two aggregates of grains of two sizes that meet off-centre at 16 m/s."""
+    first = sand.setup.bpca(12, radius="0.1 um", material=ICE, seed=1)
+    second = sand.setup.bpca(10, radius="0.08 um", material=ICE, seed=2)
+    return sand.setup.encounter(first, second, speed="16 m/s", impact_parameter="0.3 b").grains
+
+
+def in_flow(grains, box, rates, shift):
+    """The grains shifted by a vector [m] into a box, with velocities relative to its flow; and their images."""
+    position = grains.position + shift
+    velocity = grains.velocity - np.asarray(rates) * grains.position
+    quantities = {"velocity": velocity, "spin": grains.spin}
+    return sand.Grains(box.wrap(position), grains.radius, ICE, **quantities), box.image(position)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.49])
+def test_free_bodies_move_as_in_an_open_box(shift, record_bound):
+    """Two bodies collide while their box changes linearly by (−30, +20, −10) %: the motion is that of an open box.
+
+    The velocities u + A x of the laboratory obey Newton's law, and a box that changes linearly moves its images at a
+    constant velocity: positions, with A x of a shift added, agree up to the error of the integrator, of second order,
+    in which the drift of the box has a part.  Contacts form and break, roll, and are damped in all modes.  Also across
+    a face of the box.
+    """
+    grains, box = colliding_bodies(), sand.Box.periodic("3 um", "2.6 um", "2.8 um")
+    lengths, changes, until = np.array(box.lengths), np.array([-0.3, 0.2, -0.1]), 4e-8
+    rates = changes / until
+    probe = sand.Simulation(grains, [DAMPED])
+    probe.run(steps=1)
+    longest, errors = probe.state.clock[STEP], []
+    for divisor in (1, 2, 4):
+        stepping = sand.Verlet(step=longest / divisor)
+        free = sand.Simulation(grains, [DAMPED], stepping=stepping)
+        free.run(until=until)
+        moved = shift * lengths
+        placed, images = in_flow(grains, box, rates, moved)
+        law = sand.Deformation(rates, law="linear")
+        sim = sand.Simulation(placed, [DAMPED], box=box, deformation=law, stepping=stepping)
+        sim.run(until=until)
+        now = np.array(sim.box.lengths)
+        assert now == pytest.approx(lengths * (1.0 + changes), rel=1e-12, abs=0.0)
+        whole = sim.grains.position + (sim.grains.image + images) * now - moved * (1.0 + changes)
+        errors.append(np.abs(whole - free.grains.position).max() / RADIUS)
+        counts = [[each.state.count[k] for k in (MADE, BROKEN)] for each in (sim, free)]
+        assert counts[0] == counts[1] and counts[0][0] > 3
+        one, two = (each.ledger.rows[-1] for each in (sim, free))
+        for name in ("lost_forming", "lost_rolling", "lost_damping_normal", "lost_damping_rolling"):
+            assert one[name] == pytest.approx(two[name], rel=1e-6, abs=0.0) and one[name] > 0.0, name
+    record_bound(f"error in radii at 25 steps per period, shift {shift}", errors[0], most=1e-8)
+    record_bound(f"ratio of errors, step halved, shift {shift}", errors[0] / errors[1], least=3.0)
+    record_bound(f"ratio of errors, step halved again, shift {shift}", errors[1] / errors[2], least=3.0)
+
+
+def packing(rate, number=60, side=None, **options):
+    """An aggregate of ice grains in a cube that just holds it, deformed at a rate."""
+    body = sand.setup.bcca(number, radius=RADIUS, material=ICE, seed=1)
+    x = body.position - 0.5 * (body.position.min(0) + body.position.max(0))
+    box = sand.Box.periodic(side or float(np.ptp(x, axis=0).max() + 2.1 * RADIUS))
+    given = None if rate is None else rate if isinstance(rate, sand.Deformation) else sand.Deformation(rate)
+    return sand.Simulation(sand.Grains(x, RADIUS, ICE), [DAMPED], box=box, deformation=given, **options)
+
+
+def test_the_work_of_the_boundaries_closes_the_ledger(record_bound):
+    """A compression to φ = 0.3: the total of the ledger changes by less than 1e-4 of the work, |lost_box|.
+
+    Contacts form, roll, twist and slide. The work along each axis adds up to that of the box, and the mean pressures of
+    all rows to the work: Σ_rows −P̄ ΔV = W for three equal rates, to rounding of the ledger.
+    """
+    sim = packing("-4e6 1/s", row_every="5 ns")
+    sim.run(stop="filling > 0.3", until="2 us")
+    rows = sim.ledger.rows
+    work = -rows[-1]["lost_box"]
+    assert rows[-1]["filling"] >= 0.3 and rows[-1]["made"] > 40 and min(
+        rows[-1][f"lost_{mode}"] for mode in ("forming", "sliding", "rolling", "damping_normal")
+    ) > 0.0  # fmt: skip
+    record_bound("error of the ledger over the work", abs(rows[-1]["total"] - rows[0]["total"]) / work, most=1e-4)
+    assert sum(rows[-1][f"work_{axis}"] for axis in "xyz") == pytest.approx(work, rel=1e-12, abs=0.0)
+    mean = sum(
+        -before["box_x"] ** 3 * (math.expm1(3.0 * math.log(after["box_x"] / before["box_x"]))) / 3.0
+        * sum(after[f"mean_pressure_{axis}"] for axis in "xyz")
+        for before, after in zip(rows, rows[1:], strict=False)
+    )  # fmt: skip
+    assert mean == pytest.approx(work, rel=1e-6, abs=0.0)
+
+
+def test_a_gas_without_contacts_is_compressed_adiabatically():
+    """K ∝ L⁻² and P = 2K/3V at each moment, lost_box the change of K; to rounding, as the drift is exact."""
+    rng = np.random.default_rng(5)
+    grains = sand.Grains(rng.uniform(-1e-6, 1e-6, (30, 3)), RADIUS, ICE, velocity=rng.normal(size=(30, 3)))
+    sim = sand.Simulation(grains, [], box="4 um", deformation=sand.Deformation("-1e6 1/s"))
+    sim.run(until="0.3 us")
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert last["box_x"] == pytest.approx(4e-6 * math.exp(-0.3), rel=1e-3, abs=0.0)
+    ratio = (first["box_x"] / last["box_x"]) ** 2
+    assert last["translation"] == pytest.approx(first["translation"] * ratio, rel=1e-11, abs=0.0)
+    assert last["total"] == pytest.approx(first["total"], rel=1e-11, abs=0.0)
+    pressures = [first[f"mean_pressure_{axis}"] for axis in "xyz"]
+    assert sum(pressures) / 3.0 == pytest.approx(
+        2.0 / 3.0 * first["translation"] / first["box_x"] ** 3, rel=1e-12, abs=0
+    )
+    velocity = sim.grains.velocity + sim.grains.position @ sim.strain_rate
+    assert not np.allclose(velocity, sim.grains.velocity, rtol=1e-3)
+
+
+def test_rates_of_0_give_the_bits_of_a_run_without_a_deformation():
+    """All arrays but those of the box; and steps of the moving box at a rate that is still 0 agree to rounding.
+
+    Errors of rounding, 1e-16 r, grow in the motion of damped contacts by less than a factor of 1e5 in 400 steps.
+    """
+    later = sand.Deformation(sand.Ramp(["0 1/s", "-1e6 1/s"], ["1 s", "2 s"]))
+    one, two, three = packing(None), packing(0.0), packing(later)
+    for sim in (one, two, three):
+        with sim.change() as change:
+            change.velocity[:20, 0] += 0.5
+        sim.run(steps=400)
+    bits = arrays_of(two)
+    assert arrays_of(one) == {name: bits[name] for name in arrays_of(one)}
+    assert {name for name in bits if name not in arrays_of(one)} == {f"cell/{name}" for name in sim.state.cell._fields}
+    assert three.box == one.box and three.ledger["lost_box"][-1] == 0.0
+    assert three.grains.position == pytest.approx(one.grains.position, rel=0.0, abs=1e-11 * RADIUS)
+
+
+def test_interruptions_and_output_change_no_bit(tmp_path):
+    """A run with frames between its steps, one without, a copy, and one that continues from a checkpoint.
+
+    With rates that a ramp changes; the box of a frame is that of its time.
+    """
+    rate = sand.Deformation(sand.Ramp([["-2e6 1/s", "1e6 1/s", 0], 3 * ["-1e6 1/s"]], [0, "0.1 us"], steps=7))
+    one, often, first = packing(rate), packing(rate, frame_every="0.37 ns"), packing(rate, out=tmp_path / "run")
+    one.run(steps=5000)
+    often.run(steps=5000)
+    first.run(until="31.234567 ns")
+    other = first.copy()
+    again = packing(rate, restart=newest_checkpoint(tmp_path / "run", components.groups()))
+    assert again.box == first.box and again.box.lengths[0] < one.start.position.max() * 10
+    for sim in (other, again):
+        sim.run(steps=5000 - sim.steps)
+    assert arrays_of(one) == arrays_of(often) == arrays_of(other) == arrays_of(again)
+    resumed = sand.resume(tmp_path / "run")
+    resumed.run(steps=5000 - resumed.steps)
+    assert arrays_of(resumed) == arrays_of(one) and resumed.deformation == rate
+    frame = sand.open(tmp_path / "run")[0]
+    assert frame.box == sand.Box.periodic(*one.start.position.shape[:0], one.ledger.rows[0]["box_x"])
+
+
+@pytest.mark.parametrize("search", ["cells", "all pairs"])
+def test_lists_are_complete_while_the_box_shrinks(search):
+    """After each of 60 calls, all pairs that overlap are contacts, found by brute force; the box shrinks by 40 %.
+
+    The rate is so high that the flow alone brings grains together: |A| L is 40 m/s.
+    """
+    rng = np.random.default_rng(8)
+    grid = np.stack(np.meshgrid(*[np.arange(4) - 1.5] * 3, indexing="ij"), -1).reshape(-1, 3)
+    grains = sand.Grains(grid[:60] * 4e-7 + rng.uniform(-5e-8, 5e-8, (60, 3)), RADIUS, ICE)
+    search = sand.Neighbours(search)
+    sim = sand.Simulation(grains, [DAMPED], box="1.6 um", deformation=sand.Deformation("-2.5e7 1/s"), neighbours=search)
+    for _ in range(60):
+        sim.run(steps=20)
+        i, j = np.triu_indices(60, 1)
+        apart = np.linalg.norm(sim.box.nearest(sim.grains.position[i] - sim.grains.position[j]), axis=1)
+        touching = {tuple(pair) for pair in np.stack([i, j], 1)[apart < 2.0 * RADIUS].tolist()}
+        assert touching <= {tuple(sorted(pair)) for pair in sim.contacts["pair"].tolist()}
+        if sim.box.lengths[0] < 1.0e-6:
+            break
+    assert sim.box.lengths[0] < 1.1e-6 and len(touching) > 60
+
+
+def test_the_run_ends_before_a_grain_has_two_images_in_reach():
+    """A box may not become smaller than 2 (2 r + r): with one more contact of a pair its forces would be unknown."""
+    sim = packing("-3e7 1/s", number=4, side=9e-7)
+    result = sim.run(until="1 us")
+    assert result.outcome is sand.Outcome.BOX_TOO_SMALL
+    assert sim.box.lengths[0] == pytest.approx(6.0 * RADIUS, rel=1e-2, abs=0.0)
+
+
+def test_a_pressure_is_reached_and_kept():
+    """The rates follow the pressure of contacts and motion: a lattice comes to 1 MPa, and stays there.
+
+    At rest the pressure is Σ l f/3V of the contacts alone, from `sim.contacts`.  The rate never exceeds the largest.
+    """
+    grid = np.stack(np.meshgrid(*[np.arange(3) - 1.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 2.0 * RADIUS
+    law = sand.Deformation("1e6 1/s", law="pressure", pressure="1 MPa", time="1 ns")
+    grains = sand.Grains(grid * 0.999, RADIUS, ICE)
+    sim = sand.Simulation(grains, [DAMPED], box=5.994 * RADIUS + 1e-9, deformation=law, row_every="10 ns")
+    sim.run(until="0.4 us")
+    pair, x = sim.contacts["pair"], sim.grains.position
+    branch = sim.box.nearest(x[pair[:, 0]] - x[pair[:, 1]])
+    pressure = (branch * sim.contacts["force"]).sum() / (3.0 * sim.box.volume)
+    assert pressure == pytest.approx(1e6, rel=0.02, abs=0.0)
+    lengths = np.array([row["box_x"] for row in sim.ledger.rows])
+    assert np.abs(np.diff(np.log(lengths))).max() <= 1.001e6 * 1e-8
+    assert sim.ledger.rows[-1]["total"] == pytest.approx(
+        sim.ledger.rows[0]["total"], abs=1e-3 * max(abs(row["lost_box"]) for row in sim.ledger.rows)
+    )
+
+
+def test_a_change_sets_the_rate_and_the_box():
+    """New rates begin at the change; a box that is changed goes on from its new lengths, with the same contacts."""
+    sim = packing(0.0, number=12, side=2.4e-6)
+    sim.run(steps=50)
+    assert not sim.strain_rate.any()
+    with sim.change() as change:
+        change.deformation = sand.Deformation(["1e5 1/s", 0, "-1e5 1/s"])
+    sim.run(steps=50)
+    assert np.diag(sim.strain_rate) == pytest.approx([1e5, 0.0, -1e5], rel=1e-12, abs=0.0)
+    assert sim.box.lengths[0] > sim.box.lengths[1] == 2.4e-6 > sim.box.lengths[2]
+    contacts = len(sim.contacts["pair"])
+    with sim.change() as change:
+        change.box = "2.6 um"
+    assert sim.box == sand.Box.periodic("2.6 um") and len(sim.contacts["pair"]) == contacts
+    sim.run(steps=50)
+    assert sim.box.lengths[0] > 2.6e-6 and len(sim.contacts["pair"]) == contacts
+    with pytest.raises(sand.BadInput, match=r"give sand\.Deformation\(0\)"), sim.change() as change:
+        change.deformation = None
+
+
+@pytest.mark.validate
+def test_a_gas_moves_with_the_box():
+    """Drag leads to the flow: velocities relative to the box decay by the stopping time alone, and the ledger closes."""
+    gas = sand.Gas("300 K", pressure="1 kPa", brownian=False)
+    rng = np.random.default_rng(5)
+    grains = sand.Grains(rng.uniform(-1e-6, 1e-6, (30, 3)), RADIUS, ICE, velocity=rng.normal(size=(30, 3)))
+    rate = -1e3
+    sim = sand.Simulation(grains, [gas], box="4 um", deformation=sand.Deformation(rate))
+    time = gas.shortest_time(grains)
+    sim.run(until=time)
+    ratio = sim.ledger["translation"][-1] / sim.ledger["translation"][0]
+    assert ratio == pytest.approx(math.exp(-2.0 - 2.0 * rate * time), rel=1e-2, abs=0.0)
+    assert sim.ledger["total"][-1] == pytest.approx(sim.ledger["total"][0], rel=1e-9, abs=0.0)
+
+
+def test_copies_have_boxes_of_their_own():
+    """A deep copy and the original, each run further, are independent and equal to the last bit."""
+    sim = packing("-1e6 1/s", number=12, side=2.4e-6)
+    sim.run(until="3.21 ns")
+    other = copy.deepcopy(sim)
+    at_copy, box = arrays_of(other), other.box
+    sim.run(steps=100)
+    assert arrays_of(other) == at_copy != arrays_of(sim) and other.box == box != sim.box
+    other.run(steps=100)
+    assert arrays_of(other) == arrays_of(sim)
