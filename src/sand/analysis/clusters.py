@@ -135,7 +135,7 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
     Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration.
     `percolation_axes` has the parameters, and says along which axes.
     """
-    return percolation_axes(position, pairs, box).any(axis=1)
+    return np.asarray(percolation_axes(position, pairs, box).any(axis=1))
 
 
 @checked

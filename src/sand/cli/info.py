@@ -319,20 +319,28 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
         good = slow_from(planned)
         simulation = simulation_of(planned, case.physics(), stepping=case.stepping)
     limits = _limits(simulation)
-    cost, costs = _cost(simulation, planned.until, math.inf, None, len(seeds))
+    cost, costs = _cost(simulation, planned.until, math.inf, None, len(seeds), len(seeds))
     rate = f"{planned.rate:.3g} 1/s, or {planned.rate * planned.scales.time:.2g} /t_c"
     rows = [
         ("aggregate", f"{len(simulation.grains)} grains, filling factor {planned.filling(planned.sides):.3g}"),
         ("between", " x ".join(format_quantity(float(f"{side:.3g}"), "m") for side in planned.sides)),
         ("rate of strain", f"{rate}; the largest that is slow enough: {good}"),
-        ("E_roll", f"12 pi^2 gamma R xi_c = {planned.scales.roll_energy:.3g} J; E_roll/r^3 = {planned.scales.pressure:.3g} Pa"),
+        (
+            "E_roll",
+            f"12 pi^2 gamma R xi_c = {planned.scales.roll_energy:.3g} J; E_roll/r^3 = {planned.scales.pressure:.3g} Pa",
+        ),
         ("seeds", str(len(seeds))),
         *_of_each(costs, len(seeds), "run"),
         ("end", f"at {format_quantity(planned.until, 's')}"),
         *limits.items(),
         start,
     ]
-    numbers = {"rate": planned.rate, "until": planned.until, "sides": planned.sides.tolist(), **planned.scales._asdict()}
+    numbers = {
+        "rate": planned.rate,
+        "until": planned.until,
+        "sides": planned.sides.tolist(),
+        **planned.scales._asdict(),
+    }
     return "a valid case", rows, {"kind": "laboratory case", "case": content, "cost": cost, "limits": limits} | numbers
 
 

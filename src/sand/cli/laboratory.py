@@ -40,8 +40,9 @@ def command_of(name: str, short: str, what: str) -> click.Command:
         laboratory(job, threads=threads, **how)
 
     command.help = (
-        f"{what}\n\nRuns each seed in DIR/seed-N, with all files of `sand run`, and writes laboratory.json, results.csv "
-        "with the rows of all seeds, and a figure to the folder. Ctrl-C interrupts it; continue with `sand resume`."
+        f"{what}\n\nRuns each seed in DIR/seed-N, with all files of `sand run`, and writes laboratory.json, "
+        "results.csv with the rows of all seeds, and a figure to the folder. Ctrl-C interrupts it; continue with "
+        "`sand resume`."
     )
     return command
 
@@ -50,7 +51,7 @@ def laboratory(job: Any, *, as_json: bool, quiet: bool, **execution: Any) -> Non
     """Run a `LaboratoryJob` and print the results; `execution` as for `job.run_job`. Raises BadInput as it does."""
     from .job import run_job
 
-    content = run_job(job, as_json=as_json, quiet=quiet or as_json, **execution)
+    content = run_job(job, as_json=as_json, quiet=quiet or as_json, lines=True, **execution)
     heading = f"resume {job.folder}" if job.resume else f"{job.COMMAND} {job.path}"
     rows = [*run_rows(content["runs"]), ("files", report.listed(job.folder))]
     report.answer(content, heading, rows, as_json=as_json, quiet=quiet)

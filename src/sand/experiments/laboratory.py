@@ -1,4 +1,4 @@
-"""Numerical laboratory: a packing is compressed, stretched or sheared slowly, by its periodic box or between two walls."""
+"""Numerical laboratory: a packing is compressed, stretched or sheared, by its periodic box or between two walls."""
 
 from __future__ import annotations
 
@@ -74,6 +74,9 @@ def read_rate(value: Any, name: str) -> Rate:
     raise BadInput(f"{name} = {shown(value)} is no rate of strain; {advice}")
 
 
+BOX = Reading(lambda value, name: as_box(value), write=lambda box: list(box.lengths))
+
+
 @checked
 @dataclass(frozen=True)
 class Loading(Settings):
@@ -97,8 +100,8 @@ class Loading(Settings):
         Axis of the strain, "x", "y" or "z"; "all" for equal strains of a box that is compressed. "auto", the default:
         "all" for a box that is compressed, x for one that is stretched, z between walls. Shear moves the lid along x.
     box : float or str or sequence, optional
-        Sides of the box at the start [m], one or three: the sides along walls, and with by = "box" all. By default those
-        of a frame, or of a cube that holds the body with a gap of a tenth of a radius.
+        Sides of the box at the start [m], one or three; between walls those along x and y count. By default those of a
+        frame, or of a cube that holds the body with a gap of a tenth of a radius.
     pressure : float or str, optional
         Pressure [Pa] > 0 with which the lid presses on the grains while it shears them; by default its height stays.
     every : float, optional
@@ -115,7 +118,7 @@ class Loading(Settings):
     to: Annotated[Any, Number(above=0.0)]
     by: Annotated[str, Word(*WAYS)] = "box"
     along: Annotated[str, Word("auto", "all", "x", "y", "z")] = "auto"
-    box: Annotated[Any, Reading(lambda value, name: as_box(value), write=lambda box: list(box.lengths))] = None
+    box: Annotated[Any, BOX] = None
     pressure: Annotated[Any, Number("Pa", above=0.0)] = None
     every: Annotated[Any, Number(least=1e-4, most=0.5)] = 0.02
 
@@ -244,16 +247,19 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
 
 
 def slow_from(planned: Plan) -> str:
-    """What the rule of the rate says of a plan; warns if no part of it is slow enough."""
+    """The largest rate at the start of a plan that is slow enough; warns if no part of the plan is."""
     first, last = (planned.rate_ratio(sides) for sides in (planned.sides, _way(planned.loading).last_sides(planned)))
-    good = planned.rate / first
-    text = f"{good:.3g} 1/s, or {good * planned.scales.time:.2g} /t_c, at the start"
-    if min(first, last) > 1.0:
+
+    def text(rate: float) -> str:
+        return f"{rate:.3g} 1/s, or {rate * planned.scales.time:.2g} /t_c"
+
+    good = f"{text(planned.rate / first)}, at the start"
+    if (times := min(first, last)) > 1.0:
         warn(
-            f"the rate, {planned.rate:.3g} 1/s or {planned.rate * planned.scales.time:.2g} /t_c, is {min(first, last):.2g} "
-            f"times too fast for a static stress; the largest good rate is {text}"
+            f"the rate, {text(planned.rate)}, is {times:.2g} times too fast for a static stress; the largest good rate "
+            f"is {good}"
         )
-    return text
+    return good
 
 
 class Percolation(Observer):
@@ -275,7 +281,7 @@ class Percolation(Observer):
 
 
 def percolating(position: np.ndarray, pairs: np.ndarray, box: Box) -> dict[str, Any]:
-    """Number of clusters that percolate, and of the largest one its lowest grain (−1: none), size, and axes as 0 or 1."""
+    """Number of clusters that percolate; of the largest one the lowest grain (−1: none), size, and axes as 0 or 1."""
     axes, labels = percolation_axes(position, pairs, box), cluster_labels(len(position), np.asarray(pairs))
     sizes = np.bincount(labels) * axes.any(axis=1)
     largest = int(sizes.argmax())
@@ -358,7 +364,7 @@ def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
 def table_of(planned: Plan, rows: Sequence[dict[str, float]], seen: Percolation) -> list[dict[str, Any]]:
     """Rows of the table: those of the ledger between which ln φ or the strain changes by `Loading.every`."""
     kept, table = rows[0], [planned.row(None, rows[0]) | seen.found.get(rows[0]["time"], {})]
-    compressed, least = planned.loading.kind == "compress", planned.loading.every * (1.0 - 1e-6)
+    compressed, least = planned.loading.kind == "compress", planned.loading.every * (1.0 - 1e-3)
     for row in rows[1:]:
         new, last = planned.row(kept, row), table[-1]
         change = math.log(new["filling"] / last["filling"]) if compressed else abs(new["strain"] - last["strain"])

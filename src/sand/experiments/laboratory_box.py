@@ -10,6 +10,7 @@ import numpy as np
 from ..basics.box import Box
 from ..basics.errors import BadInput
 from ..basics.units import format_quantity
+from ..components.deformation import Deformation
 from ..contact.model import Contact
 from ..setup.from_frame import Start
 
@@ -34,10 +35,15 @@ def in_box(loading: Loading, body: Start, axes: str) -> Start:
         if loading.box is not None:
             raise BadInput(f"box: the frame has its own, {body.box.describe()}; leave box out")
         if open_axes := [axis for axis in axes if body.box.lengths["xyz".index(axis)] is None]:
-            raise BadInput(f"the box of the frame is open along {open_axes[0]}; it must be periodic along {', '.join(axes)}")
+            raise BadInput(
+                f"the box of the frame is open along {open_axes[0]}; it must be periodic along {', '.join(axes)}"
+            )
         return body
     grains = body.grains.copy()
-    low, high = (grains.position - grains.radius[:, None]).min(axis=0), (grains.position + grains.radius[:, None]).max(axis=0)
+    low, high = (
+        (grains.position - grains.radius[:, None]).min(axis=0),
+        (grains.position + grains.radius[:, None]).max(axis=0),
+    )
     cube = float((high - low).max()) + GAP * float(grains.radius.mean())
     lengths = [cube, cube, cube] if loading.box is None else list(loading.box.lengths)
     for k, axis in enumerate("xyz"):
@@ -47,7 +53,9 @@ def in_box(loading: Loading, body: Start, axes: str) -> Start:
             raise BadInput(f"box: its {axis} axis is open; give a length")
         elif lengths[k] < high[k] - low[k]:
             given, needed = (format_quantity(float(v), "m") for v in (lengths[k], high[k] - low[k]))
-            raise BadInput(f"box: {given} along {axis} is less than the body, {needed}; give a larger box, or leave it out")
+            raise BadInput(
+                f"box: {given} along {axis} is less than the body, {needed}; give a larger box, or leave it out"
+            )
     grains.arrays.position[...] -= (0.5 * (low + high))[:, None]
     return Start(grains, body.contacts, Box(tuple(lengths)), body.note)  # type: ignore[arg-type]
 
@@ -84,6 +92,6 @@ def sides(plan: Plan, row: dict[str, float]) -> np.ndarray:
 
 
 def stress(plan: Plan, before: dict[str, float], row: dict[str, float]) -> float:
-    """Mean stress [Pa] between two rows of the ledger, work of the box over its change of volume; positive against it."""
+    """Mean stress [Pa] between two rows of the ledger, the work of the box over its change of volume."""
     first, last = (float(np.prod(sides(plan, one))) for one in (before, row))
     return float((before[LOST] - row[LOST]) / abs(last - first))

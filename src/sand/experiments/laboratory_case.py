@@ -30,7 +30,7 @@ from .laboratory import Loading, Plan, plan
 
 
 class PackingSection(BodySection):
-    """Section [aggregate]: an aggregate (a different one for each seed if it is random), a file, or a frame of a run."""
+    """Section [aggregate]: an aggregate (another one for each seed if it is random), a file, or a frame of a run."""
 
     frame: Annotated[int | None, Whole(-(2**31), 2**31 - 1), For("kind", "file")] = None
     """Index of the frame, if `file` is a run of SAND; −1, the last, by default. Of a folder with seed-1, seed-2, … each
@@ -60,7 +60,7 @@ class PackingSection(BodySection):
 
 
 def frame_with(path: Path, filling: float) -> int:
-    """Index of the frame of a run whose filling factor is nearest.  Raises BadInput if it is beyond those of the run."""
+    """Index of the frame of a run whose filling factor is nearest.  Raises BadInput if it is beyond all of them."""
     with contextlib.closing(Frames(path / TRAJECTORY if path.is_dir() else path)) as frames:
         found = np.array([_filling(frame) for frame in frames])
     if not found.size or not found.min() * (1.0 - 0.02) <= filling <= found.max() * (1.0 + 0.02):
@@ -163,17 +163,17 @@ CASES: dict[str, type[LaboratoryCase]] = {"compress": CompressionCase, "stretch"
 """Models of the case files, by command."""
 
 
-def check_laboratory(content: dict[str, Any], name: str) -> LaboratoryCase:
+def model_of(content: dict[str, Any], command: str | None = None) -> Any:
+    """The model of a case file of a command, by default of that which its tables show."""
+    return with_integrator(CASES[command or command_for(content) or ""], content)
+
+
+def check_laboratory(content: dict[str, Any], name: str, command: str | None = None) -> LaboratoryCase:
     """Validate the content of a case file; `name` begins each message.  Raises BadInput."""
     problems = material_errors(content, ("aggregate",), "silica")
-    return validate(model_of(content), content, name, problems)
-
-
-def model_of(content: dict[str, Any]) -> Any:
-    """The model of a case file, by its tables."""
-    return with_integrator(CASES[command_for(content) or ""], content)
+    return validate(model_of(content, command), content, name, problems)
 
 
 def read_laboratory(path: str | Path, command: str) -> LaboratoryCase:
     """Read and check a case file of a command.  Raises BadInput, all errors of the file, one line each."""
-    return check_laboratory(read_content(path, command), str(path))
+    return check_laboratory(read_content(path, command), str(path), command)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
@@ -77,6 +78,10 @@ class LaboratoryJob(Job):
             raise error.at(str(self.path)) from None
         return super().compute(executor, [*observers, Shown(self.tasks(), progress)], progress)
 
+    def line(self, outcome: dict[str, Any]) -> str:
+        """Seed, filling factor, strain and stress at the end."""
+        return f"  {said(outcome['seed'], outcome)}"
+
     def results(self, outcomes: list[dict[str, Any]]) -> dict[str, Any]:
         """All outcomes; writes the table of all rows, and draws the figure."""
         from ..plotting.laboratory import laboratory_figure
@@ -91,7 +96,18 @@ class LaboratoryJob(Job):
 def rows_of(outcome: dict[str, Any]) -> list[dict[str, Any]]:
     """Rows of the table of a run, with its seed."""
     columns = outcome["table"]
-    return [{"seed": outcome["seed"], **dict(zip(columns, row, strict=True))} for row in zip(*columns.values(), strict=True)]
+    return [
+        {"seed": outcome["seed"], **dict(zip(columns, row, strict=True))} for row in zip(*columns.values(), strict=True)
+    ]
+
+
+def said(seed: int, row: dict[str, Any]) -> str:
+    """A row in words."""
+    text = f"seed {seed}: filling factor {row['filling']:.3g}, strain {row['strain']:.3g}"
+    if math.isnan(row["stress"]):
+        return text
+    rounded = float(f"{row['stress']:.3g}")
+    return f"{text}, stress {format_quantity(rounded, 'Pa')}"
 
 
 class Shown(Observer):
@@ -107,10 +123,7 @@ class Shown(Observer):
         rows = simulation.ledger.rows
         found = self.plan.row(rows[-2] if len(rows) > 1 else None, row)
         done = (self._seeds.index(simulation.seed) + min(row["time"] / self.plan.until, 1.0)) / len(self._seeds)
-        text = f"seed {simulation.seed}: filling factor {found['filling']:.3g}, strain {found['strain']:.3g}"
-        if len(rows) > 1:
-            text += f", stress {format_quantity(float('%.3g' % found['stress']), 'Pa')}"
-        self._progress(text, done)
+        self._progress(said(simulation.seed, found), done)
 
 
 def run_seed(
@@ -138,7 +151,9 @@ def loaded(
     if resumed and place is not None and checkpoint_files(place):
         simulation = resume(place, observers=own)
         if changed := changed_tables(simulation_of(planned, forces, **given), simulation):
-            raise BadInput(f"{place} contains a run with different [{changed[0]}]; give another folder, or the same case")
+            raise BadInput(
+                f"{place} contains a run with different [{changed[0]}]; give another folder, or the same case"
+            )
     else:  # a run killed at its very start leaves a folder without a checkpoint
         simulation = simulation_of(planned, forces, out=place, overwrite=True, observers=own, **given)
     return run_to_end(planned, simulation).to_dict()

@@ -21,7 +21,9 @@ FLOOR, LID = "floor", "lid"
 def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.ndarray]:
     """The packing in a box that is open along z, and the lengths of the box, along z the distance of the walls."""
     if not body.box.is_open and body.box.lengths[2] is not None:
-        raise BadInput("by = 'walls': the frame is periodic along z, where the walls are; start from a body, or between walls")
+        raise BadInput(
+            "by = 'walls': the frame is periodic along z, where the walls are; start from a body, or between walls"
+        )
     start = in_box(loading, body, "xy")
     low, high = _planes(start, contact)
     return start, np.array([*start.box.lengths[:2], high - low])

@@ -290,7 +290,9 @@ class SweptLoading(SweptCase):
         """Set up the packing, and estimate its cost."""
         planned = self.case.plan(seed)
         slow_from(planned)
-        cost = simulation_of_plan(planned, self.case.physics(), stepping=self.case.stepping).expected_cost(planned.until)
+        cost = simulation_of_plan(planned, self.case.physics(), stepping=self.case.stepping).expected_cost(
+            planned.until
+        )
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from ..config.template import (
     EXAMPLES,
@@ -60,7 +61,7 @@ LOADINGS: dict[str, Values] = {
         "forces.contact": DAMPED,
     },
 }
-"""Keys in use of `sand compress`, `sand stretch` and `sand shear`: an aggregate of ice with slightly damped contacts."""
+"""Keys in use of `sand compress`, `sand stretch` and `sand shear`: aggregates of ice, slightly damped."""
 SWEEP = {"vary": {"impact.speed": "log(0.3 m/s, 3 m/s, 4)", "impact.impact_parameter": ["0 b", "0.5 b"]}, "seeds": 2}
 """Keys in use of [sweep], for the collisions above."""
 
@@ -102,8 +103,7 @@ def _scattering(name: str) -> str:
 
 def _loading(name: str, command: str) -> str:
     table = OF_COMMAND[command]
-    section = CASES[command].model_fields[table].annotation
-    assert section is not None
+    section: Any = CASES[command].model_fields[table].annotation
     note = summary(section).removeprefix(f"Section [{table}]: ").capitalize()
     tables = [
         Table("[aggregate]", summary(PackingSection).removeprefix("Section [aggregate]: "), keys_of(PackingSection)),

@@ -64,5 +64,9 @@ def _columns(table: dict[str, list[float]]) -> dict[str, np.ndarray]:
     columns = {name: np.array(column, float) for name, column in table.items()}
     lost = {name: np.diff(columns[name]) for name in (*ALWAYS_LOST, *DAMPED) if name in columns}
     total = np.sum(list(lost.values()), axis=0)
-    shares = {name: np.where(total > 0.0, lost[f"lost_{name}"] / np.where(total > 0.0, total, 1.0), 0.0) for name in CHANNELS}
-    return {name: column[1:] for name, column in columns.items()} | shares | {"others": 1.0 - sum(shares.values())}
+    dissipates = total > 0.0
+    shares = {
+        name: np.where(dissipates, lost[f"lost_{name}"] / np.where(dissipates, total, 1.0), 0.0) for name in CHANNELS
+    }
+    shares["others"] = 1.0 - np.sum(list(shares.values()), axis=0)
+    return {name: column[1:] for name, column in columns.items()} | shares

@@ -146,7 +146,9 @@ def tatsuuma_strength(filling: Any, surface_energy: Any = 0.1, radius: Any = 1e-
         r [m].
     """
     gamma = si(surface_energy, "J/m^2", "surface_energy", above=0.0)
-    return 6e5 * (gamma / 0.1) * (1e-7 / si(radius, "m", "radius", above=0.0)) * si_array(filling, "1", "filling") ** 1.8
+    return (
+        6e5 * (gamma / 0.1) * (1e-7 / si(radius, "m", "radius", above=0.0)) * si_array(filling, "1", "filling") ** 1.8
+    )
 
 
 @checked

@@ -51,8 +51,8 @@ FOLDERS = {
     "grow": (GROW + CONTACT, {f"seed-{k}/summary.json": SUMMARY for k in (1, 2)} | {"growth.json": {}}),
     "scatter": (SCATTER, {"scattering.json": {"job": "cross-section", "sand": "0.0.7"}}),
     "stretch": (
-        '[aggregate]\nkind = "rbd"\ngrains = 30\nradius = "0.1 um"\nmaterial = "iron"\n[stretch]\nrate = "2 m/s"\nto = 0.5\n'
-        f'by = "walls"\nseeds = [1, 2, 3]\n{CONTACT}',
+        '[aggregate]\nkind = "rbd"\ngrains = 30\nradius = "0.1 um"\nmaterial = "iron"\n[stretch]\nrate = "2 m/s"\n'
+        f'to = 0.5\nby = "walls"\nseeds = [1, 2, 3]\n{CONTACT}',
         {"laboratory.json": {"runs": [{}, {}], "sand": "0.0.7"}},
     ),
     "sweep": (
