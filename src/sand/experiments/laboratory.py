@@ -61,15 +61,15 @@ def read_rate(value: Any, name: str) -> Rate:
     advice = "give '1e-5 /t_c', with the time t_c of a contact, '1e4 1/s', or, by = 'walls', a speed such as '10 cm/s'"
     if isinstance(value, (int, float)):
         raise BadInput(f"{name} = {shown(value)} has no unit; {advice}")
-    if isinstance(value, str) and (match := _PER_CONTACT_TIME.fullmatch(value.strip())):
-        return Rate(si(match[1], "1", name, above=0.0), "/t_c")
-    for unit in ("1/s", "m/s"):
+    match = _PER_CONTACT_TIME.fullmatch(value.strip()) if isinstance(value, str) else None
+    candidates = [(value, "1/s", "1/s"), (value, "m/s", "m/s")] if match is None else [(match[1], "1", "/t_c")]
+    for number, unit, called in candidates:
         try:
-            number = si(value, unit, name)
+            found = si(number, unit, name)
         except BadInput:
             continue
-        if number > 0.0:
-            return Rate(number, unit)
+        if found > 0.0:
+            return Rate(found, called)
         raise BadInput(f"{name} = {shown(value)} must be above 0: what is done gives the direction")
     raise BadInput(f"{name} = {shown(value)} is no rate of strain; {advice}")
 
@@ -137,8 +137,8 @@ class Loading(Settings):
             yield "rate is a speed, which is for by = 'walls'; give a rate such as '1e-5 /t_c'"
         allowed = self.axes_allowed
         if self.along not in ("auto", *allowed):
-            texts = " or ".join(map(repr, allowed)) if allowed else "leave it out"
-            yield f"along = {self.along!r} is not for kind = {self.kind!r} with by = {self.by!r}; give {texts}"
+            advice = f"give {' or '.join(map(repr, allowed))}" if allowed else "leave it out"
+            yield f"along = {self.along!r} is not for {self.kind} with by = {self.by!r}; {advice}"
         if self.pressure is not None and (self.kind, self.by) != ("shear", "walls"):
             yield "pressure is for shear with by = 'walls', whose lid may move along its normal; leave it out"
 

@@ -19,7 +19,7 @@ from ..io.run_folder import FIGURE, LABORATORY, LOADED, RESULTS_CSV, read_toml
 from ..io.table import write_table
 from ..simulation.observers import Observer
 from ..simulation.serialise import changed_tables
-from .job import Job, Progress
+from .job import Job, Progress, ignored
 from .laboratory import Plan, run_to_end, simulation_of, slow_from
 from .laboratory_case import OF_COMMAND, LaboratoryCase, model_of, read_laboratory
 
@@ -70,13 +70,17 @@ class LaboratoryJob(Job):
         """Run the packing of a seed."""
         return partial(run_seed, self.content, str(self.folder.absolute()), self.resume)
 
-    def compute(self, executor: Executor | None, observers: Sequence[Any], progress: Progress) -> dict[str, Any]:
-        """As `Job.compute`; the first packing is set up before, to find errors, and tells of its rate."""
+    def run(
+        self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
+    ) -> dict[str, Any]:
+        """As `Job.run`; the first packing is set up before, to find errors, and tells of its rate."""
         try:
-            slow_from(self.case.plan(self.tasks()[0]))
+            planned = self.case.plan(self.tasks()[0])
+            simulation_of(planned, self.case.physics(), stepping=self.case.stepping)
         except BadInput as error:
             raise error.at(str(self.path)) from None
-        return super().compute(executor, [*observers, Shown(self.tasks(), progress)], progress)
+        slow_from(planned)
+        return super().run(executor, [*observers, Shown(self.tasks(), progress)], progress)
 
     def line(self, outcome: dict[str, Any]) -> str:
         """Seed, filling factor, strain and stress at the end."""
@@ -84,8 +88,8 @@ class LaboratoryJob(Job):
 
     def results(self, outcomes: list[dict[str, Any]]) -> dict[str, Any]:
         """All outcomes; writes the table of all rows, and draws the figure."""
-        from ..plotting.laboratory import laboratory_figure
         from ..plotting.run_figure import save
+        from .laboratory_figure import laboratory_figure
 
         write_table(self.folder / RESULTS_CSV, [row for one in outcomes for row in rows_of(one)])
         announce("drawing the figure")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..basics.errors import BadInput
-from ..components.walls import LOST, Wall
+from ..config.wall_section import WallSection
 from ..contact.model import Contact
 from ..setup.from_frame import Start
 from .laboratory_box import in_box
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from .laboratory import Loading, Plan
 
 FLOOR, LID = "floor", "lid"
+LOST = "lost_walls"
+"""Column of the ledger: energy [J] that the moving lid took from grains and contacts."""
 
 
 def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.ndarray]:
@@ -53,8 +55,11 @@ def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
     pressed: dict[str, Any] = {}
     if loading.pressure is not None:
         pressed = {"mass": float(grains.mass.sum()), "force": loading.pressure * _area(plan)}
-    floor = Wall((0.0, 0.0, low), (0.0, 0.0, 1.0), material, name=FLOOR)
-    return {"walls": [floor, Wall((0.0, 0.0, high), (0.0, 0.0, -1.0), material, velocity, name=LID, **pressed)]}
+    planes = [
+        WallSection(material=material.name, point=(0.0, 0.0, low), normal=(0.0, 0.0, 1.0), name=FLOOR),
+        WallSection(material=material.name, point=(0.0, 0.0, high), normal=(0.0, 0.0, -1.0), name=LID, velocity=velocity, **pressed),
+    ]
+    return {"walls": [one.build({material.name: material}) for one in planes]}
 
 
 def _area(plan: Plan) -> float:

@@ -74,7 +74,7 @@ radius = "0.1 um"
 material = "ice"
 [TABLE]
 rate = "1 mm/s"
-to = 0.5
+to = 0.6
 by = "walls"
 [forces.contact]
 """

@@ -11,8 +11,8 @@ import sand
 from sand.cli.main import main
 from sand.experiments import laboratory
 from sand.experiments.laboratory import Loading, load, percolating, plan, table_of
+from sand.experiments.laboratory_figure import laboratory_figure
 from sand.experiments.laboratory_job import rows_of
-from sand.plotting.laboratory import laboratory_figure
 from sand.theory.compression import packing_scales
 
 ICE = sand.ICE

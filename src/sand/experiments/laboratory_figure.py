@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..analysis.ledger_columns import ALWAYS_LOST, DAMPED
 from ..theory.compression import CLOSEST, arakawa_coordination, kataoka_pressure, tatsuuma_pressure
-from .papers import Curve, Guide, Panel, panels_figure
+from ..plotting.papers import Curve, Guide, Panel, panels_figure
 
 POINTS = 60
 """Largest number of points of a curve."""
@@ -37,6 +37,8 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
 
     def curve(column: str, text: str) -> Curve:
         values = np.array([np.interp(x, table[name], table[column]) for table in tables])
+        if compressed and column == "stress":  # fast compressions begin with noise, which a logarithm cannot show
+            values[values <= 0.0] = np.nan
         return Curve(text, x, values.mean(axis=0), values.min(axis=0), values.max(axis=0))
 
     laws, numbers = [], []
