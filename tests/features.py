@@ -50,7 +50,8 @@ def simulation(*features: str) -> sand.Simulation:
         contact |= each.get("contact", {})
         stepping |= each.get("stepping", {})
         forces |= each.get("forces", {})
-        more |= {name: value for name, value in each.items() if name in ("walls", "driven", "deformation", "box", "neighbours")}
+        own = ("walls", "driven", "deformation", "box", "neighbours")
+        more |= {name: value for name, value in each.items() if name in own}
     verlet = sand.Verlet(**stepping)
     bodies = any(each.get("rigid") for each in given)
     how = sand.RigidClusters(contact_stepping=verlet) if bodies else verlet

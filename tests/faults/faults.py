@@ -48,6 +48,9 @@ class Fault:
 # fmt: off
 FAULTS = (
     # formulas
+    Fault("velocities of a deformed box that grow with it", "sign", "formula", "numerics/flow.py",
+          "return v[0] / (1.0 + dt * span.rate_x)", "return v[0] * (1.0 + dt * span.rate_x)",
+          "unit/numerics/test_flow.py::test_a_drift_keeps_the_velocity_in_the_laboratory"),
     Fault("half the JKR force", "factor 2", "formula", "contact/jkr.py",
           "return 4.0 * pull_off_force * (cube * cube - cube)", "return 2.0 * pull_off_force * (cube * cube - cube)",
           "unit/contact/test_jkr.py::test_special_points_are_exact"),

@@ -1,6 +1,7 @@
 """A box that is deformed: Newton's law in the laboratory, the work of its boundaries, and runs that are interrupted."""
 
 import copy
+import itertools
 import math
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 import sand
 from sand import components
-from sand.basics.state import BROKEN, MADE, STEP
+from sand.basics.state import BROKEN, MADE, SLIPPED, STEP
 from sand.io.checkpoint import newest_checkpoint
 
 RADIUS = 1e-7
@@ -45,37 +46,35 @@ def test_free_bodies_move_as_in_an_open_box(shift, record_bound):
     """Two bodies collide while their box changes linearly by (−30, +20, −10) %: the motion is that of an open box.
 
     The velocities u + A x of the laboratory obey Newton's law, and a box that changes linearly moves its images at a
-    constant velocity: positions, with A x of a shift added, agree up to the error of the integrator, of second order,
-    in which the drift of the box has a part.  Contacts form and break, roll, and are damped in all modes.  Also across
-    a face of the box.
+    constant velocity.  The kicks and drifts of velocity Verlet are then those of the open box, with A x of the shift
+    added: positions differ by errors of rounding, 1e-16 r, which grow in 3000 steps.  Contacts form, roll, and are
+    damped in all modes.  Also across a face of the box, by which positions jump.  25 and 50 steps per period.
     """
     grains, box = colliding_bodies(), sand.Box.periodic("3 um", "2.6 um", "2.8 um")
     lengths, changes, until = np.array(box.lengths), np.array([-0.3, 0.2, -0.1]), 4e-8
-    rates = changes / until
+    rates, moved = changes / until, shift * np.array(box.lengths)
     probe = sand.Simulation(grains, [DAMPED])
     probe.run(steps=1)
-    longest, errors = probe.state.clock[STEP], []
-    for divisor in (1, 2, 4):
-        stepping = sand.Verlet(step=longest / divisor)
+    for divisor in (1, 2):
+        stepping = sand.Verlet(step=probe.state.clock[STEP] / divisor)
         free = sand.Simulation(grains, [DAMPED], stepping=stepping)
-        free.run(until=until)
-        moved = shift * lengths
         placed, images = in_flow(grains, box, rates, moved)
         law = sand.Deformation(rates, law="linear")
         sim = sand.Simulation(placed, [DAMPED], box=box, deformation=law, stepping=stepping)
-        sim.run(until=until)
+        for each in (free, sim):
+            each.run(until=until)
         now = np.array(sim.box.lengths)
         assert now == pytest.approx(lengths * (1.0 + changes), rel=1e-12, abs=0.0)
         whole = sim.grains.position + (sim.grains.image + images) * now - moved * (1.0 + changes)
-        errors.append(np.abs(whole - free.grains.position).max() / RADIUS)
-        counts = [[each.state.count[k] for k in (MADE, BROKEN)] for each in (sim, free)]
+        error = np.abs(whole - free.grains.position).max() / RADIUS
+        record_bound(f"error in radii, shift {shift}, step over {divisor}", error, most=1e-10)
+        counts = [[each.state.count[k] for k in (MADE, BROKEN, SLIPPED)] for each in (sim, free)]
         assert counts[0] == counts[1] and counts[0][0] > 3
         one, two = (each.ledger.rows[-1] for each in (sim, free))
         for name in ("lost_forming", "lost_rolling", "lost_damping_normal", "lost_damping_rolling"):
-            assert one[name] == pytest.approx(two[name], rel=1e-6, abs=0.0) and one[name] > 0.0, name
-    record_bound(f"error in radii at 25 steps per period, shift {shift}", errors[0], most=1e-8)
-    record_bound(f"ratio of errors, step halved, shift {shift}", errors[0] / errors[1], least=3.0)
-    record_bound(f"ratio of errors, step halved again, shift {shift}", errors[1] / errors[2], least=3.0)
+            assert one[name] == pytest.approx(two[name], rel=1e-9, abs=0.0) and one[name] > 0.0, name
+        change = [abs(each.ledger["total"][-1] - each.ledger["total"][0]) for each in (sim, free)]
+        assert change[0] == pytest.approx(change[1], rel=1.0, abs=1e-3 * abs(one["lost_box"]))
 
 
 def packing(rate, number=60, side=None, **options):
@@ -105,7 +104,7 @@ def test_the_work_of_the_boundaries_closes_the_ledger(record_bound):
     mean = sum(
         -before["box_x"] ** 3 * (math.expm1(3.0 * math.log(after["box_x"] / before["box_x"]))) / 3.0
         * sum(after[f"mean_pressure_{axis}"] for axis in "xyz")
-        for before, after in zip(rows, rows[1:], strict=False)
+        for before, after in itertools.pairwise(rows)
     )  # fmt: skip
     assert mean == pytest.approx(work, rel=1e-6, abs=0.0)
 
@@ -243,7 +242,7 @@ def test_a_change_sets_the_rate_and_the_box():
 
 @pytest.mark.validate
 def test_a_gas_moves_with_the_box():
-    """Drag leads to the flow: velocities relative to the box decay by the stopping time alone, and the ledger closes."""
+    """Drag leads to the flow: velocities relative to it decay by the stopping time alone, and the ledger closes."""
     gas = sand.Gas("300 K", pressure="1 kPa", brownian=False)
     rng = np.random.default_rng(5)
     grains = sand.Grains(rng.uniform(-1e-6, 1e-6, (30, 3)), RADIUS, ICE, velocity=rng.normal(size=(30, 3)))

@@ -13,11 +13,13 @@ from typing import Any
 
 from .constants import BOLTZMANN
 
-# A number, then a unit of names, integer powers of one digit, products and quotients; no arithmetic.
+# A number, then a unit of names, integer powers of one digit, products and quotients, or 1 over these; no arithmetic.
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|[+-]?(?:inf|nan)"
 _UNIT = r"[A-Za-zµμΩÅ°%][A-Za-zµμΩÅ°]*(?:(?:\^|\*\*)?-?\d|[²³])?"
 # The pattern is unambiguous: with several ways to match, text that does not match would take exponential time.
-TEXT = re.compile(rf"\s*({NUMBER})\s*({_UNIT}(?:(?:\s*[*/·]\s*|\s+){_UNIT})*)?\s*", re.IGNORECASE)
+TEXT = re.compile(
+    rf"\s*({NUMBER})(?:\s+1(?=\s*/))?\s*((?:/\s*)?{_UNIT}(?:(?:\s*[*/·]\s*|\s+){_UNIT})*)?\s*", re.IGNORECASE
+)
 LONGEST_TEXT = 100
 """Characters of a number with its unit; longer text is refused before it is parsed."""
 
@@ -74,7 +76,7 @@ _ANGLES = re.compile(r"rad|rpm|rps|rev|turn|deg|cycle")
 def powers_of(text: str) -> tuple[int, ...] | None:
     """Exponents of ten, m, kg, s, A and K of a unit, or None if it contains a unit that is not in `_COMMON`."""
     total: tuple[int, ...] = (0,) * 6
-    position = 0
+    position = 1 if text.startswith("1/") else 0
     while position < len(text):
         found = _FACTOR.match(text, position)
         if found is None or found[2] not in _COMMON:
@@ -98,7 +100,8 @@ def registry() -> Any:
 
 def spelled(text: str) -> str:
     """A unit in the notation of pint."""
-    found = text.replace("·", "*").replace("²", "**2").replace("³", "**3")
+    found = f"1{text}" if text.startswith("/") else text
+    found = found.replace("·", "*").replace("²", "**2").replace("³", "**3")
     found = re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", found)
     for names, definition in _GAUSSIAN.items():
         found = re.sub(rf"(?<![A-Za-z])({_PREFIX})(?:{names})(?![A-Za-z])", rf"\1{definition.split()[0]}", found)

@@ -22,7 +22,7 @@ from ..engine.component import Component, Setup
 from ..engine.engine import Engine
 from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
-from .deformation_stage import EXPONENTIAL, LAWS, PRESSURE, RATE, DeformationNumbers, deformation_stages
+from .deformation_stage import EXPONENTIAL, LAWS, LINEAR, PRESSURE, RATE, DeformationNumbers, deformation_stages
 
 AXES = "xyz"
 REFUSED = {
@@ -148,9 +148,13 @@ class DeformedBox(Component):
         state.cell.start[:] = self._lengths  # type: ignore[union-attr]
 
     def begin(self, engine: Engine) -> None:
-        """Set rates and pressure of the present intervals of the ramps; A follows at the end of the next step."""
+        """Set rates and pressure of the present intervals of the ramps, and A where rates have changed."""
         cell, given = engine.stored_state.cell, force_at(self.given, engine.stored_state.time)
-        cell.rate[:], cell.goal[0] = given.rate, given.pressure or 0.0
+        cell.goal[0] = given.pressure or 0.0
+        if (cell.rate != given.rate).any():
+            cell.rate[:] = given.rate
+            if given.law != PRESSURE:
+                cell.span[RATE:] = cell.rate * (cell.start / cell.span[:3] if given.law == LINEAR else 1.0)
 
     def next_time(self, engine: Engine) -> float:
         """Next time [s] at which a ramp changes a rate or the pressure."""
