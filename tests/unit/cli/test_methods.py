@@ -103,6 +103,9 @@ EXPECTED = {
         "density = 7874 kg/m^3",
     ],
 }
+for _table, _kind in (("compression", "compress"), ("shear", "shear")):
+    _case, _results = FOLDERS["stretch"]
+    FOLDERS[_kind], EXPECTED[_kind] = (_case.replace("[stretch]", f"[{_table}]"), _results), EXPECTED["stretch"]
 OF_FORCES = [
     "the JKR law (Johnson et al. 1971), with critical damping",
     "slide factor = 2.5, roll factor = 8",
