@@ -215,10 +215,13 @@ class Run:
         if any(not np.array_equal(one.id, whole[0].id) for one in whole):
             raise BadInput(f"to_xarray: the grains of {self.folder} change; use its frames one by one, and their id")
         vectors = ("position", "velocity", "moment", "spin", "image")
-        data = {
+        data: dict[str, Any] = {
             name: (("frame", "grain", "axis"), np.array([getattr(one, name) for one in whole]), {"units": unit})
             for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s", "1"), strict=True)
         }
+        if all(one.stored_virial is not None for one in whole):  # of runs with stress
+            shares = np.array([one.virial for one in whole])
+            data["virial"] = (("frame", "grain", "axis", "along"), shares, {"units": "J"})
         labels = np.array([cluster_labels(len(one), one.pair) for one in whole])
         rest = [one.at_rest for one in whole if one.at_rest is not None]
         of_grains = {"cluster": labels} | ({"at_rest": np.array(rest)} if rest and len(rest) == len(whole) else {})

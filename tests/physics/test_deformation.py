@@ -96,7 +96,7 @@ def test_the_work_of_the_boundaries_closes_the_ledger(record_bound):
     sim.run(stop="filling > 0.3", until="2 us")
     rows = sim.ledger.rows
     work = -rows[-1]["lost_box"]
-    assert rows[-1]["filling"] >= 0.3 and rows[-1]["made"] > 40 and min(
+    assert rows[-1]["filling"] >= 0.3 and rows[-1]["made"] > 30 and min(
         rows[-1][f"lost_{mode}"] for mode in ("forming", "sliding", "rolling", "damping_normal")
     ) > 0.0  # fmt: skip
     record_bound("error of the ledger over the work", abs(rows[-1]["total"] - rows[0]["total"]) / work, most=1e-4)
@@ -165,13 +165,13 @@ def test_interruptions_and_output_change_no_bit(tmp_path):
     resumed = sand.resume(tmp_path / "run")
     resumed.run(steps=5000 - resumed.steps)
     assert arrays_of(resumed) == arrays_of(one) and resumed.deformation == rate
-    frame = sand.open(tmp_path / "run")[0]
-    assert frame.box == sand.Box.periodic(*one.start.position.shape[:0], one.ledger.rows[0]["box_x"])
+    frames = sand.open(tmp_path / "run").frames
+    assert frames[0].box == sand.Box.periodic(one.ledger.rows[0]["box_x"]) and frames[-1].box == resumed.box
 
 
 @pytest.mark.parametrize("search", ["cells", "all pairs"])
 def test_lists_are_complete_while_the_box_shrinks(search):
-    """After each of 60 calls, all pairs that overlap are contacts, found by brute force; the box shrinks by 40 %.
+    """After each of some calls, all pairs that overlap are contacts, found by brute force; the box shrinks by half.
 
     The rate is so high that the flow alone brings grains together: |A| L is 40 m/s.
     """
@@ -180,15 +180,14 @@ def test_lists_are_complete_while_the_box_shrinks(search):
     grains = sand.Grains(grid[:60] * 4e-7 + rng.uniform(-5e-8, 5e-8, (60, 3)), RADIUS, ICE)
     search = sand.Neighbours(search)
     sim = sand.Simulation(grains, [DAMPED], box="1.6 um", deformation=sand.Deformation("-2.5e7 1/s"), neighbours=search)
-    for _ in range(60):
+    touching = set()
+    while sim.box.lengths[0] > 0.75e-6:
         sim.run(steps=20)
         i, j = np.triu_indices(60, 1)
         apart = np.linalg.norm(sim.box.nearest(sim.grains.position[i] - sim.grains.position[j]), axis=1)
         touching = {tuple(pair) for pair in np.stack([i, j], 1)[apart < 2.0 * RADIUS].tolist()}
         assert touching <= {tuple(sorted(pair)) for pair in sim.contacts["pair"].tolist()}
-        if sim.box.lengths[0] < 1.0e-6:
-            break
-    assert sim.box.lengths[0] < 1.1e-6 and len(touching) > 60
+    assert len(touching) > 60
 
 
 def test_the_run_ends_before_a_grain_has_two_images_in_reach():
@@ -200,23 +199,52 @@ def test_the_run_ends_before_a_grain_has_two_images_in_reach():
 
 
 def test_a_pressure_is_reached_and_kept():
-    """The rates follow the pressure of contacts and motion: a lattice comes to 1 MPa, and stays there.
+    """Two axes follow a pressure each: a lattice, with a space along z, comes to 1 MPa along both, and stays there.
 
-    At rest the pressure is Σ l f/3V of the contacts alone, from `sim.contacts`.  The rate never exceeds the largest.
+    At rest the pressure is Σ l_a f_a/V of the contacts alone, from `sim.contacts`.  Rates never exceed the largest one,
+    and the axis with the rate 0 keeps its length.
     """
-    grid = np.stack(np.meshgrid(*[np.arange(3) - 1.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 2.0 * RADIUS
-    law = sand.Deformation("1e6 1/s", law="pressure", pressure="1 MPa", time="1 ns")
-    grains = sand.Grains(grid * 0.999, RADIUS, ICE)
-    sim = sand.Simulation(grains, [DAMPED], box=5.994 * RADIUS + 1e-9, deformation=law, row_every="10 ns")
-    sim.run(until="0.4 us")
+    grid = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0), np.arange(3.0), indexing="ij"), -1).reshape(-1, 3)
+    grains = sand.Grains((grid - grid.mean(0)) * 1.998 * RADIUS, RADIUS, ICE)
+    law = sand.Deformation(["1e6 1/s", "1e6 1/s", 0], law="pressure", pressure="1 MPa", time="1 ns")
+    box = sand.Box.periodic(8.0 * RADIUS, 8.0 * RADIUS, 9.0 * RADIUS)
+    sim = sand.Simulation(grains, [DAMPED], box=box, deformation=law, row_every="5 ns")
+    sim.run(until="0.2 us")
     pair, x = sim.contacts["pair"], sim.grains.position
     branch = sim.box.nearest(x[pair[:, 0]] - x[pair[:, 1]])
-    pressure = (branch * sim.contacts["force"]).sum() / (3.0 * sim.box.volume)
-    assert pressure == pytest.approx(1e6, rel=0.02, abs=0.0)
-    lengths = np.array([row["box_x"] for row in sim.ledger.rows])
-    assert np.abs(np.diff(np.log(lengths))).max() <= 1.001e6 * 1e-8
-    assert sim.ledger.rows[-1]["total"] == pytest.approx(
-        sim.ledger.rows[0]["total"], abs=1e-3 * max(abs(row["lost_box"]) for row in sim.ledger.rows)
+    pressure = (branch * sim.contacts["force"]).sum(axis=0) / sim.box.volume
+    assert pressure[:2] == pytest.approx([1e6, 1e6], rel=0.02, abs=0.0) and abs(pressure[2]) < 1e4
+    rows = sim.ledger.rows
+    lengths = np.array([row["box_x"] for row in rows])
+    assert np.abs(np.diff(np.log(lengths))).max() <= 1.001e6 * 5e-9 and sim.box.lengths[2] == 9.0 * RADIUS
+    assert rows[-1]["mean_pressure_x"] == pytest.approx(1e6, rel=0.05, abs=0.0)
+    work = sum(abs(b["lost_box"] - a["lost_box"]) for a, b in itertools.pairwise(rows))
+    assert rows[-1]["total"] == pytest.approx(rows[0]["total"], abs=1e-3 * work)
+
+
+@pytest.mark.compiled("deformation", "dipoles")
+def test_dipoles_of_all_images_follow_the_box(record_bound):
+    """Free dipoles in a cube that shrinks: the Ewald sum has α L and r_c/L of its start, and the trace of W is 3U.
+
+    The energy is that of a new Ewald sum in the present box, to its accuracy, and the ledger closes: the work of the
+    box on the dipoles is −A 3U dt, with errors of the steps.
+    """
+    rng = np.random.default_rng(2)
+    grid = np.stack(np.meshgrid(*[np.arange(3.0) - 1.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 1.2e-7
+    moment = rng.normal(size=(27, 3)) * 3e-18
+    grains = sand.Grains(grid + rng.uniform(-1e-8, 1e-8, (27, 3)), "10 nm", "iron", moment=moment)
+    forces = [sand.Dipoles(periodic="ewald", reciprocal="direct", accuracy=1e-6)]
+    sim = sand.Simulation(grains, forces, box="0.4 um", deformation=sand.Deformation("-4e6 1/s"))
+    sim.run(until="60 ns")
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert last["box_x"] == pytest.approx(0.4e-6 * math.exp(-0.24), rel=1e-3, abs=0.0)
+    now = sand.Grains(sim.grains.position, "10 nm", "iron", moment=sim.grains.moment)
+    fresh = sand.Simulation(now, forces, box=sim.box).loads()["energy"]["magnetic"]
+    assert last["magnetic"] == pytest.approx(fresh, abs=1e-5 * np.abs(last["magnetic"]))
+    change = last["magnetic"] - first["magnetic"]
+    assert abs(change) > 0.3 * abs(first["magnetic"]) and abs(last["lost_box"]) > 0.1 * abs(change)
+    record_bound(
+        "error of the ledger over the work", abs(last["total"] - first["total"]) / abs(last["lost_box"]), most=1e-3
     )
 
 

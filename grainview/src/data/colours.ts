@@ -75,7 +75,8 @@ export interface ScaleSettings {
 /** The scale of a quantity: the range from the settings, else from the manifest, else from this frame. */
 function scaleOf(quantity: Quantity, values: Float32Array, settings: ScaleSettings, manifest: Manifest): Scale {
   if (quantity.kind === "diverging") {
-    return { low: -1, high: 1, log: false, palette: manifest.palettes.diverging };
+    const reach = (quantity.unit && manifest.ranges[quantity.id]?.[1]) || 1;
+    return { low: -reach, high: reach, log: false, palette: manifest.palettes.diverging };
   }
   const range = manifest.ranges[quantity.id];
   let [low, high] = (range && range[1] > range[0] ? range : extent(values)) ?? [0, 1];

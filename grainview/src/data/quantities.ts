@@ -69,6 +69,26 @@ function kineticEnergy(frame: Frame, { grains, manifest }: Dataset): Float32Arra
   return out;
 }
 
+/**
+ * Mean pressure in each grain, Σ l·f r/(r1 + r2) / 3V over its contacts, with l from the centre of grain 2 to that of
+ * grain 1 and the force f on grain 1.
+ */
+function pressure(frame: Frame, { grains, manifest }: Dataset): Float32Array {
+  if (frame.pressure) return frame.pressure;
+  const out = new Float32Array(manifest.grains);
+  for (let c = 0; 2 * c < frame.pair.length; c++) {
+    const [i, j] = [frame.pair[2 * c], frame.pair[2 * c + 1]];
+    let product = 0;
+    for (let a = 0; a < 3; a++) {
+      let apart = frame.position[3 * i + a] - frame.position[3 * j + a];
+      if (manifest.periodic[a]) apart -= frame.box[a] * Math.round(apart / frame.box[a]);
+      product += apart * manifest.unit * frame.force[3 * c + a];
+    }
+    for (const k of [i, j]) out[k] += (product * grains.radius[k]) / (grains.radius[i] + grains.radius[j]);
+  }
+  return out.map((virial, i) => virial / (4 * Math.PI * (grains.radius[i] * manifest.unit) ** 3));
+}
+
 const hasMoments = ({ manifest }: Dataset): boolean => !manifest.ranges.moment || manifest.ranges.moment[1] > 0;
 
 export const QUANTITIES: Quantity[] = [
@@ -94,6 +114,7 @@ export const QUANTITIES: Quantity[] = [
   { id: "speed", label: "speed", unit: "m/s", kind: "sequential", values: (frame) => magnitudes(frame.velocity) },
   { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => magnitudes(frame.spin) },
   { id: "kinetic_energy", label: "kinetic energy", unit: "J", kind: "sequential", values: kineticEnergy },
+  { id: "pressure", label: "pressure by contacts", unit: "Pa", kind: "diverging", values: pressure },
   {
     id: "alignment", label: "alignment in cluster", unit: "", kind: "diverging",
     available: hasMoments,

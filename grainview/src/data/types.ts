@@ -65,6 +65,8 @@ export interface Frame {
   at_rest?: Uint8Array;
   /** Absent if no grain is charged. */
   charge?: Float32Array;
+  /** Mean pressure in each grain by its contacts [Pa], those with walls included; in runs with stress. */
+  pressure?: Float32Array;
   /** Own quantities of the user, by their id in the manifest. */
   own: Map<string, Float32Array>;
   pair: Uint32Array;

@@ -27,7 +27,8 @@ function magnitudeAndComponents(v: number[], unit: string): string {
 
 export function grainRows(i: number, frame: Frame, dataset: Dataset): Row[] {
   const { manifest, grains } = dataset;
-  const names = ["coordination", "kinetic_energy", "alignment", "field_alignment", ...manifest.own.map((q) => q.id)];
+  const own = manifest.own.map((q) => q.id);
+  const names = ["coordination", "kinetic_energy", "pressure", "alignment", "field_alignment", ...own];
   const others = quantitiesOf(manifest).filter((q) => names.includes(q.id));
   const rows: Row[] = [
     ["position", components(vector(frame.position, i, manifest.unit), "m", 5)],

@@ -11,6 +11,7 @@ from ..basics.arguments import checked
 from ..basics.errors import BadInput, did_you_mean, refuse_other
 from ..basics.schema import MODES as SHARES
 from ..basics.schema import REST
+from ..basics.virial import virials_of_frame
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 
@@ -94,6 +95,14 @@ def _load(frame: Any, _: np.ndarray | None) -> np.ndarray:
     return np.asarray((np.asarray(frame.force, dtype=np.float64) * normal).sum(axis=1) / size)
 
 
+def _pressure(frame: Any, _: np.ndarray | None) -> np.ndarray:
+    if len(frame.pair) and np.isnan(frame.force).all():
+        return np.full(len(frame.radius), np.nan)
+    virial = getattr(frame, "virial", None)
+    trace = np.trace(virials_of_frame(frame) if virial is None else virial, axis1=1, axis2=2)
+    return np.asarray(trace / (4.0 * np.pi * np.asarray(frame.radius, dtype=np.float64) ** 3))
+
+
 def _mode(frame: Any, _: np.ndarray | None) -> np.ndarray:
     share = np.abs(np.asarray(frame.share, dtype=np.float64)).reshape(-1, 4)
     share[:, 0] = np.asarray(frame.share, dtype=np.float64).reshape(-1, 4)[:, 0]  # compression has no limit
@@ -119,6 +128,9 @@ GRAINS = (
     Quantity("speed", "m/s", "speed", "sequential", _floats(lambda f: _size(f.velocity)), ""),
     Quantity("spin", "rad/s", "spin", "sequential", _floats(lambda f: _size(f.spin)), ""),
     Quantity("kinetic_energy", "J", "kinetic energy", "sequential", _kinetic, ""),
+    Quantity(
+        "pressure", "Pa", "pressure by contacts, mean in the grain", "diverging", _pressure, "the file holds no forces"
+    ),
     Quantity(
         "alignment",
         "1",

@@ -30,8 +30,9 @@ RESERVED = frozenset(
         *("written_by_sand", "head", "has_array"),
         # quantities and figures of `sand plot`, and other variables of `Run.to_xarray`
         *("cluster", "size", "coordination", "speed", "kinetic_energy", "alignment", "field_alignment"),
+        *("pressure", "virial", "stored_virial"),
         *("load", "mode", "energies", "losses", "contacts", "balance", "temperatures", "still", "frame"),
-        *("grain", "axis"),
+        *("grain", "axis", "along"),
         # columns of exported files
         *("species", "pos", "positions", "velo", "radii", "moments", "dipole", "charges", "type", "x", "y", "z"),
     }

@@ -159,9 +159,9 @@ def command(
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
     QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
-    alignment (of moments with the moment of their cluster), field_alignment, material, at_rest (with rigid clusters),
-    or an own quantity of the run, such as temperature. As a colour of grains, size is the number of grains in their
-    cluster.
+    pressure (by contacts, mean in the grain), alignment (of moments with the moment of their cluster), field_alignment,
+    material, at_rest (with rigid clusters), or an own quantity of the run, such as temperature. As a colour of grains,
+    size is the number of grains in their cluster.
     """
     from ..io.run_folder import make_folder, replace_file
 

@@ -20,6 +20,7 @@ from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
 from ..engine.engine import Engine
+from ..forces.pair.dipoles import Dipoles
 from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
 from .deformation_stage import EXPONENTIAL, LAWS, LINEAR, PRESSURE, RATE, DeformationNumbers, deformation_stages
@@ -125,13 +126,27 @@ class DeformedBox(Component):
                 found.append(f"axis {axis} of the box is open, but a box that is deformed has three periodic ones")
         if self.moves_box:
             others = [REFUSED[each.name] for each in setup.components if each.name in REFUSED]
-            others += [f"the force '{each.name}'" for each in setup.forces.long_range]
+            others += [f"the force '{each.name}'" for each in setup.forces.long_range if not isinstance(each, Dipoles)]
             positions = [each for each in setup.forces.external if getattr(each, "position_dependent", False)]
             others += [f"the force '{each.name}', whose energy depends on the position," for each in positions]
             if setup.stepping.name != "verlet":
                 others.append(f"stepping = '{setup.stepping.name}'")
             found += [f"{other} {where}" for other in others]
+            found += self._problems_of_dipoles(setup)
         return [f"deformation: {line}" for line in found]
+
+    def _problems_of_dipoles(self, setup: Setup) -> list[str]:
+        """Dipoles are summed over all images, with parameters in units of a side that does not grow."""
+        dipoles = next((each for each in setup.forces.long_range if isinstance(each, Dipoles)), None)
+        if dipoles is None:
+            return []
+        if not dipoles.uses_ewald(setup.grains, setup.box) or dipoles.ewald(setup.grains, setup.box).order:
+            return ["dipoles need periodic = 'ewald' and reciprocal = 'direct' in a box that is deformed"]
+        rates = [rate for each in forces_at_points(self.given) for rate in each.rate]
+        alike = all(len(set(each.rate)) == 1 for each in forces_at_points(self.given))
+        if self.given.law == PRESSURE or not alike or max(rates) > 0.0:
+            return ["dipoles need three equal rates of at most 0, and none that follows a pressure"]
+        return []
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Stages of the deformation; none if all rates are 0."""
@@ -139,7 +154,8 @@ class DeformedBox(Component):
         if not self.moves_box:
             return {}
         shortest = 2.0 * (2.0 * float(setup.grains.radius.max()) + float(setup.grains.radius.min()))
-        return deformation_stages(DeformationNumbers(LAWS.index(self.given.law), self.given.time or 0.0, shortest))
+        number, time = LAWS.index(self.given.law), self.given.time or 0.0
+        return deformation_stages(DeformationNumbers(number, time, shortest, bool(setup.forces.long_range)))
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the box in memory."""

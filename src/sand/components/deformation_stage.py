@@ -23,6 +23,7 @@ from ..contact.virial import contact_virial
 from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import DT, LIMIT, Stop
 from ..integrate.step_control import quantise_step
+from ..numerics.vec import dot, load
 
 INVERSE, RATE = 3, 6
 """First words of 1/L and A in `CellArrays.span`."""
@@ -38,6 +39,7 @@ class DeformationNumbers(NamedTuple):
     law: int  # index in LAWS
     time: float  # of the running mean of the pressure [s]
     shortest: float  # least length of an axis [m], so that no two grains touch through two images
+    dipoles: bool  # whether dipoles act, in a box that keeps its shape
 
 
 @stage("the time step of a box that is deformed")
@@ -93,11 +95,22 @@ def follow_pressure(grains, cell, dt, time):
         cell.span[RATE + a] = cell.rate[a] * min(1.0, max(-1.0, excess))
 
 
+@loop
+def dipole_energy(grains):
+    """−½ Σ μ·B [J] in the flux densities of the other grains."""
+    energy = 0.0
+    for i in range(grains.mass.size):
+        energy -= 0.5 * dot(load(grains.moment, i), load(grains.field, i))
+    return energy
+
+
 @stage("the work of the box")
 def work_of_box(grains, contacts, cell, count, scratch, span, parameters):
     """The work of contacts at the end of the step, and the rates of the next one."""
     found = contact_virial(grains, contacts.pair, contacts.force, count[CONTACTS], span)
-    cell.virial[0], cell.virial[1], cell.virial[2] = found[0], found[4], found[8]
+    # the energy U ∝ L⁻³ of dipoles has the trace 3U
+    of_dipoles = dipole_energy(grains) if parameters.dipoles else 0.0
+    cell.virial[0], cell.virial[1], cell.virial[2] = found[0] + of_dipoles, found[4] + of_dipoles, found[8] + of_dipoles
     for a in range(3):
         cell.work[a] -= 0.5 * scratch[DT] * cell.span[RATE + a] * cell.virial[a]
         cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if parameters.law == 1 else 1.0)

@@ -13,7 +13,7 @@ from ..contact.bath_work import accelerations, half_kick_weight, record_half_kic
 from ..contact.constants_table import FASTEST_MODE, column_loops
 from ..contact.damping import THERMAL, relative_motion
 from ..contact.law import ContactLaw
-from ..contact.measure import ENERGIES
+from ..contact.measure import ENERGIES, put_row
 from ..contact.mechanics import scaled_stiffness, stored_energies
 from ..contact.transitions import ZERO
 from ..integrate.hooks import Hook, HookStages
@@ -21,7 +21,7 @@ from ..integrate.parts import DT, LIMIT, Stop
 from ..integrate.rigid.body_touches import NEAR, TOUCHING, reach_of_plane
 from ..integrate.stages import NO_STEP
 from ..integrate.step_control import CLOSING_FRACTION, quantise_step
-from ..numerics.vec import accrue, dot, load, scale, sub
+from ..numerics.vec import accrue, across, dot, load, scale, sub
 from .wall_formulas import wall_displacements
 from .wall_loops import (
     FULL,
@@ -129,6 +129,30 @@ def energies_stage(law: ContactLaw) -> Stage:
         return 0
 
     return measure_wall_energies
+
+
+@factory
+def table_stage(law: ContactLaw) -> Stage:
+    """The stage that measures contacts with walls, for one contact law."""
+    constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
+    normal_energy = law.energy
+
+    @stage("the table of contacts with walls", parts=WALL_PARTS)
+    def measure_wall_contacts(s, parameters):
+        """Fill `parameters[0]` (rows, C) with CONTACT_ROWS and CONTACT_VECTORS of `contact.measure`."""
+        contacts = s.wall_contacts
+        for c in range(contacts.used[0]):
+            constants, radius = constants_at(contacts, c), s.grains.radius[contacts.pair[0, c]]
+            pose = wall_pose(s, c, contacts.twist[c])
+            found = wall_displacements(pose, radius)
+            y = radius_root(found.overlap, constants)
+            present = scaled_stiffness(constants, y, s.settings.follow)
+            stored = stored_energies(found, normal_energy(found.overlap, y, constants), present)
+            forces = contact_radius(found.overlap, y, constants), dot(load(contacts.force, c), pose.n)
+            put_row(parameters[0], c, found, across(found.roll, pose.n), stored, forces, present)
+        return 0
+
+    return measure_wall_contacts
 
 
 @stage("the forces of walls")

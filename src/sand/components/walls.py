@@ -15,15 +15,17 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from ..basics.arguments import checked
+from ..basics.box import Box
 from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.initial_pairs import most_overlap
 from ..basics.material import Material, as_material
 from ..basics.ramps import ramps_of
 from ..basics.settings import Direction, Number, Reading, Settings, Vector
-from ..basics.state import State
+from ..basics.state import RECORDED, State
 from ..contact.constants_table import constant_names
 from ..contact.law import ContactLaw
+from ..contact.measure import CONTACT_ROWS, CONTACT_VECTORS
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
 from ..integrate.hooks import HookStages
@@ -32,12 +34,14 @@ from ..integrate.parts import ContactParameters
 from ..integrate.stage_list import variant_of
 from .wall_arrays import WallArrays, WallContactArrays
 from .wall_loops import WallNumbers
-from .wall_stages import wall_stages
+from .wall_stages import table_stage, wall_stages
 
 LOST = "lost_walls"
 """Column of the ledger: energy [J] that moving walls took from grains and contacts."""
 CONTACTS_OF_ALL = "wall_contacts"
 """Column of the ledger: number of contacts with walls."""
+PARALLEL = 1e-9
+"""Largest component of n1 + n2 of the normals of two walls that count as parallel and facing each other."""
 
 
 def _name_of_columns(value: Any, name: str) -> str:
@@ -113,6 +117,13 @@ class WallState:
         Energy [J] that the wall has given to grains and contacts by its motion since the start.
     contacts : int
         Number of contacts.
+    pressure : float
+        Force of the grains against the wall, −force · normal, over its area [Pa], positive if they press. The area is
+        that of the periodic box across the normal; NaN where the box is open along the wall.
+    gap : float
+        Distance to the wall opposite [m]; NaN without a parallel wall that faces this one.
+    filling : float
+        Volume of the grains over that of the gap, gap × area; NaN without both.
     """
 
     name: str
@@ -122,6 +133,9 @@ class WallState:
     impulse: np.ndarray
     work: float
     contacts: int
+    pressure: float
+    gap: float
+    filling: float
 
 
 def read_walls(value: Any) -> tuple[Wall, ...]:
@@ -224,6 +238,43 @@ class Walls(Component):
         """Materials of the walls."""
         return [wall.material for wall in self.items]
 
+    def virials(self, state: State) -> np.ndarray:
+        """Of contacts with walls, h n_a F_b: from the plane along its normal n to the centre of the grain, at h [m]."""
+        arrays, contacts, position = *_arrays_of(state), state.grains.arrays.position
+        grain, wall = contacts.pair[:, : contacts.used[0]].astype(np.int64)
+        n = arrays.normal[:, wall]
+        arm = ((position[:, grain] - arrays.position[:, wall]) * n).sum(axis=0) * n
+        found = np.zeros((position.shape[1], 3, 3))
+        np.add.at(found, grain, np.einsum("ac,bc->cab", arm, contacts.force[:, : grain.size]))
+        return found
+
+    def volume(self, state: State) -> float | None:
+        """That between two walls that face each other, in a box that is periodic along them."""
+        volumes = [_area(state.box) * gap for gap in _gaps(state.of_components["walls"])]
+        return None if len(volumes) != 2 or math.isnan(volumes[0]) else volumes[0]
+
+    def contact_table(self, state: State, law: ContactLaw, table: Any) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+        """Columns of the contacts with walls, and their units by name; `table` is that of the stages."""
+        rows = [*((name, unit) for name, unit, _ in (*CONTACT_ROWS, *CONTACT_VECTORS))]
+        units = {"grain": "", "wall": "", "formed": "s", **dict(rows), "force": "N", "torque": "N m"}
+        units |= {f"lost_{name}": "J" for name in RECORDED}
+        vectors = {name for name, _, _ in CONTACT_VECTORS} | {"force", "torque"}
+        if not self.items:
+            return {name: np.zeros((0, 3) if name in vectors else 0) for name in units}, units
+        contacts = _arrays_of(state)[1]
+        used, scalars = int(contacts.used[0]), len(CONTACT_ROWS)
+        out = np.zeros((scalars + 3 * len(CONTACT_VECTORS), used))
+        table_stage(law).run(table, (out,))
+        found: dict[str, np.ndarray] = dict(zip(("grain", "wall"), contacts.pair[:, :used].copy(), strict=True))
+        found |= {"formed": contacts.formed[:used].copy()}
+        found |= {name: out[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
+        for k, (name, _, _) in enumerate(CONTACT_VECTORS):
+            found[name] = out[scalars + 3 * k : scalars + 3 * k + 3].T.copy()
+        found |= {"force": contacts.force[:, :used].T.copy(), "torque": contacts.torque1[:, :used].T.copy()}
+        for k, name in enumerate(RECORDED):
+            found[f"lost_{name}"] = contacts.lost[k, :used].copy() if k < len(contacts.lost) else np.zeros(used)
+        return found, units
+
 
 def _material_problems(wall: Wall, grains: Grains, contact: Contact | None) -> list[str]:
     material: Material = wall.material
@@ -271,12 +322,31 @@ def _grain_problems(wall: Wall, grains: Grains, contact: Contact) -> list[str]:
     ]
 
 
+def _arrays_of(state: State) -> tuple[WallArrays, WallContactArrays]:
+    return state.of_components["walls"], state.of_components["wall_contacts"]
+
+
+def _area(box: Box) -> float:
+    """Area [m²] of a wall across the open axis of a box that is periodic along both others; NaN for other boxes."""
+    lengths = [length for length in box.lengths if length is not None]
+    return math.prod(lengths) if len(lengths) == 2 else math.nan
+
+
+def _gaps(walls: WallArrays) -> list[float]:
+    """Distance [m] of each wall to the only other one, if this is parallel and faces it; NaN else."""
+    normal, position = walls.normal.T, walls.position.T
+    if len(normal) != 2 or (np.abs(normal[0] + normal[1]) > PARALLEL).any():
+        return [math.nan] * len(normal)
+    return [float((position[1] - position[0]) @ normal[0])] * 2
+
+
 def wall_states(walls: Sequence[Wall], state: State) -> tuple[WallState, ...]:
     """The walls in a state."""
     if not walls:
         return ()
-    arrays, contacts = state.of_components["walls"], state.of_components["wall_contacts"]
-    on = contacts.pair[1, : contacts.used[0]]
+    arrays, contacts = _arrays_of(state)
+    on, area, gaps = contacts.pair[1, : contacts.used[0]], _area(state.box), _gaps(arrays)
+    solid = 4.0 / 3.0 * math.pi * float((state.grains.arrays.radius**3).sum())
     return tuple(
         WallState(
             wall.name,
@@ -286,6 +356,9 @@ def wall_states(walls: Sequence[Wall], state: State) -> tuple[WallState, ...]:
             impulse=arrays.impulse[:, w].copy(),
             work=float(arrays.work[w]),
             contacts=int((on == w).sum()),
+            pressure=-float(arrays.force[:, w] @ arrays.normal[:, w]) / area,
+            gap=gaps[w],
+            filling=solid / (area * gaps[w]),
         )
         for w, wall in enumerate(walls)
     )

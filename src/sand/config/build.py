@@ -46,6 +46,7 @@ def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Sim
         frame_every=case.run.frame_every,
         row_every=case.run.row_every,
         checkpoint_every=case.run.checkpoint_every,
+        stress=case.run.stress,
         **extra,
         **options,
     )

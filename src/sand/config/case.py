@@ -70,6 +70,9 @@ class RunSection(Section):
     """Further rows of the ledger, in the same forms; every frame has a row."""
     checkpoint_every: SaveCadence = None
     """Checkpoints, in the same forms or by wall time, "30 s wall"; by default at least every minute of wall time."""
+    stress: Annotated[bool, Flag()] = False
+    """Whether rows of the ledger have the pressure tensor, and frames the shares of the grains in it; see
+    `Simulation.stress`."""
     seed: Seed = 0
     """Seed of all random numbers: initial conditions and random kicks of a gas."""
     out: PathName | None = None
@@ -326,9 +329,10 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
     try:
         table = content.get("stepping")
         awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
+        stress = isinstance(run, dict) and run.get("stress") is True
         box = DeformedBox(())
         columns += [*box.columns(), *box.losses()] if "deformation" in content else []
-        condition.check([*Ledger(awake=awake).columns, *columns, *wall_columns(content.get("walls"))])
+        condition.check([*Ledger(awake=awake, stress=stress).columns, *columns, *wall_columns(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems
     return []

@@ -3,6 +3,7 @@
 import math
 
 from ..basics.state import CONTACTS
+from ..compiler.jit import loop
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
 from ..numerics.vec import across, add, cross, dot, load, norm, scale, sub
@@ -108,6 +109,31 @@ CONTACT_LOADS = ("force", "torque1", "torque2")
 """Rows of `measure_contacts` after the scalars: CONTACT_VECTORS, then the loads including damping, three rows each."""
 
 
+@loop
+def put_row(out, c, moved, roll, stored, forces, constants):
+    """Fill column c with CONTACT_ROWS and CONTACT_VECTORS, of contacts of grains and with walls.
+
+    `moved` is a `Displacements`, `roll` its ξ [m], `stored` are the energies [J], `forces` the contact radius [m] and
+    the normal force [N], that of dashpots included.
+    """
+    slide, size = norm(moved.slide), norm(roll)
+    longest = constants.break_overlap if constants.break_overlap > 0.0 else constants.reduced_radius
+    out[0, c], out[1, c] = moved.overlap, forces[0]
+    out[2, c], out[3, c], out[4, c] = slide, size, moved.twist
+    out[5, c] = -moved.overlap / longest
+    out[6, c] = slide / constants.slide_limit if constants.slide_limit > 0.0 else 0.0
+    out[7, c] = size / constants.roll_limit
+    out[8, c] = abs(moved.twist) / constants.twist_limit
+    out[9, c] = forces[1]
+    out[10, c] = constants.slide_stiffness * slide
+    out[11, c] = constants.reduced_radius * constants.roll_stiffness * size
+    out[12, c] = -constants.twist_stiffness * moved.twist
+    for mode in range(4):
+        out[13 + mode, c] = stored[mode]
+    for axis in range(3):
+        out[17 + axis, c], out[20 + axis, c] = moved.slide[axis], roll[axis]
+
+
 @factory
 def contacts_stage(law: ContactLaw) -> Stage:
     """The stage that measures contacts, for one contact law."""
@@ -127,30 +153,16 @@ def contacts_stage(law: ContactLaw) -> Stage:
             constants = scaled_stiffness(frozen, y, follow)
             displacements = displacements_of(pose, overlap, r1, r2, constants)
             xi = across(displacements.roll, pose.n)
-            slide, roll = norm(displacements.slide), norm(xi)
             stored = energies(pose, normal_energy(overlap, y, constants), r1, r2, constants)
             normal = normal_force(overlap, y, constants)
             damping = measured_load(contacts, c)
-            out[0, c], out[1, c] = overlap, contact_radius(overlap, y, constants)
-            out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
-            longest = constants.break_overlap if constants.break_overlap > 0.0 else constants.reduced_radius
-            out[5, c] = -overlap / longest
-            out[6, c] = slide / constants.slide_limit if constants.slide_limit > 0.0 else 0.0
-            out[7, c] = roll / constants.roll_limit
-            out[8, c] = abs(displacements.twist) / constants.twist_limit
-            out[9, c] = normal + dot(damping.force, pose.n)
-            out[10, c] = constants.slide_stiffness * slide
-            out[11, c] = constants.reduced_radius * constants.roll_stiffness * roll
-            out[12, c] = -constants.twist_stiffness * displacements.twist
-            for mode in range(4):
-                out[13 + mode, c] = stored[mode]
+            forces = contact_radius(overlap, y, constants), normal + dot(damping.force, pose.n)
+            put_row(out, c, displacements, xi, stored, forces, constants)
             force, torque1, torque2 = contact_load(pose, normal, r1, r2, constants)
             more, more1, more2 = loads_on_grains(damping, scale(pose.distance, pose.n), r1 / (r1 + r2))
             force, torque1, torque2 = add(force, more), add(torque1, more1), add(torque2, more2)
             for axis in range(3):
                 out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]
-                out[17 + axis, c] = displacements.slide[axis]
-                out[20 + axis, c] = xi[axis]
         return 0
 
     return measure_contacts

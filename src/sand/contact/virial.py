@@ -1,8 +1,8 @@
 """The virial of contacts, from which their part of the stress follows: W_ab = Σ l_a f_b [J] (Love 1927, Weber 1966).
 
-l is the nearest image of x1 − x2, and f the force on grain 1, that of dashpots included.  With W = V P of a volume V the
-pressure tensor P is positive in compression.  While grains and box are strained homogeneously, r → (1 + ε) r at fixed
-orientations, elastic energy of contacts changes by dU = −W_ab dε_ba.
+l is the nearest image of x1 − x2, and f the force on grain 1, that of dashpots included.  With W = V P of a volume V
+the pressure tensor P is positive in compression.  While grains and box are strained homogeneously, r → (1 + ε) r at
+fixed orientations, the elastic energy of contacts changes by dU = −W_ab dε_ba.
 """
 
 from ..compiler.jit import loop

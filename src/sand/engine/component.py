@@ -197,6 +197,14 @@ class Component:
         """Those of its columns that are means since the row before, which the first row does not have."""
         return {}
 
+    def virials(self, state: State) -> np.ndarray | None:
+        """Virial (N, 3, 3) [J] by its forces on each grain, Σ r_a F_b with r from where they act; None for none."""
+        return None
+
+    def volume(self, state: State) -> float | None:
+        """Volume [m³] that it bounds; None for none."""
+        return None
+
     def materials(self) -> list[Material]:
         """Materials that a case file has to define."""
         return []

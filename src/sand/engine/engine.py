@@ -83,6 +83,10 @@ class GrainSteps:
         grains = engine.state.grains
         return grains.force.copy(), grains.torque.copy()
 
+    def virial_at_rest(self, engine: Engine) -> np.ndarray:
+        """Virial (3, 3) [J] of the contacts in clusters at rest, whose loads contact steps do not compute."""
+        return np.zeros((3, 3))
+
     def summary(self, state: State) -> dict[str, Any]:
         """What the summary of a run says of bodies; nothing without any."""
         return {}

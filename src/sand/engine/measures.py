@@ -10,12 +10,13 @@ import numpy as np
 
 from ..analysis.body_motion import BodyMotion
 from ..basics.arrays import cluster_arrays
+from ..basics.errors import BadInput
 from ..basics.state import CONTACTS, State
 from ..contact.damping import THERMAL
 from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies
 from ..forces.base import ExternalForce
 from ..forces.external_loops import external_energies_for
-from ..forces.pair.long_range_loops import long_range_energies_for
+from ..forces.pair.long_range_loops import long_range_energies_for, long_range_virial_for
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.hooks import Hook
 from ..integrate.respa import clear_long_range_loads
@@ -85,6 +86,31 @@ def pair_energy(engine: CompiledState, k: int) -> float:
     shares = np.zeros(len(engine.stored_state.grains))
     _add_energies(engine, engine.stored_state, k, shares)
     return math.fsum(shares)
+
+
+def refuse_forces_without_virial(engine: CompiledState) -> None:
+    """Raise BadInput if the virial of a long-range force cannot be computed."""
+    without = [force.name for force, sums, _ in engine.long_range if sums.virial is None]
+    if without:
+        raise BadInput(
+            f"stress: the loops of {without[0]} (a tree, or loops of your own) give no stress; sum all pairs instead, "
+            "such as with open = 'pairs', or leave stress out"
+        )
+
+
+def pair_virials(engine: CompiledState) -> dict[str, np.ndarray]:
+    """Virial (3, 3) [J] of each long-range force by ledger column, W_ab = Σ r_a F_b of all pairs and images."""
+    refuse_forces_without_virial(engine)
+    state, found = engine.state, {}
+    table, arrays = engine.table_of(state), state.grains.arrays
+    for force, sums, numbers in engine.long_range:
+        out = np.zeros(9)
+        long_range_virial_for(sums).run(table, (numbers, out))
+        found[force.column] = out.reshape(3, 3)
+        if sums.reciprocal_virial is not None:
+            run_rounds(sums, engine.content.wide, table, numbers)
+            found[force.column] += sums.reciprocal_virial(arrays, state.box.span, numbers)
+    return found
 
 
 def pair_loads(engine: CompiledState, k: int) -> np.ndarray:

@@ -15,7 +15,8 @@ from ..basics.errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..basics.own_quantities import OwnQuantities
 from ..basics.schema import REST
 from ..basics.units import format_quantity
-from .frame_chunks import IDENTITY, IN_FULL, OWN, code_of, crc32_of, material_name
+from ..basics.virial import virials_of_frame
+from .frame_chunks import IDENTITY, IN_FULL, OWN, VIRIAL, code_of, crc32_of, material_name
 
 
 class Frame:
@@ -25,7 +26,8 @@ class Frame:
     others are removed; `image` (N, 3) counts how often it has crossed the periodic box since the start of the run, and
     `unwrapped` (N, 3) are the positions without these jumps. `own` are the own quantities (N,) by name, also
     attributes: `frame.temperature`. `at_rest` (N,), True for grains of clusters at rest, single grains included, is
-    None without `sand.RigidClusters`. Arrays of contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad]
+    None without `sand.RigidClusters`; `stored_virial` (N, 9) of `virial` is None in runs without stress. Arrays of
+    contacts: `pair` (C, 2), `overlap` [m], `formed` [s], `twist` [rad]
     (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
     """
 
@@ -50,6 +52,7 @@ class Frame:
         self.own = OwnQuantities({name: stored.log[f"particles/{name}"] for name in units}, units)
         rest = stored.log.get(f"particles/{REST}")
         self.at_rest = None if rest is None else np.asarray(rest) == 1
+        self.stored_virial = stored.log.get(f"particles/{VIRIAL}")
         self.materials, self.material = [material_name(name) for name in p.types], np.asarray(p.typeid)
         self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
         self.orientation = np.roll(np.asarray(p.orientation), -1, axis=1)
@@ -77,6 +80,16 @@ class Frame:
         lengths = [0.0 if length is None else length for length in self.box.lengths]
         return self.position + self.image * np.array(lengths)
 
+    @property
+    def virial(self) -> np.ndarray:
+        """Share (N, 3, 3) [J] of each grain in the virial of contacts, as `Simulation.at_grains` has it.
+
+        From the contacts of grains in the frame; of runs with `stress = true` also from contacts with walls.
+        """
+        if self.stored_virial is None:
+            return virials_of_frame(self)
+        return np.asarray(self.stored_virial, np.float64).reshape(-1, 3, 3)
+
     def __len__(self) -> int:
         """Number of grains."""
         return len(self.radius)
@@ -88,7 +101,7 @@ class Frame:
 
 OF_GRAINS = (
     *("position", "velocity", "spin", "moment", "orientation", "radius", "mass", "charge"),
-    *("material", "image", REST),
+    *("material", "image", REST, VIRIAL),
 )
 OF_CONTACTS = ("pair", "overlap", "formed", "force", "slide", "roll", "twist", "share")
 

@@ -20,6 +20,7 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | log/particles/id | identity of each grain; absent if it is the index, as long as no grain was removed |
 | log/particles/NAME | an own quantity of the user, in SI |
 | log/own | names and units of the own quantities, JSON as bytes: `{"temperature": "K"}`; absent without them |
+| log/particles/virial | shares of grains in the virial of contacts and walls [J], rows xx, xy, … zz; with stress |
 | log/particles/at_rest | 1 for grains of clusters at rest, 0 for awake ones; only with rigid clusters |
 | log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
@@ -55,7 +56,9 @@ OWN = "own"
 """Name of the array with names and units of own quantities."""
 IN_FULL = ("position", "radius", "velocity", "mass", "charge")
 """Quantities that trajectories have in single precision, and files of bodies also in double precision."""
-SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST))
+VIRIAL = "virial"
+"""Name of the shares of the grains in the virial of contacts."""
+SOMETIMES = tuple(f"particles/{name}" for name in (IDENTITY, REST, VIRIAL))
 """Logged arrays of grains that not all frames have."""
 UNCHANGED = ("scale/length", "periodic", "lengths")
 """Logged arrays that are left out of frames in which they are those of the first one."""
@@ -70,12 +73,14 @@ def stored_frame(
     *,
     exact: bool = False,
     at_rest: np.ndarray | None = None,
+    virial: np.ndarray | None = None,
     scale: float | None = None,
     materials: Sequence[str] = (),
 ) -> Any:
     """Frame as GSD reads it, of grains and contacts (columns as in `ContactTable`); `exact`: also `IN_FULL` in float64.
 
-    `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters. `scale`: reference radius [m], by
+    `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters. `virial` (N, 3, 3): shares of the
+    grains in the virial of contacts [J]. `scale`: reference radius [m], by
     default the mean radius. `materials`: names that come first, also without a grain, and so keep their numbers.
     """
     arrays, own = grains.arrays, [m.name for m in grains.materials]
@@ -120,6 +125,8 @@ def stored_frame(
         log[f"particles/{IDENTITY}"] = np.array(arrays.id)
     if at_rest is not None:
         log[f"particles/{REST}"] = np.array(at_rest, dtype=np.uint8)
+    if virial is not None:
+        log[f"particles/{VIRIAL}"] = np.ascontiguousarray(virial.reshape(-1, 9), np.float32)
     if exact:
         log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
     sides = np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)

@@ -116,10 +116,12 @@ class TrajectoryWriter:
         *,
         exact: bool = False,
         at_rest: np.ndarray | None = None,
+        virial: np.ndarray | None = None,
     ) -> None:
         """Append one frame; columns of `contacts` as in `ContactTable`; `exact`: `frame.IN_FULL` in float64.
 
-        `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters.
+        `at_rest` (N,): which grains belong to clusters at rest, with rigid clusters. `virial` (N, 3, 3): shares of the
+        grains in the virial of contacts [J].
 
         Raises
         ------
@@ -127,7 +129,7 @@ class TrajectoryWriter:
             If the frame cannot be written; earlier ones stay.
         """
         fixed: Any = {"scale": self._scale, "materials": self._materials}
-        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest, **fixed)
+        frame = stored_frame(step, time, grains, box, contacts, exact=exact, at_rest=at_rest, virial=virial, **fixed)
         self._scale = float(frame.log["scale/length"][0])
         self._materials += [m.name for m in grains.materials if m.name not in self._materials]
         if self._is_stored(time, code_of(frame)):

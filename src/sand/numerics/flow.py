@@ -53,6 +53,12 @@ def squared_approach(squared_speed, reach, span):
     return (2.0 * math.sqrt(squared_speed) + reach * rate_of_strain(span)) ** 2
 
 
+@unless_still(lambda length, span: 1.0)
+def shrinkage(length, span):
+    """Factor by which the box is shorter along x than a length [m]."""
+    return length * span.inverse_x
+
+
 @unless_still(lambda built, span: 0.0)
 def strain_since(built, span):
     """Σ |L/L₀ − 1| of the box since its lengths were L₀ = `built` (3,) [m]."""

@@ -63,7 +63,27 @@ def measured_columns(state: State, law: ContactLaw, table: Any) -> dict[str, np.
     return found | {name: rows[scalars + 3 * k : scalars + 3 * k + 3].T for k, name in enumerate(names)}
 
 
-class ContactTable(Columns):
+class Contacts(Columns):
+    """Columns of contacts, (C,) or (C, 3), with their units by name."""
+
+    def __init__(self, columns: dict[str, np.ndarray], units: dict[str, str]):
+        super().__init__(columns)
+        self.units = units
+
+    def __repr__(self) -> str:
+        return f"<{len(self['force'])} contacts: {', '.join(self)}>"
+
+    def to_xarray(self) -> Any:
+        """Convert to an xarray Dataset with dimension `contact` and units as attributes; needs xarray."""
+        xarray = import_optional("xarray", "to_xarray")
+        variables = {
+            name: ("contact", column, {"units": self.units.get(name, self.units.get(name[:-2], ""))})
+            for name, column in self._flat().items()
+        }
+        return xarray.Dataset(variables)
+
+
+class ContactTable(Contacts):
     """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
 
     Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.  `table` is the table of the
@@ -71,21 +91,9 @@ class ContactTable(Columns):
     """
 
     def __init__(self, state: State, law: ContactLaw, table: Any):
+        super().__init__({}, {name: unit for name, unit, _ in COLUMNS})
         found, contacts, used = measured_columns(state, law, table), state.contacts, int(state.count[CONTACTS])
         self.update({name: column.copy() if column.ndim == 2 else column for name, column in found.items()})
         for k, name in enumerate(RECORDED):
             is_recorded = k < len(contacts.lost)
             self[f"lost_{name}"] = contacts.lost[k, :used].copy() if is_recorded else np.zeros(used)
-
-    def __repr__(self) -> str:
-        return f"<{len(self['pair'])} contacts: {', '.join(self)}>"
-
-    def to_xarray(self) -> Any:
-        """Convert to an xarray Dataset with dimension `contact` and units as attributes; needs xarray."""
-        xarray = import_optional("xarray", "to_xarray")
-        units = {name: unit for name, unit, _ in COLUMNS}
-        variables = {
-            name: ("contact", column, {"units": units.get(name, units.get(name[:-2], ""))})
-            for name, column in self._flat().items()
-        }
-        return xarray.Dataset(variables)

@@ -22,6 +22,7 @@ from ..engine.component import Component
 from ..engine.engine import Engine
 from ..engine.measures import body_motion, contact_energies, force_energies, losses
 from ..io.ledger_table import TEMPERATURES
+from .stress import PRESSURES, stress_of
 
 KINETIC = "translation", "rotation"
 """Columns of kinetic energies."""
@@ -79,20 +80,30 @@ class Ledger(LedgerColumns):
         Components, such as walls, which may have columns of their own.
     awake : bool, optional
         Whether clusters may be at rest: with the column `awake`.
+    stress : bool, optional
+        Whether rows have the columns PRESSURES.
     """
 
-    def __init__(self, forces: Sequence[str] = (), extra: Sequence[Component] = (), *, awake: bool = False):
+    def __init__(
+        self,
+        forces: Sequence[str] = (),
+        extra: Sequence[Component] = (),
+        *,
+        awake: bool = False,
+        stress: bool = False,
+    ):
+        self.stress = stress
         others = [name for name in forces if name != MAGNETIC]
         self._extra, numbers = tuple(extra), (*NUMBERS, AWAKE) if awake else NUMBERS
         self._further = [name for each in extra for name in each.losses()]
-        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE}
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *OF_MOTION, *NUMBERS, AWAKE, *PRESSURES}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
         for each in extra:
             if taken := [name for name in each.columns() if name in {*own, *forces, *self._further, MAGNETIC}]:
                 advice = f"give one of the {each.noun} another name"
                 raise BadInput(f"{each.name}: '{taken[0]}' is a column of the ledger; {advice}")
-        self._more = [name for each in extra for name in each.columns()]
+        self._more = [*(PRESSURES if stress else ()), *(name for each in extra for name in each.columns())]
         of_state = (*LOSSES, *self._further, "total", *OF_MOTION, *numbers, *self._more)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
         self.frame_times: list[float] = []
@@ -125,7 +136,7 @@ class Ledger(LedgerColumns):
         row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
         row |= {CORRECTION: float(state.clock[CORRECTED]), INTERNAL: math.fsum(bodies.internal.tolist())}
         row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
-        row |= own
+        row |= (stress_of(engine).row() if self.stress else {}) | own
         before = self.rows[-1] if self.rows else None
         return row | {name: mean for each in self._extra for name, mean in each.means(before, row).items()}
 

@@ -187,7 +187,8 @@ class RunWriter:
         assert self._trajectory is not None
         w, engine = simulation.state, simulation._engine
         contacts = measured_columns(w, engine.law, engine.table_of(w))
-        self._trajectory.write(w.steps, w.time, w.grains, w.box, contacts, at_rest=w.at_rest)
+        virial = simulation._virials(contacts) if simulation.ledger.stress else None
+        self._trajectory.write(w.steps, w.time, w.grains, w.box, contacts, at_rest=w.at_rest, virial=virial)
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
         """Write a checkpoint if it is due by the cadence of the simulation, or if the last one is old enough."""

@@ -43,6 +43,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
         "frame_every": simulation.frame_every,
         "row_every": simulation.row_every,
         "checkpoint_every": simulation.checkpoint_every,
+        "stress": simulation.ledger.stress or None,
         "seed": int(simulation.seed or 0),
     }
     forces = {}

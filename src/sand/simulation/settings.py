@@ -18,7 +18,8 @@ from .observers import Observer
 from .updater import read_updaters
 
 ARGUMENTS = (
-    *("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "deformation", "out"),
+    *("grains", "forces", "box", "stepping", "neighbours", "seed", "walls", "contacts", "driven", "deformation"),
+    *("stress", "out"),
 )
 """Arguments of a simulation that are fixed once it is built."""
 RESULT_ATTRIBUTES = (

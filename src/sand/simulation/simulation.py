@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from ..basics.initial_pairs import StrainedContacts
 from ..basics.state import CONTACTS, OUTSIDE, State
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
+from ..basics.virial import shares_of_virial
 from ..components import components_of, read_components
 from ..components.deformation import Deformation, DeformedBox
 from ..components.driven import Driven
@@ -27,7 +28,7 @@ from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.component import Component, in_use
-from ..engine.measures import energies_at_grains, force_columns
+from ..engine.measures import energies_at_grains, force_columns, refuse_forces_without_virial
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
@@ -39,7 +40,7 @@ from .cadence import Chosen, chosen_cadence
 from .change import Change
 from .changed_engine import as_chosen, changed_engine
 from .condition import GIVEN, Condition
-from .contact_table import ContactTable
+from .contact_table import Contacts, ContactTable
 from .cost.cost import Cost, StepTimer, expected_cost
 from .displays import DISPLAYS
 from .exclusive import Exclusive, exclusive
@@ -52,6 +53,7 @@ from .run_writer import RunWriter
 from .settings import Origin, Output, ReadOnlySettings, held_by, read_forces
 from .signals import Signals
 from .stop import stop_criteria
+from .stress import Stress, check_stress_rows, stress_of, volume_of
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
 from .wall_clock import WallClock
@@ -127,6 +129,8 @@ class Simulation(ReadOnlySettings):
     deformation : Deformation or None, optional
         How a periodic box is deformed, such as `sand.Deformation("-1e4 1/s")`; velocities of grains are then those
         relative to its flow.
+    stress : bool, optional
+        Whether rows of the ledger have the pressure tensor, and frames the shares of the grains in it: see `stress`.
     restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
         Arrays and metadata of a checkpoint in `out` from which to continue; used by `sand.resume`.
 
@@ -172,6 +176,7 @@ class Simulation(ReadOnlySettings):
         contacts: StrainedContacts | None = None,
         driven: Any = (),
         deformation: Deformation | None = None,
+        stress: bool = False,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
         given = read_components(walls=walls, driven=driven, deformation=deformation)
@@ -189,7 +194,10 @@ class Simulation(ReadOnlySettings):
         self._system = System(grains.copy(), forces, box, *fitted, seed, given, meta.get("next_id", len(grains)))
         self._origin = Origin(meta.get("temperature", kinetic_temperature(grains)), choices=meta.get("choices", {}))
         self._origin.origin = self._origin.choices.get("start", "")
-        self.ledger = Ledger(force_columns(engine), in_use(given), awake=engine.state.at_rest is not None)
+        awake = engine.state.at_rest is not None
+        self.ledger = Ledger(force_columns(engine), in_use(given), awake=awake, stress=stress)
+        if stress:
+            check_stress_rows(engine)
         self.writer = None if out is None else RunWriter(out, overwrite, not is_new, meta.get("case_in_file"))
         self._clock, self._exclusive = WallClock(meta.get("wall_seconds", 0.0), meta.get("wall_times")), Exclusive()
         self._measured: StepTimer | None = None
@@ -282,6 +290,17 @@ class Simulation(ReadOnlySettings):
         return wall_states(self._system.given["walls"].items, self.state)
 
     @property
+    @exclusive
+    def wall_contacts(self) -> Contacts:
+        """Table of the present contacts with walls: columns by name, (C,) or (C, 3), as of `contacts`.
+
+        `grain` and `wall` are indices of grains and of `walls`, `force` [N] and `torque` [N m] act on the grain.
+        """
+        self._begin()
+        walls: Any = self._system.given["walls"]
+        return Contacts(*walls.contact_table(self.state, self._engine.law, self._engine.table_of(self.state)))
+
+    @property
     def driven(self) -> tuple[Driven, ...]:
         """The grains with prescribed motion."""
         return self._system.given["driven"].items
@@ -343,16 +362,66 @@ class Simulation(ReadOnlySettings):
         }
 
     @exclusive
+    @checked
+    def stress(self, volume: Any = None) -> Stress:
+        """Compute the present stress: a pressure tensor P = W/V, positive in compression.
+
+        W is the sum of these virials [J], with the nearest images l and r of separations, and forces f and F on the
+        first grain of a pair:
+
+            contacts        W_ab = Σ l_a f_b, dashpots included
+            kinetic         W_ab = Σ m v_a v_b
+            walls           W_ab = Σ h n_a F_b, with h n from the wall to the centre of the grain
+            pair forces     W_ab = Σ r_a F_b, cut-offs included
+            Ewald sums      of all images: real part as pairs, and the reciprocal part, W_ab = −∂U/∂ε_ba
+
+        It is that of one instant, which oscillates as contacts vibrate: means over time are those of equilibrium.
+        Forces of fields and of a gas on single grains have no part in it. The trace of W is 3U for the energy U of
+        dipoles, and U for charges and gravitation, if they are summed without a smooth cut-off.
+
+        Parameters
+        ----------
+        volume : float or str, optional
+            V [m³]; by default that of the periodic box, or between two walls that face each other across the only open
+            axis. In other boxes it has to be given.
+
+        Returns
+        -------
+        Stress
+            `total` and `parts` (3, 3) [Pa], `pressure` [Pa], `volume` [m³], `asymmetry` (3,) [Pa], and the couple
+            stress of the contacts, `couple` (3, 3) [N/m].
+
+        Raises
+        ------
+        BadInput
+            If no volume is known, or a force is summed by a tree, or by loops of your own without a virial.
+
+        Notes
+        -----
+        Contacts: Love 1927; Weber 1966, Bull. Liaison Ponts Chaussées 20, 3; Christoffersen, Mehrabadi &
+        Nemat-Nasser 1981, J. Appl. Mech. 48, 339. Ewald sums: Nosé & Klein 1983, Mol. Phys. 50, 1055; Aguado & Madden
+        2003, J. Chem. Phys. 119, 7471. In clusters at rest, with `sand.RigidClusters`, W of the contacts is that of
+        the forces by which they keep their rigid motion.
+        """
+        size = volume_of(self._engine, volume)
+        refuse_forces_without_virial(self._engine)
+        self._begin()
+        return stress_of(self._engine, size)
+
+    @exclusive
     def at_grains(self) -> dict[str, np.ndarray]:
-        """Compute flux density and energies of each grain.
+        """Compute flux density, share of the virial of contacts, and energies of each grain.
 
         Returns
         -------
         dict[str, ndarray]
-            `flux_density` (N, 3) [T] at the centres, from the other grains and from external fields. All others are
-            energies (N,) [J] that sum to the columns of the ledger: `kinetic` (translation and rotation), `contacts`
-            (half of each contact's elastic energy to each of its grains), and one for each long-range force (half of
-            each pair energy; −½ μ·B for dipoles) and each per-grain force, under the names of their columns.
+            `flux_density` (N, 3) [T] at the centres, from the other grains and from external fields. `virial` (N, 3, 3)
+            [J], the share in the virial of contacts and walls (`stress`): of each contact, force times the arm from the
+            point that divides the distance of the centres as the radii. Over the volume of the grain it is the mean
+            pressure tensor in it. All others are energies (N,) [J] that sum to the columns of the ledger: `kinetic`
+            (translation and rotation), `contacts` (half of each contact's elastic energy to each of its grains), and
+            one for each long-range force (half of each pair energy; −½ μ·B for dipoles) and each per-grain force, under
+            the names of their columns.
         """
         state, grains, contacts = self.state, self.grains, self.contacts
         external = [
@@ -365,7 +434,15 @@ class Simulation(ReadOnlySettings):
             np.add.at(elastic, contacts["pair"][:, side], half)
         energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
         shares = {name: share.copy() for name, share in energies_at_grains(self._engine).items()}
-        return {"flux_density": flux} | energies | shares
+        return {"flux_density": flux, "virial": self._virials(contacts)} | energies | shares
+
+    def _virials(self, contacts: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Share (N, 3, 3) [J] of each grain in the virial of contacts and walls."""
+        grains, pair = self.grains, contacts["pair"].astype(np.int64)
+        separation = self.box.nearest(grains.position[pair[:, 0]] - grains.position[pair[:, 1]])
+        found = shares_of_virial(grains.radius, pair, separation, contacts["force"])
+        others = (each.virials(self.state) for each in self._engine.components)
+        return found + sum(virials for virials in others if virials is not None)
 
     @exclusive
     @checked
@@ -502,6 +579,8 @@ class Simulation(ReadOnlySettings):
             return
         fixed = int(self.seed or 0), given
         engine, forces, given = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
+        if self.ledger.stress:
+            check_stress_rows(engine)
         before = self._log_row()["total"]
         self._engine = engine
         start, box, next_id = self.grains.copy(), change.box, change._next_id

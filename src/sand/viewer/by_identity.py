@@ -109,6 +109,9 @@ class ByIdentity:
         if frame.at_rest is not None:
             columns["at_rest"] = np.ones(count, bool)
             columns["at_rest"][rows] = frame.at_rest
+        if frame.stored_virial is not None:
+            columns["stored_virial"] = np.full((count, 9), np.nan)
+            columns["stored_virial"][rows] = frame.stored_virial
         columns |= {"id": self.identity, "pair": rows[frame.pair]}
         for name, column in columns.items():
             setattr(whole, name, column)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.quantities import measured
 from ..basics.errors import BadInput
 from ..basics.schema import REST
 from ..io.run_folder import plain
@@ -126,6 +127,7 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
         "cluster": names.astype(np.uint32),
         **({"charge": frame.charge} if np.any(frame.charge) else {}),
         **{f"{OWN}{name}": values for name, values in frame.own.items()},
+        **({} if getattr(frame, "stored_virial", None) is None else {"pressure": measured(frame, "pressure")}),
         **({} if getattr(frame, REST, None) is None else {REST: np.asarray(frame.at_rest, np.uint8)}),
         "pair": frame.pair.astype(np.uint32),
         **{name: getattr(frame, name) for name in ("force", "share", "overlap", "formed")},

@@ -30,7 +30,7 @@ MAX_COUNTED = 20_000_000
 """Grains × frames whose clusters are counted if there is no ledger."""
 SAMPLED_FRAMES = 12
 """Number of frames, spread evenly over the run, from which ranges are computed."""
-PERCENTILES = ("speed", "spin", "kinetic_energy")
+PERCENTILES = ("speed", "spin", "kinetic_energy", "pressure")
 """Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
 EXTREMES = ("size", "radius", "coordination", "moment", "load")
 """Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""
@@ -48,7 +48,7 @@ def series_from_ledger(ledger: LedgerColumns) -> dict[str, Any]:
     """Plots and contact events from a ledger; a plot whose columns are missing is left out."""
     thinned = ledger.select(evenly_spaced(len(ledger)))
     plots = []
-    for plot in (_clusters, _energies, _losses, _contacts, _balance, _temperatures, _awake):
+    for plot in (_clusters, _energies, _losses, _contacts, _balance, _temperatures, _awake, _pressures):
         try:
             plots.append(plot(thinned))
         except (KeyError, ValueError):  # a ledger of another version
@@ -100,6 +100,13 @@ def _temperatures(ledger: LedgerColumns) -> dict[str, Any]:
     drawn = zip(TEMPERATURES, TEMPERATURE_LINES, strict=True) if has_temperatures(ledger) else ()
     lines = [_line(label, colour, column(ledger, name)) for name, (label, colour) in drawn]
     return _plot("temperatures", "Temperatures of bodies", lines, "K", log=True)
+
+
+def _pressures(ledger: LedgerColumns) -> dict[str, Any]:
+    """Of runs with `stress`."""
+    named = {"pressure": TEXT_COLOUR, "pressure_xx": BLUE, "pressure_yy": SKY, "pressure_zz": RED}
+    lines = [_line(name.replace("_", " "), colour, ledger[name]) for name, colour in named.items()]
+    return _plot("pressure", "Pressure", lines, "Pa")
 
 
 def _energies(ledger: LedgerColumns) -> dict[str, Any]:

@@ -53,7 +53,7 @@ from ..part import MOVING
 from .awake_steps import AwakeSteps
 from .cluster_bodies import describe_body, form_bodies, members, set_friction
 from .quick_bodies import QuickBodies
-from .rigid_loads import may_stay_at_rest
+from .rigid_loads import may_stay_at_rest, virial_at_rest
 
 OF_GRAINS, OF_BODIES = attrgetter(*MOVING), attrgetter("centre", "orientation", "momentum", "angular_momentum")
 """Arrays of grains and bodies that change in a step."""
@@ -144,6 +144,10 @@ class BodySteps(GrainSteps):
         for stage, numbers in engine.content.of_components.get(Hook.LOADS, ()):
             stage.run(engine.table_of(state), numbers)
         return state.grains.force, state.grains.torque
+
+    def virial_at_rest(self, engine: Engine) -> np.ndarray:
+        """As `GrainSteps.virial_at_rest`."""
+        return virial_at_rest(engine.state, *self.loads(engine))
 
     def summary(self, state: State) -> dict[str, Any]:
         """Time awake, steps of each level, and the largest load at rest."""

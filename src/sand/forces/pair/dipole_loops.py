@@ -15,7 +15,7 @@ from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, load, nearest_image, put, sub
 from .dipole_formulas import pair_load, pair_load_cut
 from .dipole_rates import pair_rates
-from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
+from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks, virial_of_pairs
 
 MAX_REMAINDER = 3
 """Remaining pairs of a row up to which scalar arithmetic is faster than a partly filled SIMD vector."""
@@ -266,7 +266,15 @@ def all_pairs(pair_loads: Callable) -> LongRangeSums:
     """The loops over all pairs, for one formula of the pair loads."""
     block = all_pairs_block_of(pair_loads)
     return LongRangeSums(
-        copy_moments, block, add_blocks_and_torques, all_blocks, cut_rates, energy_shares, loads_of_pair, arrays=COPIES
+        copy_moments,
+        block,
+        add_blocks_and_torques,
+        all_blocks,
+        cut_rates,
+        energy_shares,
+        loads_of_pair,
+        arrays=COPIES,
+        virial=virial_of_pairs(loads_of_pair, False),
     )
 
 
@@ -281,4 +289,5 @@ LISTED_PAIRS = LongRangeSums(
     energy_shares,
     loads_of_pair,
     arrays=COPIES,
+    virial=virial_of_pairs(loads_of_pair, True),
 )

@@ -341,13 +341,17 @@ def ewald_parameters(
         if order == 0:
             smeared = 2.0 * alpha * sources.k / math.sqrt(math.pi)
         own = smeared + sources.k / volume * sums.self_mean
-        return MeshEwaldParameters(*of_pairs, own, mean, new_mesh(sums, choice.nodes, volume, count, sources))
+        return MeshEwaldParameters(
+            *of_pairs, own, mean, alpha, lengths[0], new_mesh(sums, choice.nodes, volume, count, sources)
+        )
     blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
     size = padded_size(count)
     return EwaldParameters(
         *of_pairs,
         own_field(alpha, choice.waves, volume, sources),
         mean,
+        alpha,
+        lengths[0],
         _waves(lengths, choice, count, blocks, sources),
         Buffers(*(np.zeros((blocks, 0 if name in UNUSED[order] else size)) for name in Buffers._fields)),
     )

@@ -18,6 +18,7 @@ from ...compiler.recipes import factory
 from ...numerics.vec import accrue, dot
 from .ewald_formulas import real_part_of_charges
 from .ewald_loops import with_waves
+from .ewald_virial import direct_virial, mesh_virial
 from .generic_loops import ZERO, sums_of
 from .long_range_loops import LongRangeSums, all_blocks
 from .mesh_loops import MESH_CHARGES, add_mesh_forces, mesh_rounds, remove_self_waves
@@ -103,7 +104,13 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0)
             add_mesh_energies(grains, parameters, shares)
 
         rounds = mesh_rounds(order, MESH_CHARGES)
-        return pairs._replace(end=end_with_mesh, energies=mesh_energies, rounds=rounds, energies_need_rounds=True)
+        return pairs._replace(
+            end=end_with_mesh,
+            energies=mesh_energies,
+            rounds=rounds,
+            energies_need_rounds=True,
+            reciprocal_virial=mesh_virial(False),
+        )
 
     add_wave_energies = add_energies_of(with_wave_potential)
     begin, block, blocks = with_waves(pairs.begin, pairs.block, pairs.blocks, False)
@@ -121,4 +128,6 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0)
             block(grains, long_range, span, parameters, b)
         add_wave_energies(grains, parameters, shares)
 
-    return pairs._replace(begin=begin, block=block, end=end, blocks=blocks, energies=energies)
+    return pairs._replace(
+        begin=begin, block=block, end=end, blocks=blocks, energies=energies, reciprocal_virial=direct_virial(False)
+    )

@@ -14,6 +14,9 @@ G = (8πk/V) exp(−q²/4α²)/q², a = μ_x q_x + μ_y q_y and b = μ_z, or a =
 
 Each column needs no other one, so that columns are shared among threads in blocks, each with sums of its own.  The real
 part of dipoles is summed by the pair loops of `dipole_loops`, that of charges in `ewald_charges`.
+
+In a box that is deformed alike along all axes, α L and r_c/L stay as they were at a length L₀: with λ = L₀/L the loads
+of dipoles are those at λ x in the box of L₀, times λ⁴ for forces and λ³ for flux densities and energies.
 """
 
 import math
@@ -24,6 +27,7 @@ import numpy as np
 
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
+from ...numerics.flow import shrinkage
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, add, cross, load, nearest_image, put, scale, sub
 from .dipole_formulas import pair_load
@@ -39,7 +43,8 @@ from .dipole_loops import (
     separation_if,
 )
 from .ewald_formulas import real_part
-from .long_range_loops import LongRangeSums, all_blocks, listed_blocks
+from .ewald_virial import direct_virial, mesh_virial
+from .long_range_loops import LongRangeSums, all_blocks, listed_blocks, virial_of_pairs
 from .mesh_loops import MESH_DIPOLES, Mesh, add_mesh_field, add_mesh_forces, mesh_rounds, remove_self_waves
 
 
@@ -94,6 +99,8 @@ class EwaldParameters(NamedTuple):
     coefficients: tuple  # of B_s [1/m³] or A_s [1/m], that of the highest power first
     self_field: float  # about 4α³k/(3√π) [T/(A m²)] or 2αk/√π [V/C]: of a grain's own smeared dipole or charge, removed
     mean_field: float  # per total moment −4πk/(3V) in vacuum, 0 for tin foil [T/(A m²)]; per net charge −πk/(Vα²) [V/C]
+    alpha: float  # α [1/m]
+    length: float  # side of the box along x [m], to which these belong
     waves: Waves
     buffers: Buffers
 
@@ -107,6 +114,8 @@ class MeshEwaldParameters(NamedTuple):
     coefficients: tuple
     self_field: float
     mean_field: float
+    alpha: float
+    length: float
     mesh: Mesh
 
 
@@ -235,7 +244,7 @@ def wave_block_of(dipoles: bool) -> Callable:
                 buffers.v2[b, i] = buffers.v2_i[b, i] = 0.0
 
     @loop
-    def wave_block(span, waves, buffers, b):
+    def wave_block(span, waves, buffers, b, shrink):
         for i in range(buffers.wave.shape[1]):
             buffers.force_x[b, i] = buffers.force_y[b, i] = buffers.force_z[b, i] = 0.0
             if dipoles:
@@ -248,11 +257,13 @@ def wave_block_of(dipoles: bool) -> Callable:
             q_x, q_y = turn * n_x * span.inverse_x, turn * n_y * span.inverse_y
             factor, factor_i = begin_column(waves, buffers, b, n_x, n_y, q_x, q_y)
             first = waves.column[3, column]
-            start_potentials(buffers, b, waves.weight[first] * factor, -waves.weight[first] * factor_i)
+            start_potentials(
+                buffers, b, shrink * waves.weight[first] * factor, -shrink * waves.weight[first] * factor_i
+            )
             for m in range(1, waves.column[2, column]):
                 q = turn * m * span.inverse_z
                 factors = structure_factors(waves, buffers, b, m, q)
-                add_wave_pair(waves, buffers, b, m, q, waves.weight[first + m], factors)
+                add_wave_pair(waves, buffers, b, m, q, shrink * waves.weight[first + m], factors)
             end_column(waves, buffers, b, q_x, q_y)
 
     return wave_block
@@ -282,7 +293,7 @@ def with_waves(begin_pairs: Callable, pair_block: Callable, blocks_of_pairs: Cal
     def block(grains, long_range, span, parameters, b):
         waves = all_blocks(grains)
         if b < waves:
-            wave_block(span, parameters.waves, parameters.buffers, b)
+            wave_block(span, parameters.waves, parameters.buffers, b, shrinkage(parameters.length, span))
         else:
             pair_block(grains, long_range, span, parameters, b - waves)
 
@@ -332,11 +343,22 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
 
     @formula
     def pair_loads(position1, position2, span, moment1, moment2, parameters, real):
-        apart = separation_if(real, nearest_image(sub(position1, position2), span))
+        shrink = shrinkage(parameters.length, span)
+        apart = scale(shrink, separation_if(real, nearest_image(sub(position1, position2), span)))
         inside = real and apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2] < parameters.cutoff_square
         k = parameters.k if inside else 0.0
-        return loads(apart, moment1, moment2, k, parameters.stretch, parameters.coefficients)
+        found = loads(apart, moment1, moment2, k, parameters.stretch, parameters.coefficients)
+        cube = shrink * shrink * shrink
+        return scale(cube * shrink, found[0]), scale(cube, found[1]), scale(cube, found[2]), cube * found[3]
 
+    @loop
+    def real_pair(grains, span, parameters, i, j):
+        position1, position2 = load(grains.position, i), load(grains.position, j)
+        moment1, moment2 = load(grains.moment, i), load(grains.moment, j)
+        force, b1, b2, _ = pair_loads(position1, position2, span, moment1, moment2, parameters, True)
+        return force, cross(moment1, b1), cross(moment2, b2)
+
+    virial = virial_of_pairs(real_pair, listed)
     pack = pack_moments if listed else copy_moments
     blocks_of_pairs = listed_blocks if listed else all_blocks
     pair_block = listed_block_of(pair_loads) if listed else all_pairs_block_of(pair_loads)
@@ -364,6 +386,8 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
             bare_pair,
             arrays=COPIES,
             rounds=mesh_rounds(order, MESH_DIPOLES),
+            virial=virial,
+            reciprocal_virial=mesh_virial(True),
         )
 
     begin, block, blocks = with_waves(pack, pair_block, blocks_of_pairs, True)
@@ -373,7 +397,19 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
         if not listed:
             add_blocks(grains, long_range, span, parameters)
         add_waves(grains, long_range, parameters.buffers)
-        add_own_and_mean_field(grains, parameters.self_field, parameters.mean_field)
+        cube = shrinkage(parameters.length, span) ** 3
+        add_own_and_mean_field(grains, cube * parameters.self_field, cube * parameters.mean_field)
         add_torques(grains, long_range, span, parameters)
 
-    return LongRangeSums(begin, block, end, blocks, None, energy_shares, bare_pair, arrays=COPIES)
+    return LongRangeSums(
+        begin,
+        block,
+        end,
+        blocks,
+        None,
+        energy_shares,
+        bare_pair,
+        arrays=COPIES,
+        virial=virial,
+        reciprocal_virial=direct_virial(True),
+    )

@@ -22,7 +22,7 @@ from ...compiler.recipes import factory
 from ...numerics.vec import accrue, axpy, dot, load, nearest_image, put, scale, sub
 from .dipole_formulas import cut_weight
 from .dipole_rates import cut_curvature
-from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
+from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks, virial_of_pairs
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -162,7 +162,8 @@ def sums_of(of_pair: Callable, torques: bool, listed: bool) -> LongRangeSums:
     make = _listed_loops if listed else _all_pairs_loops
     (begin, block, end, blocks), energies = make(of_pair, pair_energy, torques)
     arrays = ("packed_grain",) if listed else ()
-    return LongRangeSums(begin, block, end, blocks, None, energies, pair, arrays=arrays)
+    virial = virial_of_pairs(pair, listed)
+    return LongRangeSums(begin, block, end, blocks, None, energies, pair, arrays=arrays, virial=virial)
 
 
 def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tuple[tuple[Callable, ...], Callable]:

@@ -9,6 +9,7 @@ import numpy as np
 from ...compiler.jit import loop
 from ...compiler.recipes import factory
 from ...compiler.stage import Stage, stage
+from ...numerics.vec import load, nearest_image, sub
 
 PARALLEL_FROM = 1000
 """Fewest grains for which large loops are divided into blocks; below, sharing a block costs more than computing it."""
@@ -68,6 +69,57 @@ class LongRangeSums(NamedTuple):
     rounds: tuple[Round, ...] = ()  # before `begin`; each has as many blocks as a sum over all pairs, `all_blocks`
     energies_need_rounds: bool = False  # `energies` uses what the rounds compute
     own_memory: bool = False  # blocks keep their sums in the parameters, never in long_range.block_sums
+    virial: Callable | None = None  # (…, out): adds the virial [J] of all pairs to out (9,); None: there is none
+    # in Python: (grains, span, parameters) → virial (3, 3) [J] of the reciprocal part of an Ewald sum, after the rounds
+    reciprocal_virial: Callable | None = None
+
+
+@factory
+def virial_of_pairs(pair: Callable, listed: bool) -> Callable:
+    """The loop that adds Σ r_a F_b [J] of all pairs to an array (9,), rows a; r is the nearest image of x_i − x_j.
+
+    `pair` is as in `LongRangeSums`.  In the Verlet list each pair occurs twice.
+    """
+
+    @loop
+    def add_pair(grains, span, parameters, i, j, share, out):
+        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+        force, _, _ = pair(grains, span, parameters, i, j)
+        for a in range(3):
+            for b in range(3):
+                out[3 * a + b] += share * apart[a] * force[b]
+
+    @loop
+    def of_all(grains, long_range, span, parameters, out):
+        for i in range(grains.mass.size):
+            for j in range(i):
+                add_pair(grains, span, parameters, i, j, 1.0, out)
+
+    @loop
+    def of_listed(grains, long_range, span, parameters, out):
+        for s in range(grains.mass.size):
+            i = long_range.order[s]
+            for m in range(long_range.start[s], long_range.start[s + 1]):
+                add_pair(grains, span, parameters, i, long_range.order[long_range.neighbour[m]], 0.5, out)
+
+    return of_listed if listed else of_all
+
+
+@factory
+def long_range_virial_for(sums: LongRangeSums) -> Stage:
+    """The stage that adds the virial [J] of the pairs of one force to an array.
+
+    Its parameters are those of the loops, and the array (9,).
+    """
+    assert sums.virial is not None
+    virial = sums.virial
+
+    @stage("the stress of pairs")
+    def add_virial(grains, long_range, span, parameters):
+        virial(grains, long_range, span, parameters[0], parameters[1])
+        return 0
+
+    return add_virial
 
 
 @factory
