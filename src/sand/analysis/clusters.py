@@ -8,7 +8,7 @@ import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
 from ..basics.box import Box
-from ..basics.clusters import closes_through_boundary, closing_lengths, in_one_piece, labels_of
+from ..basics.clusters import closes_through_boundary, in_one_piece, labels_of
 from ..basics.errors import BadInput, shown
 from ..basics.units import whole_number
 
@@ -157,10 +157,31 @@ def percolation_axes(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.nd
     """
     ends = checked_pairs(len(position), pairs)
     labels = labels_of(len(position), ends)
-    whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
     found = np.zeros((labels.max(initial=-1) + 1, 3), dtype=bool)
-    np.logical_or.at(found, labels[ends[:, 0]], closing_lengths(whole, ends, box) != 0)
+    crossed = box.image(np.asarray(position)[ends[:, 1]] - np.asarray(position)[ends[:, 0]])
+    if crossed.any():
+        image = _images(len(position), ends, crossed)
+        np.logical_or.at(found, labels[ends[:, 0]], image[ends[:, 0]] - crossed != image[ends[:, 1]])
     return found
+
+
+def _images(count: int, ends: np.ndarray, crossed: np.ndarray) -> np.ndarray:
+    """Images (N, 3) by which grains make their clusters whole, from the lengths (C, 3) by which contacts cross."""
+    neighbours: list[list[tuple[int, int, int]]] = [[] for _ in range(count)]
+    for k, (a, b) in enumerate(ends.tolist()):
+        neighbours[a].append((b, k, -1))
+        neighbours[b].append((a, k, 1))
+    image, seen, steps = [[0, 0, 0] for _ in range(count)], [False] * count, crossed.tolist()
+    for start in range(count):
+        queue = [] if seen[start] else [start]
+        seen[start] = True
+        while queue:
+            i = queue.pop()
+            for j, k, sign in neighbours[i]:
+                if not seen[j]:
+                    seen[j], image[j] = True, [n + sign * step for n, step in zip(image[i], steps[k], strict=True)]
+                    queue.append(j)
+    return np.array(image)
 
 
 @checked

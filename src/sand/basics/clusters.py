@@ -40,18 +40,9 @@ def _disjoint_sets(count: int, ends: np.ndarray) -> np.ndarray:
     return np.array([labels.setdefault(root(grain), len(labels)) for grain in range(count)], dtype=np.int64)
 
 
-def closing_lengths(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
-    """Lengths of the box (C, 3) by which each contact of clusters in one piece connects grains to images of others.
-
-    They are 0 where the grains touch as they lie; the path along contacts that a contact closes leads from a grain to
-    its own image, displaced by these numbers of lengths.
-    """
-    return box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]])
-
-
 def closes_through_boundary(whole: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     """Contacts (C,) whose grains, in clusters that are in one piece, touch across a periodic boundary all the same."""
-    return np.asarray(closing_lengths(whole, pairs, box).any(axis=1))
+    return np.asarray(box.image(whole[pairs[:, 1]] - whole[pairs[:, 0]]).any(axis=1))
 
 
 def in_one_piece(whole: np.ndarray, pairs: np.ndarray, box: Box, labels: np.ndarray | None = None) -> np.ndarray:

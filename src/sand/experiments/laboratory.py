@@ -198,7 +198,11 @@ class Plan(NamedTuple):
             "coordination": 2.0 * row["contacts"] / grains,
             "rate_ratio": self.rate_ratio(sides),
         }
-        more = {name: row[name] for name in row if name in OF_STATE or name.startswith(("pressure_", "lost_"))}
+        more = {
+            name: row[name]
+            for name in row
+            if name in OF_STATE or name.startswith(("pressure", "mean_pressure", "lost_"))
+        }
         return known | more
 
 
@@ -331,6 +335,7 @@ def simulation_of(planned: Plan, forces: Sequence[Force] | None = None, **option
         box=start.box,
         contacts=start.contacts,
         frame_every=planned.row_every,
+        stress=True,
         **planned.moved,
         **options,
     )

@@ -69,7 +69,11 @@ def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.n
 def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
     """The motion of the box, as an argument of `Simulation`."""
     sign = -1.0 if plan.loading.kind == "compress" else 1.0
-    return {"deformation": COMPONENTS["deformation"]([sign * plan.rate if axis in plan.loading.axes else 0.0 for axis in "xyz"])}
+    return {
+        "deformation": COMPONENTS["deformation"](
+            [sign * plan.rate if axis in plan.loading.axes else 0.0 for axis in "xyz"]
+        )
+    }
 
 
 def times(loading: Loading, filling: float, rate: float) -> tuple[float, float]:

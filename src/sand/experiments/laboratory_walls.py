@@ -57,7 +57,14 @@ def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
         pressed = {"mass": float(grains.mass.sum()), "force": loading.pressure * _area(plan)}
     planes = [
         WallSection(material=material.name, point=(0.0, 0.0, low), normal=(0.0, 0.0, 1.0), name=FLOOR),
-        WallSection(material=material.name, point=(0.0, 0.0, high), normal=(0.0, 0.0, -1.0), name=LID, velocity=velocity, **pressed),
+        WallSection(
+            material=material.name,
+            point=(0.0, 0.0, high),
+            normal=(0.0, 0.0, -1.0),
+            name=LID,
+            velocity=velocity,
+            **pressed,
+        ),
     ]
     return {"walls": [one.build({material.name: material}) for one in planes]}
 

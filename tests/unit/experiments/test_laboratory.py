@@ -186,6 +186,28 @@ def test_stress_between_walls_is_the_impulse_of_the_lid():
     assert abs(content["drift"]) < 1e-3
 
 
+@pytest.mark.compiled("deformation")
+@pytest.mark.filterwarnings("ignore:the rate,")
+@pytest.mark.parametrize("kind", ["compress", "stretch"])
+def test_stress_in_a_box_is_the_mean_of_its_axes(kind):
+    """Work over the change of volume, beside the work along each axis that the ledger has in columns of its own.
+
+    Both divide by the same ∫V dL/L, that of the ledger with the logarithmic mean of V: rounding is left. A step strains
+    a side by 1 + x in place of e^x, x = rate × dt = 2e-5: the end is off by x/2 of ln(L/L₀).
+    """
+    body = sand.setup.rbd(12, radius="0.1 um", material="ice", seed=1)
+    found = load(body, Loading(kind, "1e6 1/s", 0.2, every=0.05), seed=1)
+    table, compressed = found.table[1:], kind == "compress"
+    mean = np.array([np.mean([row[f"mean_pressure_{axis}"] for axis in found.plan.loading.axes]) for row in table])
+    stress = np.array([row["stress"] for row in table])
+    assert len(stress) > 3 and stress.any()
+    assert (stress if compressed else -stress) == pytest.approx(mean, rel=1e-6, abs=1e-6 * np.abs(mean).max())
+    last, sides = table[-1], found.plan.sides
+    assert last["filling" if compressed else "strain"] == pytest.approx(0.2, rel=1e-4, abs=0.0)
+    factors = [last[f"side_{axis}"] / side for axis, side in zip("xyz", sides, strict=True)]
+    assert factors[1:] == pytest.approx([factors[0]] * 2 if compressed else [1.0] * 2, rel=1e-9, abs=0.0)
+
+
 @pytest.mark.compiled("contacts")
 @pytest.mark.filterwarnings("ignore:the rate,")
 def test_a_job(tmp_path, monkeypatch, capsys):
