@@ -87,18 +87,18 @@ def packing(rate, number=60, side=None, **options):
 
 
 def test_the_work_of_the_boundaries_closes_the_ledger(record_bound):
-    """A compression to φ = 0.3: the total of the ledger changes by less than 1e-4 of the work, |lost_box|.
+    """A compression to φ = 0.5: the total of the ledger changes by less than 1e-4 of the work, |lost_box|.
 
-    Contacts form, roll, twist and slide. The work along each axis adds up to that of the box, and the mean pressures of
-    all rows to the work: Σ_rows −P̄ ΔV = W for three equal rates, to rounding of the ledger.
+    Contacts form, break, roll, twist and slide: with 25 steps per period the energy of a touch is known to 0.3 %.  The
+    work along each axis adds up to that of the box, and the mean pressures of all rows to the work: Σ_rows −P̄ ΔV = W
+    for three equal rates, to rounding of the ledger.
     """
-    sim = packing("-4e6 1/s", row_every="5 ns")
-    sim.run(stop="filling > 0.3", until="2 us")
+    sim = packing("-1e6 1/s", row_every="20 ns")
+    sim.run(stop="filling > 0.5", until="2 us")
     rows = sim.ledger.rows
     work = -rows[-1]["lost_box"]
-    assert rows[-1]["filling"] >= 0.3 and rows[-1]["made"] > 30 and min(
-        rows[-1][f"lost_{mode}"] for mode in ("forming", "sliding", "rolling", "damping_normal")
-    ) > 0.0  # fmt: skip
+    modes = ("forming", "breaking", "sliding", "rolling", "twisting", "damping_normal")
+    assert rows[-1]["filling"] >= 0.5 and min(rows[-1][f"lost_{mode}"] for mode in modes) > 0.0
     record_bound("error of the ledger over the work", abs(rows[-1]["total"] - rows[0]["total"]) / work, most=1e-4)
     assert sum(rows[-1][f"work_{axis}"] for axis in "xyz") == pytest.approx(work, rel=1e-12, abs=0.0)
     mean = sum(
@@ -169,6 +169,7 @@ def test_interruptions_and_output_change_no_bit(tmp_path):
     assert frames[0].box == sand.Box.periodic(one.ledger.rows[0]["box_x"]) and frames[-1].box == resumed.box
 
 
+@pytest.mark.filterwarnings("ignore:.*contacts broke while aggregates grew", "ignore:grains overlap too deeply")
 @pytest.mark.parametrize("search", ["cells", "all pairs"])
 def test_lists_are_complete_while_the_box_shrinks(search):
     """After each of some calls, all pairs that overlap are contacts, found by brute force; the box shrinks by half.
@@ -219,7 +220,10 @@ def test_a_pressure_is_reached_and_kept():
     assert np.abs(np.diff(np.log(lengths))).max() <= 1.001e6 * 5e-9 and sim.box.lengths[2] == 9.0 * RADIUS
     assert rows[-1]["mean_pressure_x"] == pytest.approx(1e6, rel=0.05, abs=0.0)
     work = sum(abs(b["lost_box"] - a["lost_box"]) for a, b in itertools.pairwise(rows))
-    assert rows[-1]["total"] == pytest.approx(rows[0]["total"], abs=1e-3 * work)
+    error = (
+        1e-2 * rows[-1]["lost_forming"] + 1e-4 * work
+    )  # of 24 touches at once in steps of 1/25 period, and of the work
+    assert rows[-1]["total"] == pytest.approx(rows[0]["total"], abs=error)
 
 
 @pytest.mark.compiled("deformation", "dipoles")
@@ -281,6 +285,41 @@ def test_a_gas_moves_with_the_box():
     ratio = sim.ledger["translation"][-1] / sim.ledger["translation"][0]
     assert ratio == pytest.approx(math.exp(-2.0 - 2.0 * rate * time), rel=1e-2, abs=0.0)
     assert sim.ledger["total"][-1] == pytest.approx(sim.ledger["total"][0], rel=1e-9, abs=0.0)
+
+
+@pytest.mark.validate
+def test_threads_and_order_in_memory_change_no_bit():
+    """5000 grains, in several blocks: the same bits with 1, 2 and 3 threads; along a curve, the same to rounding.
+
+    Contacts form at all faces, slide and roll; the box is part of the bits.
+    """
+    grid = np.stack(np.meshgrid(*[np.arange(17.0) - 8.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 2.001 * RADIUS
+    velocity = np.random.default_rng(4).normal(size=grid.shape)
+    ends = []
+    for threads, order in ((1, "as given"), (2, "as given"), (3, "as given"), (2, "curve")):
+        sand.set_threads(threads)
+        sim = sand.Simulation(
+            sand.Grains(grid, RADIUS, ICE, velocity=velocity), [DAMPED], box=17 * 2.001 * RADIUS,
+            deformation=sand.Deformation("-1e6 1/s"), neighbours=sand.Neighbours(order=order),
+        )  # fmt: skip
+        sim.run(steps=150)
+        ends.append(sim)
+    sand.set_threads(None)
+    assert ends[0].state.count[MADE] > 1000 and ends[0].ledger["lost_rolling"][-1] > 0.0
+    assert arrays_of(ends[0]) == arrays_of(ends[1]) == arrays_of(ends[2])
+    assert ends[3].grains.position == pytest.approx(ends[0].grains.position, rel=0.0, abs=1e-9 * RADIUS)
+    assert ends[3].ledger["lost_box"][-1] == pytest.approx(ends[0].ledger["lost_box"][-1], rel=1e-9, abs=0.0)
+
+
+@pytest.mark.validate
+def test_a_long_compression_closes_the_ledger(record_bound):
+    """256 grains from φ = 0.01 to 0.5, with sliding and breaking: the error of the ledger is below 1e-4 of the work."""
+    sim = packing("-2e6 1/s", number=256, row_every="20 ns")
+    sim.run(stop="filling > 0.5", until="2 us")
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert last["filling"] >= 0.5 and min(last["broken"], last["lost_sliding"], last["lost_twisting"]) > 0.0
+    error = abs(last["total"] - first["total"]) / abs(last["lost_box"])
+    record_bound("error of the ledger over the work, φ 0.01 to 0.5", error, most=1e-4)
 
 
 def test_copies_have_boxes_of_their_own():

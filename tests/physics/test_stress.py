@@ -1,6 +1,5 @@
 """Stress: strained lattices, derivatives of energies, shares, torques, walls, Ewald sums, rigid clusters, output."""
 
-import contextlib
 import math
 
 import numpy as np
@@ -266,38 +265,59 @@ def test_traces_of_homogeneous_energies():
         assert trace == pytest.approx(degree * value, rel=1e-10, abs=0)
 
 
-@pytest.mark.compiled("dipoles")
-@pytest.mark.parametrize("reciprocal", ["direct", "mesh"])
-@pytest.mark.parametrize("kind", ["dipoles", "vacuum", "charges"])
-def test_ewald_sums(kind, reciprocal):
-    """All images: tr W = 3U (dipoles) or U (charges), and W_aa = −dU/dε_aa by energies in stretched boxes.
-
-    With an accuracy of 1e-8: the trace to 1e-8, elements to 1e-6 of the largest, the asymmetric part of dipoles, minus
-    the sum of the torques, to 1e-6.  The charges have a net charge, whose background is part of U and of W.
-    """
+def all_images(kind, reciprocal):
+    """An Ewald sum with the highest accuracy."""
     settings = {"periodic": "ewald", "accuracy": 1e-8, "reciprocal": reciprocal}
-    force = sand.Charges(**settings) if kind == "charges" else sand.Dipoles(**settings)
-    if kind == "vacuum":
-        force = sand.Dipoles(**settings, boundary="vacuum")
-    with pytest.warns(match="net charge") if kind == "charges" else contextlib.nullcontext():
-        sim = scattered(force)
-        stress, u = sim.stress(), energy(sim)
-        virial = stress.parts[force.column] * stress.volume
-        size = np.abs(virial).max()
-        assert virial.trace() == pytest.approx((1.0 if kind == "charges" else 3.0) * u, rel=0, abs=1e-8 * size)
-        found = slopes(lambda stretch: energy(scattered(force, 1.2e-6 * stretch)), 2e-3)
-        np.testing.assert_allclose(np.diag(virial), found, rtol=0, atol=1e-6 * size)
+    if kind == "charges":
+        return sand.Charges(**settings)
+    return sand.Dipoles(**settings, boundary="vacuum" if kind == "vacuum" else "tin-foil")
+
+
+LONG = pytest.mark.validate
+
+
+@pytest.mark.compiled("dipoles")
+@pytest.mark.filterwarnings("ignore:charges. the net charge")
+@pytest.mark.parametrize("kind", ["dipoles", "vacuum", "charges"])
+@pytest.mark.parametrize("reciprocal", ["direct", pytest.param("mesh", marks=LONG)])
+def test_ewald_sums(kind, reciprocal):
+    """All images: W_aa = −dU/dε_aa by energies in stretched boxes, to 1e-6 of the largest element; tr W = 3U or U.
+
+    The sums in stretched boxes have other parameters, whose errors of energies, 1e-8 of it, are divided by steps of
+    2e-3.  The charges have a net charge, whose background is part of U and of W.  The asymmetric part of dipoles is
+    minus the sum of the torques, to 1e-6.
+    """
+    force = all_images(kind, reciprocal)
+    sim = scattered(force)
+    stress, u = sim.stress(), energy(sim)
+    virial = stress.parts[force.column] * stress.volume
+    size = np.abs(virial).max()
+    assert virial.trace() == pytest.approx((1.0 if kind == "charges" else 3.0) * u, rel=0, abs=1e-13 * size)
+    found = slopes(lambda stretch: energy(scattered(force, 1.2e-6 * stretch)), 2e-3)
+    np.testing.assert_allclose(np.diag(virial), found, rtol=0, atol=1e-6 * size)
     torque = sim.loads()["torque"].sum(axis=0)
     np.testing.assert_allclose(stress.asymmetry * stress.volume, -torque, rtol=0, atol=1e-6 * size)
 
 
 @pytest.mark.compiled("dipoles")
+@pytest.mark.filterwarnings("ignore:charges. the net charge")
+@pytest.mark.parametrize("kind", ["dipoles", "charges"])
+def test_mesh_against_wave_vectors(kind):
+    """All elements of W by a mesh are those of the sum over wave vectors, to 1e-6 of the largest."""
+    first, other = (
+        scattered(force).stress().parts[force.column]
+        for force in (all_images(kind, "direct"), all_images(kind, "mesh"))
+    )
+    np.testing.assert_allclose(other, first, rtol=0, atol=1e-6 * np.abs(first).max())
+
+
+@pytest.mark.compiled("dipoles")
+@pytest.mark.filterwarnings("ignore:without settling_time")
 def test_clusters_at_rest_carry_their_inertia():
     """A cluster that turns as a rigid body: W of its contacts is that of contact steps of the same cluster.
 
-    Its contacts pull the grains inwards: tr W = −Σ m |ω×s|², and with moments tr W = −2K − Σ s·F, from A and α of the
-    rigid motion.  In contact steps, damped until its contacts are at rest, W is that of their forces, to 1e-3 of it:
-    the cluster is deformed by 1e-4 of r.
+    Its contacts pull the grains inwards, and against their dipoles: tr W = −Σ m |ω×s|² − Σ s·F.  In contact steps W is
+    that of their forces, and oscillates by 4 % at 0.6 us and 0.6 % at 2 us, as the damped vibrations vanish: to 1 %.
     """
     body = sand.setup.bpca(8, radius=R, material=ICE, moment="1e-17 A m^2", seed=3)
     turn = np.array([2e5, -1e5, 3e5])
@@ -307,24 +327,26 @@ def test_clusters_at_rest_carry_their_inertia():
     contact, found = sand.Contact(damping="critical"), {}
     for name, stepping in (("contacts", sand.Verlet()), ("rigid", sand.RigidClusters())):
         sim = sand.Simulation(grains, [contact, sand.Dipoles()], stepping=stepping, frame_every="1 s")
-        sim.run(until="0.2 us")
+        sim.run(until="2 us")
         found[name] = sim.stress("1 um^3")
         if name == "rigid":
             assert sim.state.at_rest.all()
     size = np.abs(found["rigid"].parts["contacts"]).max()
     for part in ("contacts", "magnetic", "kinetic"):
-        np.testing.assert_allclose(found["rigid"].parts[part], found["contacts"].parts[part], rtol=0, atol=1e-3 * size)
+        np.testing.assert_allclose(found["rigid"].parts[part], found["contacts"].parts[part], rtol=0, atol=1e-2 * size)
+    assert found["rigid"].parts["contacts"].trace() < -0.9 * found["rigid"].parts["kinetic"].trace()
 
 
 def gas(out=None, stress=True):
     """Magnetic grains that stick, in a periodic box."""
     kind = {"radius": "10 nm", "material": "iron", "moment": "material", "temperature": "100 K"}
     grains = sand.setup.gas(20, "0.25 um", **kind, seed=11)
-    forces = [sand.Contact(), sand.Dipoles()]
+    forces = [sand.Contact(damping="critical"), sand.Dipoles()]
     return sand.Simulation(grains, forces, box="0.25 um", stress=stress, out=out, frame_every="2 ns")
 
 
 @pytest.mark.compiled("dipoles")
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate")
 def test_rows_and_frames(tmp_path):
     """With `stress` rows have the present tensor and frames the shares; the motion has the bits of a run without it."""
     sim, plain = gas(tmp_path / "run"), gas(stress=False)

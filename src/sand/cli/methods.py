@@ -127,7 +127,6 @@ def _of_run(folder: Path, path: Path) -> Sentences:
 
 def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     """Sentences on a case of `sand run`: grains, box, materials, forces, components, integrator and end."""
-    from ..components import GIVEN
     from .method_text import section, settings
 
     grains, number = case.grains, case.grains.number or results.get("grains")
@@ -143,7 +142,7 @@ def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     used = _names(grains.material) + [name for one in grains.classes for name in _names(one.material)]
     yield from _common(case, [*used, *case.materials], results, case.forces.build())
     for name, components in case.components().items():
-        for one in GIVEN[name](components):
+        for one in components if isinstance(components, list) else [components] * (components is not None):
             yield f"A part of the simulation, {name}, had: {settings(one)}."
     yield f"The end was {section(case.run, 'out', 'seed', 'frame_every', 'row_every', 'checkpoint_every')}."
 

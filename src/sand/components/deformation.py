@@ -26,6 +26,8 @@ from ..integrate.parts import ContactParameters
 from .deformation_stage import EXPONENTIAL, LAWS, LINEAR, PRESSURE, RATE, DeformationNumbers, deformation_stages
 
 AXES = "xyz"
+LEAST_STRAIN = 1e-9
+"""Least strain of an axis between two rows for a mean of the pressure."""
 REFUSED = {
     "walls": "walls",
     "driven": "driven grains",
@@ -160,12 +162,12 @@ class DeformedBox(Component):
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the box in memory."""
         state.add_groups(self.groups, {})
-        state.cell.span[:] = state.fixed_box.moving_span  # type: ignore[union-attr]
-        state.cell.start[:] = self._lengths  # type: ignore[union-attr]
+        cell = _cell_of(state)
+        cell.span[:], cell.start[:] = state.fixed_box.moving_span, self._lengths
 
     def begin(self, engine: Engine) -> None:
         """Set rates and pressure of the present intervals of the ramps, and A where rates have changed."""
-        cell, given = engine.stored_state.cell, force_at(self.given, engine.stored_state.time)
+        cell, given = _cell_of(engine.stored_state), force_at(self.given, engine.stored_state.time)
         cell.goal[0] = given.pressure or 0.0
         if (cell.rate != given.rate).any():
             cell.rate[:] = given.rate
@@ -202,7 +204,7 @@ class DeformedBox(Component):
 
     def row(self, state: State) -> dict[str, float]:
         """Values of the columns; the pressure is that of the present moment."""
-        cell, grains = state.cell, state.grains.arrays
+        cell, grains = _cell_of(state), state.grains.arrays
         lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
         virial = cell.virial + (grains.mass * grains.velocity**2).sum(axis=1)
         found = dict(zip(self.columns(), [*lengths, 0.0, *cell.work, *virial / volume], strict=True))
@@ -212,7 +214,8 @@ class DeformedBox(Component):
     def means(self, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
         """The pressure P_aa = −ΔW_a / ∫ V dL_a / L_a since the row before, from the work W_a on the grains.
 
-        For rates in constant ratios, the integral is Δ ln L_a times the logarithmic mean of the volumes.
+        For rates in constant ratios, the integral is Δ ln L_a times the logarithmic mean of the volumes.  With a strain
+        below LEAST_STRAIN the quotient would be rounding.
         """
         found: dict[str, float] = {}
         if before is None:
@@ -222,10 +225,15 @@ class DeformedBox(Component):
         mean = (volumes[1] - volumes[0]) / ratio if abs(ratio) > 1e-6 else 0.5 * (volumes[0] + volumes[1])
         for axis in AXES:
             strain = math.log(now[f"box_{axis}"] / before[f"box_{axis}"])
-            if strain != 0.0:
+            if abs(strain) > LEAST_STRAIN:
                 found[f"mean_pressure_{axis}"] = (before[f"work_{axis}"] - now[f"work_{axis}"]) / (mean * strain)
         return found
 
     def parameters(self) -> dict[str, Any]:
         """Its table in a case file, SI."""
         return self.given.parameters()
+
+
+def _cell_of(state: State) -> CellArrays:
+    cell: CellArrays = state.of_components[CELL]
+    return cell

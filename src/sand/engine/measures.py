@@ -16,6 +16,7 @@ from ..contact.damping import THERMAL
 from ..contact.measure import BODY_ROWS, ENERGIES, contacts_stage, energies_stage, measure_bodies
 from ..forces.base import ExternalForce
 from ..forces.external_loops import external_energies_for
+from ..forces.pair.ewald_force import EwaldForce
 from ..forces.pair.long_range_loops import long_range_energies_for, long_range_virial_for
 from ..integrate.force_stages import SUM, WHOLE, pair_force_stages, run_rounds
 from ..integrate.hooks import Hook
@@ -99,17 +100,25 @@ def refuse_forces_without_virial(engine: CompiledState) -> None:
 
 
 def pair_virials(engine: CompiledState) -> dict[str, np.ndarray]:
-    """Virial (3, 3) [J] of each long-range force by ledger column, W_ab = Σ r_a F_b of all pairs and images."""
+    """Virial (3, 3) [J] of each long-range force by ledger column, W_ab = Σ r_a F_b of all pairs and images.
+
+    Energies of Ewald sums are homogeneous, of degree −3 for dipoles and −1 for charges, if α follows the size of the
+    box: the trace is set to 3U or U, which are more accurate than a derivative at constant α.
+    """
     refuse_forces_without_virial(engine)
     state, found = engine.state, {}
     table, arrays = engine.table_of(state), state.grains.arrays
-    for force, sums, numbers in engine.long_range:
-        out = np.zeros(9)
+    for k, (force, sums, numbers) in enumerate(engine.long_range):
+        out, shares = np.zeros(9), np.zeros(len(state.grains))
         long_range_virial_for(sums).run(table, (numbers, out))
-        found[force.column] = out.reshape(3, 3)
-        if sums.reciprocal_virial is not None:
+        virial = out.reshape(3, 3)
+        if isinstance(force, EwaldForce) and sums.reciprocal_virial is not None:
             run_rounds(sums, engine.content.wide, table, numbers)
-            found[force.column] += sums.reciprocal_virial(arrays, state.box.span, numbers)
+            virial = virial + sums.reciprocal_virial(arrays, state.box.span, numbers)
+            _add_energies(engine, state, k, shares)
+            trace = (2 * force.sources.order + 1) * math.fsum(shares.tolist())
+            virial = virial + (trace - virial.trace()) / 3.0 * np.eye(3)
+        found[force.column] = virial
     return found
 
 

@@ -12,7 +12,9 @@ from typing import Any
 from ..analysis.ledger_columns import AWAKE
 from ..basics.errors import BadInput, did_you_mean, shown
 from ..basics.units import si
+from ..io.ledger_table import TEMPERATURES
 from .ledger import MOMENTA, NUMBERS
+from .stress import PRESSURES
 
 EVERY, EVERY_LONG = 100, 1
 """Regular steps between two checks of a condition, and those of rigid clusters, which are up to 1000 times as long."""
@@ -92,7 +94,9 @@ def unit_of(column: str) -> str:
         return "1"
     if column in MOMENTA:
         return "J s" if column.startswith("angular") else "kg m/s"
-    return "J"
+    if column in TEMPERATURES:
+        return "K"
+    return "Pa" if column in PRESSURES else "J"
 
 
 def read_condition(text: Any) -> Condition:

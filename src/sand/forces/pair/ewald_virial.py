@@ -21,6 +21,8 @@ import numpy as np
 from ...basics.alignment import SIMD_WIDTH
 from ...compiler.recipes import factory
 
+NEGLIGIBLE = 1e-15
+"""Waves of a mesh with an influence below this fraction of the largest one are left out: their φ̂ is noise."""
 AT_ONCE = 1_000_000
 """Largest number of phases exp(i q·x) in memory."""
 
@@ -105,9 +107,10 @@ def mesh_virial(dipoles: bool) -> Callable:
         inverse = span.inverse_x, span.inverse_y, span.inverse_z
         q_x, q_y, q_z = (2.0 * math.pi * n * each for n, each in zip(numbers, inverse, strict=True))
         twice = np.where((numbers[2] == 0.0) | (2.0 * numbers[2] == size[2]), 1.0, 2.0)  # q_z and −q_z
+        least = NEGLIGIBLE * mesh.influence.max()
         for k in range(size[0]):
             q = np.stack(np.broadcast_arrays(q_x[k], q_y[:, None], q_z), axis=-1)
-            used = q.any(axis=-1) & (mesh.influence[k] > 0.0)
+            used = mesh.influence[k] > least
             energy = twice * spectrum[k] / (2.0 * potential.size * np.where(used, mesh.influence[k], np.inf))
             found += _tensor(energy[used], q[used], parameters.alpha)
         return found - grains.moment @ mesh.field.T if dipoles else found
