@@ -67,7 +67,7 @@ class Run:
             if any((self.folder / name).exists() for name in (files.SCATTERING, files.FLIGHTS)):
                 raise BadInput(f"{folder} holds a job of sand scatter, which keeps no trajectories of grains")
             if any(self.folder.glob("seed-*")):
-                raise BadInput(f"{folder} holds the boxes of sand grow; give the folder of one of them, such as seed-1")
+                raise BadInput(f"{folder} holds runs of several seeds; give the folder of one of them, such as seed-1")
             if (self.folder / RUNS).is_dir():
                 raise BadInput(f"{folder} holds a sweep, none of whose runs has ended")
             if (self.folder / files.CASE).exists():

@@ -317,6 +317,7 @@ class Loaded(NamedTuple):
             "rate": planned.rate,
             "contact_time": planned.scales.time,
             "largest_rate_at_start": planned.rate / planned.rate_ratio(planned.sides),
+            "surface_energy": planned.start.grains.materials[0].surface_energy,
             "roll_energy": planned.scales.roll_energy,
             "pressure_scale": planned.scales.pressure,
             **{name: last[name] for name in ("time", "step", "filling", "strain", "stress", "coordination")},

@@ -9,8 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..analysis.ledger_columns import ALWAYS_LOST, DAMPED
-from ..theory.compression import CLOSEST, arakawa_coordination, kataoka_pressure, tatsuuma_pressure
 from ..plotting.papers import Curve, Guide, Panel, panels_figure
+from ..theory.compression import (
+    CLOSEST,
+    arakawa_coordination,
+    kataoka_pressure,
+    tatsuuma_pressure,
+    tatsuuma_strength,
+)
 
 POINTS = 60
 """Largest number of points of a curve."""
@@ -49,6 +55,9 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
             Guide("Tatsuuma et al. 2023", below, tatsuuma_pressure(below, scale)),
         ]
         numbers = [Guide("Arakawa et al. 2019", x, arakawa_coordination(x))]
+    if first["kind"] == "stretch":
+        strength = tatsuuma_strength(first["filling_at_start"], first["surface_energy"], first["radius"])
+        laws = [Guide("strength, Tatsuuma et al. 2019", x, np.full(len(x), strength))]
     seeds = f"{len(runs)} seed{'s' * (len(runs) > 1)}"
     parts = [curve(channel, channel) for channel in (*CHANNELS, "others")]
     log = "x" * compressed

@@ -55,18 +55,10 @@ def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
     pressed: dict[str, Any] = {}
     if loading.pressure is not None:
         pressed = {"mass": float(grains.mass.sum()), "force": loading.pressure * _area(plan)}
-    planes = [
-        WallSection(material=material.name, point=(0.0, 0.0, low), normal=(0.0, 0.0, 1.0), name=FLOOR),
-        WallSection(
-            material=material.name,
-            point=(0.0, 0.0, high),
-            normal=(0.0, 0.0, -1.0),
-            name=LID,
-            velocity=velocity,
-            **pressed,
-        ),
-    ]
-    return {"walls": [one.build({material.name: material}) for one in planes]}
+    both = {"material": material.name}
+    floor = both | {"name": FLOOR, "point": [0.0, 0.0, low], "normal": [0, 0, 1]}
+    lid = both | {"name": LID, "point": [0.0, 0.0, high], "normal": [0, 0, -1], "velocity": velocity, **pressed}
+    return {"walls": [WallSection.model_validate(one).build({material.name: material}) for one in (floor, lid)]}
 
 
 def _area(plan: Plan) -> float:

@@ -226,11 +226,11 @@ def test_settings_of_every_force():
         (lambda place: place / "none", "there is no folder"),
         (
             lambda place: place,
-            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep; give the folder",
+            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
         ),
         (
             lambda place: (place / "case.toml").write_text(RUN, "utf-8") and place,
-            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep; give the folder",
+            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
         ),
         (
             lambda place: folder_of(place / "x", '[sweep]\nkey = "a"', {}),

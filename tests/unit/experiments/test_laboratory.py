@@ -244,12 +244,27 @@ def test_a_job(tmp_path, monkeypatch, capsys):
     assert pulled["strain"] == pytest.approx(0.1, rel=1e-6, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:the rate,")
+def test_a_sweep_over_the_end(tmp_path, monkeypatch, capsys):
+    """`sand sweep` varies a key of [compression]; a run has the results of the job, its columns as lists."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cake.toml").write_text(CASE)
+    how = ["--vary", "compression.to=0.28,0.3", "--seeds", "2-2", "--files", "none", "--out", "swept", "--quiet"]
+    assert main(["sweep", "cake.toml", *how]) == 0
+    table = sand.open("swept").table
+    assert table["compression.to"].tolist() == [0.28, 0.3]
+    assert table["filling"] == pytest.approx([0.28, 0.3], rel=1e-9, abs=0.0)
+    assert len(table["table_stress"][1].split()) > len(table["table_stress"][0].split())
+
+
 def outcome(seed, kind="compress", noise=0.0):
     """An outcome whose pressure is 5e5 φ³, and whose losses are of rolling alone."""
     phi = np.geomspace(0.02, 0.3, 40)
     table = {"mean_filling": phi, "strain": 3 * phi, "stress": 5e5 * phi**3 * (1 + noise), "coordination": 2 + phi}
     table |= {"lost_rolling": phi, "lost_sliding": 0 * phi, "lost_twisting": 0 * phi, "lost_walls": -9 * phi}
     scales = {"kind": kind, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
+    scales |= {"filling_at_start": 0.1, "surface_energy": 0.1, "radius": 1e-7}
     return {"seed": seed, "table": {name: column.tolist() for name, column in table.items()}} | scales
 
 
