@@ -12,7 +12,6 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..analysis.clusters import cluster_labels, percolation_axes
 from ..basics.arguments import checked
 from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, shown, warn
@@ -23,12 +22,11 @@ from ..contact.model import Contact
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY
-from ..io.trajectory import Frames
 from ..setup.checks import pairs_in_contact, refuse_pieces
 from ..setup.from_frame import Start
-from ..simulation.observers import Observer
 from ..simulation.simulation import Simulation
 from ..theory.compression import CLOSEST, PackingScales, packing_scales
+from .laboratory_table import Percolation, table_of
 
 KINDS = ("compress", "stretch", "shear")
 """What is done to a packing."""
@@ -238,9 +236,8 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
     refuse_pieces(given.grains, np.asarray(pairs, np.int64), given.box, "the body")
     way, grains = _way(loading), given.grains
     start, sides = way.placed(loading, given, contact)
-    scales = packing_scales(
-        grains.materials[int(grains.material[0])], float(grains.radius.mean()), roll_factor=contact.roll_factor
-    )
+    rolling = {"roll_factor": contact.roll_factor, "rolling_limit": contact.rolling_limit}
+    scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **rolling)
     unit = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}[loading.rate.unit]
     found = Plan(loading, start, {}, sides, loading.rate.value / unit, 0.0, 0.0, scales)
     filling = found.filling(sides)
@@ -264,38 +261,6 @@ def slow_from(planned: Plan) -> str:
             f"is {good}"
         )
     return good
-
-
-class Percolation(Observer):
-    """Finds in each row which cluster percolates, and along which axes."""
-
-    def __init__(self) -> None:
-        self.found: dict[float, dict[str, Any]] = {}
-
-    def see(self, simulation: Simulation, row: dict[str, float]) -> None:
-        """Look at the contacts of a new row."""
-        state = simulation.state
-        self.found[row["time"]] = percolating(simulation.grains.position, simulation.contacts["pair"], state.box)
-
-    def see_frames(self, path: Path, rows: Sequence[dict[str, float]]) -> None:
-        """Look at the frames of rows before a run was resumed."""
-        if any(row["time"] not in self.found for row in rows):
-            for frame in Frames(path):
-                self.found.setdefault(frame.time, percolating(frame.position, frame.pair, frame.box))
-
-
-def percolating(position: np.ndarray, pairs: np.ndarray, box: Box) -> dict[str, Any]:
-    """Number of clusters that percolate; of the largest one the lowest grain (−1: none), size, and axes as 0 or 1."""
-    axes, labels = percolation_axes(position, pairs, box), cluster_labels(len(position), np.asarray(pairs))
-    sizes = np.bincount(labels) * axes.any(axis=1)
-    largest = int(sizes.argmax())
-    along = axes[largest] if sizes[largest] else np.zeros(3, bool)
-    return {
-        "percolating": int(axes.any(axis=1).sum()),
-        "percolating_grain": int(np.argmax(labels == largest)) if sizes[largest] else -1,
-        "percolating_size": int(sizes[largest]),
-        **{f"percolates_{name}": int(one) for name, one in zip("xyz", along, strict=True)},
-    }
 
 
 class Loaded(NamedTuple):
@@ -365,19 +330,6 @@ def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
     if simulation.writer is not None:
         seen.see_frames(simulation.writer.folder / TRAJECTORY, rows)
     return Loaded(planned, table_of(planned, rows, seen), simulation)
-
-
-def table_of(planned: Plan, rows: Sequence[dict[str, float]], seen: Percolation) -> list[dict[str, Any]]:
-    """Rows of the table: those of the ledger between which ln φ or the strain changes by `Loading.every`."""
-    kept, table = rows[0], [planned.row(None, rows[0]) | seen.found.get(rows[0]["time"], {})]
-    compressed, least = planned.loading.kind == "compress", planned.loading.every * (1.0 - 1e-3)
-    for row in rows[1:]:
-        new, last = planned.row(kept, row), table[-1]
-        change = math.log(new["filling"] / last["filling"]) if compressed else abs(new["strain"] - last["strain"])
-        if change >= least or row is rows[-1]:
-            table.append(new | seen.found.get(row["time"], {}))
-            kept = row
-    return table
 
 
 @checked

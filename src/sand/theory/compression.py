@@ -52,7 +52,9 @@ class PackingScales(NamedTuple):
 
 
 @checked
-def packing_scales(material: Material | str, radius: Any, *, roll_factor: Any = 1.0) -> PackingScales:
+def packing_scales(
+    material: Material | str, radius: Any, *, roll_factor: Any = 1.0, rolling_limit: Any = None
+) -> PackingScales:
     """Scales of the compression of a packing of equal grains.
 
     Parameters
@@ -63,6 +65,8 @@ def packing_scales(material: Material | str, radius: Any, *, roll_factor: Any = 
         r [m] > 0.
     roll_factor : float, optional
         Factor > 0 of the rolling stiffness (`sand.Contact`), which multiplies E_roll.
+    rolling_limit : float or str, optional
+        ξ_c [m] > 0 in place of the value of the material.
 
     Raises
     ------
@@ -70,7 +74,7 @@ def packing_scales(material: Material | str, radius: Any, *, roll_factor: Any = 
         If an argument is out of range, or the material has no surface energy.
     """
     one, r = as_material(material), si(radius, "m", "radius", above=0.0)
-    numbers, mass = contact(one, r), 4.0 / 3.0 * math.pi * r**3 * one.density
+    numbers, mass = contact(one, r, rolling_limit=rolling_limit), 4.0 / 3.0 * math.pi * r**3 * one.density
     energy = si(roll_factor, "1", "roll_factor", above=0.0) * numbers.roll_energy_clamped
     return PackingScales(
         energy,

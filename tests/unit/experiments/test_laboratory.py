@@ -10,9 +10,10 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.experiments import laboratory
-from sand.experiments.laboratory import Loading, load, percolating, plan, table_of
+from sand.experiments.laboratory import Loading, load, plan
 from sand.experiments.laboratory_figure import laboratory_figure
 from sand.experiments.laboratory_job import rows_of
+from sand.experiments.laboratory_table import Percolation, percolating, table_of
 from sand.theory.compression import packing_scales
 
 ICE = sand.ICE
@@ -119,7 +120,7 @@ def test_rows_of_a_constant_pressure():
         row = {"time": k * 1.0, "step": k, "contacts": 54 + k, "lost_rolling": 0.0, "lost_walls": 0.0}
         row |= {"lost_walls": -pressure * area * (gap - height), "floor_position": floor}
         ledger.append(row | {"lid_position": -(floor + height)})
-    table = table_of(found, ledger, laboratory.Percolation())
+    table = table_of(found, ledger, Percolation())
     assert math.isnan(table[0]["stress"]) and len(table) > 10
     assert [row["stress"] for row in table[1:]] == pytest.approx([pressure] * (len(table) - 1), rel=1e-9, abs=0.0)
     assert (np.diff(np.log([row["filling"] for row in table]))[:-1] >= 0.02 * (1 - 1e-3)).all()

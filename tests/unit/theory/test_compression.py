@@ -29,6 +29,8 @@ def test_scales_of_ice_grains():
     stiff = compression.packing_scales(ICE, "0.1 um", roll_factor=8)
     assert stiff.roll_energy == pytest.approx(8 * one.roll_energy, rel=1e-12, abs=0.0)
     assert stiff.time == one.time
+    long = compression.packing_scales(ICE, "0.1 um", rolling_limit="32 angstrom")
+    assert long.roll_energy == pytest.approx(4 * one.roll_energy, rel=1e-12, abs=0.0)
 
 
 def test_rule_of_the_rate():
