@@ -329,6 +329,10 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
             "E_roll",
             f"12 pi^2 gamma R xi_c = {planned.scales.roll_energy:.3g} J; E_roll/r^3 = {planned.scales.pressure:.3g} Pa",
         ),
+        (
+            "dashpots",
+            f"1 % of the critical one is damping_constant = {0.01 * planned.scales.critical_damping:.2g} kg/s",
+        ),
         ("seeds", str(len(seeds))),
         *_of_each(costs, len(seeds), "run"),
         ("end", f"at {format_quantity(planned.until, 's')}"),

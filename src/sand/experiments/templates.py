@@ -42,7 +42,7 @@ SCATTERING: Values = {
 """Keys in use of `sand scatter`: cross-sections of two magnetic grains of iron at two speeds."""
 GROWTH: Values = {**EXAMPLES, "grow": {"seeds": [1, 2, 3, 4]}, "run": {"until": "20 us", "frame_every": "0.1 us"}}
 """Keys in use of `sand grow`: the gas of the case of `sand run`, for four seeds."""
-DAMPED = {"damping": "critical", "damping_ratio": 0.01}
+DAMPED = {"damping": "constant", "damping_constant": "2.2e-10 kg/s"}
 PACKED = {"kind": "rbd", "grains": 64, "radius": "0.1 um", "material": "ice"}
 LOADINGS: dict[str, Values] = {
     "compress": {

@@ -32,6 +32,7 @@ class PackingScales(NamedTuple):
     roll_energy: float  # E_roll = 12π²γRξ_c [J]
     pressure: float  # E_roll/r³ [Pa]
     time: float  # t_c = √(m̄ δ_c/F_c) [s] with the reduced mass m̄ = m/2: the unit of rates of strain, C_v = rate × t_c
+    critical_damping: float  # 2√(k_n m̄) [kg/s], of the normal motion of a contact
     wave_speed: float  # √(3 E_roll/(r³ρ)) [m/s]: times φ, the speed of a wave of plastic compression
 
     def largest_rate(self, filling: Any, side: Any) -> float:
@@ -80,6 +81,7 @@ def packing_scales(
         energy,
         energy / r**3,
         math.sqrt(0.5 * mass * numbers.pull_off_overlap / numbers.pull_off_force),
+        math.sqrt(2.0 * mass * numbers.normal_stiffness),
         math.sqrt(3.0 * energy / (r**3 * one.density)),
     )
 

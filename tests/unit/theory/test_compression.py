@@ -26,6 +26,9 @@ def test_scales_of_ice_grains():
     mass = 4 / 3 * math.pi * 1e-21 * 1000.0
     square = 0.5 * mass * rest**2 / (2 * 6 ** (1 / 3) * radius) / (3 * math.pi * 0.1 * radius)
     assert one.time == pytest.approx(math.sqrt(square), rel=1e-9, abs=0.0)
+    # a contact with the period T of its normal motion, ω = 2π/T = √(k/m̄), is critically damped by 2 m̄ ω
+    omega = 2 * math.pi / sand.theory.contact(ICE, "0.1 um").normal_period
+    assert one.critical_damping == pytest.approx(2 * 0.5 * mass * omega, rel=1e-9, abs=0.0)
     stiff = compression.packing_scales(ICE, "0.1 um", roll_factor=8)
     assert stiff.roll_energy == pytest.approx(8 * one.roll_energy, rel=1e-12, abs=0.0)
     assert stiff.time == one.time
