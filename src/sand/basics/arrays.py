@@ -126,7 +126,9 @@ class CellArrays(NamedTuple):
     # pressure that the rates follow, and the present running means along each axis
     goal: Annotated[np.ndarray, Array((1,), "Pa")]
     pressure: Annotated[np.ndarray, Array((3,), "Pa")]
-    # virial W_aa of contacts at the end of the last step
+    # contacts before new ones formed in the present step
+    passed: Annotated[np.ndarray, Array((1,), dtype="i8", saved=False)]
+    # virial W_aa of contacts and dipoles at the end of the last step
     virial: Annotated[np.ndarray, Array((3,), "J")]
     # work of the boundaries on the grains, by the deformation along each axis
     work: Annotated[np.ndarray, Array((3,), "J", summed=True)]

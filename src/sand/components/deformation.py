@@ -145,8 +145,8 @@ class DeformedBox(Component):
         if not dipoles.uses_ewald(setup.grains, setup.box) or dipoles.ewald(setup.grains, setup.box).order:
             return ["dipoles need periodic = 'ewald' and reciprocal = 'direct' in a box that is deformed"]
         rates = [rate for each in forces_at_points(self.given) for rate in each.rate]
-        alike = all(len(set(each.rate)) == 1 for each in forces_at_points(self.given))
-        if self.given.law == PRESSURE or not alike or max(rates) > 0.0:
+        uniform = all(len(set(each.rate)) == 1 for each in forces_at_points(self.given))
+        if self.given.law == PRESSURE or not uniform or max(rates) > 0.0:
             return ["dipoles need three equal rates of at most 0, and none that follows a pressure"]
         return []
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..basics.box import Span
 from ..compiler.jit import formula, loop
 from ..contact.gather import GRAINS_AT_ONCE, gather
-from ..numerics.flow import after_step, flown, slowed, unless_still
+from ..numerics.flow import after_step, drifted_with_flow, slowed, unless_still
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import axpy, dot, load, load4, nearest_image, put, put4, scale
@@ -87,7 +87,7 @@ def drifted(grains, i, v, dt, span):
     In a box that is deformed, the velocity becomes that relative to the flow at the end.
     """
     put(grains.velocity, i, slowed(v, span, dt))
-    return flown(load(grains.position, i), v, span, dt), after_step(span, dt)
+    return drifted_with_flow(load(grains.position, i), v, span, dt), after_step(span, dt)
 
 
 @unless_still(lambda wrapped_later, span: UNBOUNDED if wrapped_later else span)

@@ -100,7 +100,7 @@ def after_step(span, dt):
 
 
 @formula
-def flown(x, v, span, dt):
+def drifted_with_flow(x, v, span, dt):
     """Where a grain at x [m] with the velocity v [m/s] relative to the flow is after dt [s]: x + dt (v + A x)."""
     return axpy(dt, with_flow(v, x, span), x)
 

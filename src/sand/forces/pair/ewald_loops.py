@@ -15,7 +15,7 @@ G = (8πk/V) exp(−q²/4α²)/q², a = μ_x q_x + μ_y q_y and b = μ_z, or a =
 Each column needs no other one, so that columns are shared among threads in blocks, each with sums of its own.  The real
 part of dipoles is summed by the pair loops of `dipole_loops`, that of charges in `ewald_charges`.
 
-In a box that is deformed alike along all axes, α L and r_c/L stay as they were at a length L₀: with λ = L₀/L the loads
+In a box that keeps the ratios of its sides, α L and r_c/L stay as they were at a length L₀: with λ = L₀/L the loads
 of dipoles are those at λ x in the box of L₀, times λ⁴ for forces and λ³ for flux densities and energies.
 """
 
