@@ -93,6 +93,11 @@ FAULTS = (
           "return alpha * sources.k / math.sqrt(math.pi) * math.erf(z)",
           "unit/forces/test_ewald_charges.py::test_lattice_energies"),
     # loops
+    Fault("a pair of the Verlet list counts twice in the stress", "factor 2", "loop", "forces/pair/long_range_loops.py",
+          "long_range.order[long_range.neighbour[m]], 0.5, out)", "long_range.order[long_range.neighbour[m]], 1.0, out)",
+          "physics/test_stress.py::test_pair_forces_with_cutoff"),
+    Fault("arms of contacts with walls point to the wall", "sign", "loop", "components/walls.py",
+          "* n).sum(axis=0) * n", "* n).sum(axis=0) * -n", "physics/test_stress.py::test_chain_between_walls"),
     Fault("waves downwards with the phase of waves upwards", "sign", "loop", "forces/pair/ewald_loops.py",
           "even * c - odd_i * s, even_i * c + odd * s", "even * c + odd_i * s, even_i * c + odd * s",
           "unit/forces/test_ewald.py::test_ewald_sum_against_images_in_a_sphere"),

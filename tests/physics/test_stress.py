@@ -185,7 +185,7 @@ def test_chain_between_walls(twice):
 def test_table_of_contacts_with_walls():
     """Forces of the table add up to that on the wall, energies with those of `contacts` to the columns of the ledger.
 
-    Displacements are those of a grain on a sphere of 1e5 r, to 1e-3.
+    Vectors of displacements have the lengths in the table, and the sliding force is their spring's, k_s = 2U/ζ².
     """
     motion = {"velocity": [[0.0004, 0.0007, -0.04]], "spin": [[7e4, -2e5, 3e5]]}
     r, contact = 5e-7, sand.Contact(damping="critical")
@@ -202,6 +202,10 @@ def test_table_of_contacts_with_walls():
     assert table["overlap"][0] == pytest.approx(r - sim.grains.position[0, 2], rel=1e-12, abs=0)
     assert table["normal_force"][0] == pytest.approx(table["force"][0, 2], rel=1e-15, abs=0)
     assert table["lost_forming"][0] == pytest.approx(row["lost_forming"][-1], rel=1e-12, abs=0)
+    for name in ("slide", "roll"):
+        assert np.linalg.norm(table[f"{name}_vector"][0]) == pytest.approx(table[name][0], rel=1e-12, abs=0)
+    spring = 2.0 * table["energy_sliding"] / table["slide"]
+    assert table["slide_force"][0] == pytest.approx(spring[0], rel=1e-12, abs=0)
     assert table["slide_vector"].shape == (1, 3) and 0.0 < table["roll_share"][0] <= 1.0 + 1e-12
     plain = sand.Simulation(grain, [contact])
     assert list(plain.wall_contacts) == list(table) and plain.wall_contacts["roll_vector"].shape == (0, 3)

@@ -24,6 +24,8 @@ CAPABILITIES = {
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
     "packings that are compressed, stretched, sheared (sand compress, stretch, shear): laws, runs, tables": 620,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
+    "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
+    "grains in frames, pictures and page": 488,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8

@@ -398,7 +398,7 @@ class Simulation(ReadOnlySettings):
 
         Notes
         -----
-        Contacts: Love 1927; Weber 1966, Bull. Liaison Ponts Chaussées 20, 3; Christoffersen, Mehrabadi &
+        Contacts: Love 1927; Weber 1966, Bull. Liaison P. et Ch. 20, 3; Christoffersen, Mehrabadi &
         Nemat-Nasser 1981, J. Appl. Mech. 48, 339. Ewald sums: Nosé & Klein 1983, Mol. Phys. 50, 1055; Aguado & Madden
         2003, J. Chem. Phys. 119, 7471. In clusters at rest, with `sand.RigidClusters`, W of the contacts is that of
         the forces by which they keep their rigid motion.
