@@ -100,8 +100,6 @@ class Loading(Settings):
     box : float or str or sequence, optional
         Sides of the box at the start [m], one or three; between walls those along x and y count. By default those of a
         frame, or of a cube that holds the body with a gap of a tenth of a radius.
-    pressure : float or str, optional
-        Pressure [Pa] > 0 with which the lid presses on the grains while it shears them; by default its height stays.
     every : float, optional
         Change of ln φ, or strain, from row to row of the table, 0.02 by default.
 
@@ -117,7 +115,6 @@ class Loading(Settings):
     by: Annotated[str, Word(*WAYS)] = "box"
     along: Annotated[str, Word("auto", "all", "x", "y", "z")] = "auto"
     box: Annotated[Any, BOX] = None
-    pressure: Annotated[Any, Number("Pa", above=0.0)] = None
     every: Annotated[Any, Number(least=1e-4, most=0.5)] = 0.02
 
     place: ClassVar[str] = ""
@@ -137,8 +134,6 @@ class Loading(Settings):
         if self.along not in ("auto", *allowed):
             advice = f"give {' or '.join(map(repr, allowed))}" if allowed else "leave it out"
             yield f"along = {self.along!r} is not for {self.kind} with by = {self.by!r}; {advice}"
-        if self.pressure is not None and (self.kind, self.by) != ("shear", "walls"):
-            yield "pressure is for shear with by = 'walls', whose lid may move along its normal; leave it out"
 
     @property
     def axes_allowed(self) -> tuple[str, ...]:

@@ -52,17 +52,10 @@ def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
     low, high = _planes(plan.start, contact)
     speed = plan.rate * float(plan.sides[2])
     velocity = {"compress": (0.0, 0.0, -speed), "stretch": (0.0, 0.0, speed), "shear": (speed, 0.0, 0.0)}[loading.kind]
-    pressed: dict[str, Any] = {}
-    if loading.pressure is not None:
-        pressed = {"mass": float(grains.mass.sum()), "force": loading.pressure * _area(plan)}
     both = {"material": material.name}
     floor = both | {"name": FLOOR, "point": [0.0, 0.0, low], "normal": [0, 0, 1]}
-    lid = both | {"name": LID, "point": [0.0, 0.0, high], "normal": [0, 0, -1], "velocity": velocity, **pressed}
+    lid = both | {"name": LID, "point": [0.0, 0.0, high], "normal": [0, 0, -1], "velocity": velocity}
     return {"walls": [WallSection.model_validate(one).build({material.name: material}) for one in (floor, lid)]}
-
-
-def _area(plan: Plan) -> float:
-    return float(plan.sides[0] * plan.sides[1])
 
 
 def times(loading: Loading, filling: float, rate: float) -> tuple[float, float]:
@@ -74,7 +67,7 @@ def times(loading: Loading, filling: float, rate: float) -> tuple[float, float]:
 
 
 def last_sides(plan: Plan) -> np.ndarray:
-    """Lengths (3,) at the end [m]; those at the start if the lid moves under a pressure."""
+    """Lengths (3,) at the end [m]."""
     loading, change = plan.loading, plan.rate * plan.until
     factor = {"compress": 1.0 - change, "stretch": 1.0 + change, "shear": 1.0}[loading.kind]
     return plan.sides * np.array([1.0, 1.0, factor])
@@ -88,14 +81,6 @@ def sides(plan: Plan, row: dict[str, float]) -> np.ndarray:
 
 
 def stress(plan: Plan, before: dict[str, float], row: dict[str, float]) -> float:
-    """Mean stress [Pa] between two rows of the ledger, from the work of the lid, over its area and its way.
-
-    Positive against the motion. A pressed lid also works along its normal: pressure × area × change of height, the
-    change of its kinetic energy along the normal being neglected.
-    """
-    work, area = before[LOST] - row[LOST], _area(plan)
-    first, last = sides(plan, before)[2], sides(plan, row)[2]
-    if plan.loading.kind == "shear":
-        normal = (plan.loading.pressure or 0.0) * area * (first - last)
-        return float((work - normal) / (area * plan.rate * plan.sides[2] * (row["time"] - before["time"])))
-    return float(work / (area * abs(first - last)))
+    """Mean stress [Pa] between two rows of the ledger: the work of the lid over its area and its way."""
+    way = plan.rate * float(plan.sides[2]) * (row["time"] - before["time"])
+    return float((before[LOST] - row[LOST]) / (plan.sides[0] * plan.sides[1] * way))

@@ -84,15 +84,12 @@ def test_walls_touch_the_outermost_grains():
 
 
 def test_the_lid_moves_as_it_is_told():
-    """Stretched it moves up, sheared along x; a pressure gives it the mass of the grains and the force P × area."""
+    """Stretched it moves up, sheared along x."""
     stretched, sheared = (plan(PACKING, walls(kind, to=0.5)) for kind in ("stretch", "shear"))
     assert stretched.moved["walls"][1].velocity == (0.0, 0.0, 1.0)
     assert sheared.moved["walls"][1].velocity == (1.0, 0.0, 0.0)
     for found in (stretched, sheared):
         assert found.until == pytest.approx(0.5 * found.sides[2], rel=1e-12, abs=0.0)
-    lid = plan(PACKING, walls("shear", to=0.5, pressure="2 kPa")).moved["walls"][1]
-    assert lid.force == pytest.approx(2e3 * 1e-12, rel=1e-12, abs=0.0)
-    assert lid.mass == pytest.approx(SOLID * ICE.density, rel=1e-9, abs=0.0)
 
 
 def test_ratio_to_the_largest_rate():
@@ -117,7 +114,7 @@ def test_rows_of_a_constant_pressure():
     ledger = []
     for k in range(40):
         height = gap * (1 - 0.01 * k)
-        row = {"time": k * 1.0, "step": k, "contacts": 54 + k, "lost_rolling": 0.0, "lost_walls": 0.0}
+        row = {"time": 0.01 * k * gap / 0.1, "step": k, "contacts": 54 + k, "lost_rolling": 0.0, "lost_walls": 0.0}
         row |= {"lost_walls": -pressure * area * (gap - height), "floor_position": floor}
         ledger.append(row | {"lid_position": -(floor + height)})
     table = table_of(found, ledger, Percolation())
@@ -152,34 +149,36 @@ def test_the_cluster_that_percolates():
 
 
 class Impulses(sand.Observer):
-    """Impulse along z that the lid has received, by time."""
+    """Impulse that the lid has received, by time."""
 
     def __init__(self):
         self.found = {}
 
     def see(self, simulation, row):
-        self.found[row["time"]] = simulation.walls[1].impulse[2]
+        self.found[row["time"]] = simulation.walls[1].impulse
 
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.filterwarnings("ignore:the rate,")
-def test_stress_between_walls_is_the_impulse_of_the_lid():
+@pytest.mark.parametrize(
+    ("kind", "to", "axis", "sign"), [("compress", 0.3, 2, 1), ("stretch", 0.4, 2, -1), ("shear", 0.4, 0, -1)]
+)
+def test_stress_between_walls_is_the_impulse_of_the_lid(kind, to, axis, sign):
     """Work over way is, at constant speed, the mean force: the impulse of the grains on the lid over the time.
 
     Both are sums over the same steps, by another road: rounding alone is left.
     """
     seen = Impulses()
     body = sand.setup.rbd(12, radius="0.1 um", material="ice", seed=1)
-    found = load(body, Loading("compress", "1 m/s", 0.3, by="walls"), observers=[seen], seed=1)
-    area = found.plan.sides[0] * found.plan.sides[1]
+    found = load(body, Loading(kind, "1 m/s", to, by="walls"), observers=[seen], seed=1)
     times = [row["time"] for row in found.table]
-    impulse = np.array([seen.found[time] for time in times])
-    mean = np.diff(impulse) / np.diff(times) / area
+    impulse = np.array([seen.found[time] for time in times])[:, axis]
+    mean = sign * np.diff(impulse) / np.diff(times) / (found.plan.sides[0] * found.plan.sides[1])
     stress = np.array([row["stress"] for row in found.table[1:]])
     assert len(stress) > 5
-    assert stress == pytest.approx(mean, rel=1e-6, abs=1e-6 * np.abs(mean).max())
+    assert stress == pytest.approx(mean, rel=1e-9, abs=1e-9 * np.abs(mean).max())
     last = found.table[-1]
-    assert last["filling"] == pytest.approx(0.3, rel=1e-9, abs=0.0)
+    assert last["filling" if kind == "compress" else "strain"] == pytest.approx(to, rel=1e-9, abs=0.0)
     assert last["coordination"] == 2 * last["contacts"] / 12
     assert {"percolates_x", "percolates_y", "rate_ratio", "lost_rolling", "lost_walls"} <= last.keys()
     content = found.to_dict()
