@@ -126,11 +126,11 @@ class CellArrays(NamedTuple):
     # pressure that the rates follow, and the present running means along each axis
     goal: Annotated[np.ndarray, Array((1,), "Pa")]
     pressure: Annotated[np.ndarray, Array((3,), "Pa")]
-    # contacts before new ones formed in the present step
-    passed: Annotated[np.ndarray, Array((1,), dtype="i8", saved=False)]
-    # virial W_aa of contacts and dipoles at the end of the last step
+    # virial W_aa of contacts and dipoles when it was last summed; strain of each axis, and time, since then
     virial: Annotated[np.ndarray, Array((3,), "J")]
-    # work of the boundaries on the grains, by the deformation along each axis
+    strain: Annotated[np.ndarray, Array((3,))]
+    elapsed: Annotated[np.ndarray, Array((1,), "s")]
+    # work of the boundaries on the grains, by the deformation along each axis, up to then
     work: Annotated[np.ndarray, Array((3,), "J", summed=True)]
 
 

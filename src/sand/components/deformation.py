@@ -14,7 +14,7 @@ from ..basics.arrays import CellArrays
 from ..basics.errors import BadInput, shown
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
-from ..basics.state import CELL, State
+from ..basics.state import CELL, CONTACTS, State
 from ..basics.units import si
 from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
@@ -206,10 +206,12 @@ class DeformedBox(Component):
         """Values of the columns; the pressure is that of the present moment."""
         cell, grains = _cell_of(state), state.grains.arrays
         lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
-        virial = cell.virial + (grains.mass * grains.velocity**2).sum(axis=1)
-        found = dict(zip(self.columns(), [*lengths, 0.0, *cell.work, *virial / volume], strict=True))
-        found |= {"filling": 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume}
-        return {name: float(value) for name, value in found.items()} | {"lost_box": -math.fsum(cell.work)}
+        virial = present_virial(state)
+        work = cell.work - 0.5 * cell.strain * (cell.virial + virial)  # with that since the virial was last summed
+        pressure = (virial + (grains.mass * grains.velocity**2).sum(axis=1)) / volume
+        filling = 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume
+        values = [*lengths, filling, *work, *pressure, -math.fsum(work)]
+        return dict(zip([*self.columns(), *self.losses()], map(float, values), strict=True))
 
     def means(self, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
         """The pressure P_aa = −ΔW_a / ∫ V dL_a / L_a since the row before, from the work W_a on the grains.
@@ -232,6 +234,15 @@ class DeformedBox(Component):
     def parameters(self) -> dict[str, Any]:
         """Its table in a case file, SI."""
         return self.given.parameters()
+
+
+def present_virial(state: State) -> np.ndarray:
+    """W_aa (3,) [J] of contacts and dipoles, whose energy is a third of the trace, with the loads of a state."""
+    grains, contacts, used = state.grains.arrays, state.contacts, int(state.count[CONTACTS])
+    first, second = grains.position[:, contacts.pair[:, :used]].swapaxes(0, 1)
+    branch = state.box.nearest((first - second).T)
+    of_contacts: np.ndarray = (branch.T * contacts.force[:, :used]).sum(axis=1)
+    return of_contacts - 0.5 * float((grains.moment * grains.field).sum())
 
 
 def _cell_of(state: State) -> CellArrays:

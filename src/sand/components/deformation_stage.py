@@ -10,25 +10,26 @@ A ← A F⁻¹, is the exact flight between two kicks.  The boundaries do the wo
 
     d(K + U)/dt = −Σ A_a W_aa,    W_aa = Σ_grains m u_a² + Σ_contacts l_a f_a
 
-on the grains: the part of K, ½ Σ m u_a² (1 − F_a²) after the drift, is exact, and that of contacts is the mean of both
-ends of the step, as for all forces of velocity Verlet.
+on the grains: the part of K, ½ Σ m u_a² (1 − F_a²) after the drift, is exact.  W of contacts is summed every
+STEPS_OF_WORK steps, a sixth of the fastest contact period, and its integral is that of the trapezoidal rule, whose sum
+over periods has no error for the first harmonics of an oscillation.
 """
 
 from typing import NamedTuple
 
-from ..basics.state import CONTACTS
-from ..compiler.jit import loop, rare
+from ..basics.state import CONTACTS, STEPS
+from ..compiler.jit import loop
 from ..compiler.stage import stage
-from ..contact.transitions import PENDING_FLAG
-from ..contact.update import VIRIAL
+from ..contact.virial import contact_virial
 from ..integrate.hooks import Hook, HookStages
 from ..integrate.parts import DT, LIMIT, Stop
 from ..integrate.step_control import quantise_step
-from ..integrate.task_queue import CONTACTS_PER_BLOCK, blocks_of
-from ..numerics.vec import add, dot, load, nearest_image, sub
+from ..numerics.vec import dot, load
 
 INVERSE, RATE = 3, 6
 """First words of 1/L and A in `CellArrays.span`."""
+STEPS_OF_WORK = 4
+"""Steps between two sums of the virial of contacts, each of which takes as long as a tenth of a step."""
 LARGEST_STRAIN = 1e-3
 """Largest strain of an axis in one step; contacts and grains that approach see the flow as velocity."""
 LAWS = EXPONENTIAL, LINEAR, PRESSURE = "exponential", "linear", "pressure"
@@ -68,15 +69,16 @@ def twice_kinetic_energy(grains, a):
 
 @stage("the deformation of the box")
 def deform(grains, cell, scratch):
-    """Deform the box as the drift has moved its grains; the work of the drift, and of contacts at its start."""
+    """Deform the box as the drift has moved its grains; the work on their motion."""
     dt = scratch[DT]
     for a in range(3):
         rate = cell.span[RATE + a]
-        moved = (1.0 + 0.5 * dt * rate) * twice_kinetic_energy(grains, a)
-        cell.work[a] -= dt * rate * (moved + 0.5 * cell.virial[a])
+        cell.work[a] -= dt * rate * (1.0 + 0.5 * dt * rate) * twice_kinetic_energy(grains, a)
         cell.span[a] *= 1.0 + dt * rate
         cell.span[INVERSE + a] /= 1.0 + dt * rate
         cell.span[RATE + a] /= 1.0 + dt * rate
+        cell.strain[a] += 0.5 * dt * (rate + cell.span[RATE + a])
+    cell.elapsed[0] += dt
     return 0
 
 
@@ -98,6 +100,14 @@ def follow_pressure(grains, cell, dt, time):
 
 
 @loop
+def add_work(cell, virial):
+    """Add the work during the strain since the last sum, by the mean of its virial and the present one [J]."""
+    for a in range(3):
+        cell.work[a] -= 0.5 * cell.strain[a] * (cell.virial[a] + virial[a])
+        cell.virial[a], cell.strain[a] = virial[a], 0.0
+
+
+@loop
 def dipole_energy(grains):
     """−½ Σ μ·B [J] in the flux densities of the other grains."""
     energy = 0.0
@@ -106,64 +116,22 @@ def dipole_energy(grains):
     return energy
 
 
-@stage("the deformation of the box")
-def note_contacts(cell, count):
-    """Keep the number of contacts that the pass over contacts is going to update."""
-    cell.passed[0] = count[CONTACTS]
-    return 0
-
-
-@loop
-def _virial_of_pass(cell, passed):
-    """W_aa [J] of the contacts to which the pass has given their loads."""
-    x = y = z = 0.0
-    for b in range(blocks_of(cell.passed[0], CONTACTS_PER_BLOCK)):
-        x += passed[b, VIRIAL]
-        y += passed[b, VIRIAL + 1]
-        z += passed[b, VIRIAL + 2]
-    return x, y, z
-
-
-@rare
-def _virial_of_others(grains, contacts, count, span, known):
-    """W_aa [J] of contacts that slipped or broke after the pass, or formed: from the number `known` on."""
-    found = (0.0, 0.0, 0.0)
-    for c in range(count[CONTACTS]):
-        if c >= known or contacts.flag[c] == PENDING_FLAG:
-            i, j = contacts.pair[0, c], contacts.pair[1, c]
-            l = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-            f = load(contacts.force, c)
-            found = found[0] + l[0] * f[0], found[1] + l[1] * f[1], found[2] + l[2] * f[2]
-    return found
-
-
-@loop
-def virial_of_step(grains, contacts, cell, count, span, passed):
-    """W_aa [J] of all contacts at the end of a step, most of it from the pass over contacts, which has l and f.
-
-    `contact.virial` gives the same from positions and forces, and takes as long as a tenth of the pass.
-    """
-    pending = 0
-    for c in range(cell.passed[0]):
-        pending += 1 if contacts.flag[c] == PENDING_FLAG else 0
-    found = _virial_of_pass(cell, passed)
-    if pending > 0 or count[CONTACTS] > cell.passed[0]:
-        found = add(found, _virial_of_others(grains, contacts, count, span, cell.passed[0]))
-    return found
-
-
 @stage("the work of the box")
-def work_of_box(grains, contacts, cell, count, scratch, span, queue, parameters):
-    """The work of contacts at the end of the step, and the rates of the next one."""
-    found = virial_of_step(grains, contacts, cell, count, span, queue.passed)
-    # the energy U ∝ L⁻³ of dipoles has the trace 3U
-    of_dipoles = dipole_energy(grains) if parameters.dipoles else 0.0
-    cell.virial[0], cell.virial[1], cell.virial[2] = found[0] + of_dipoles, found[1] + of_dipoles, found[2] + of_dipoles
+def work_of_box(grains, contacts, cell, count, scratch, span, parameters):
+    """The work of contacts since it was last added up, in few steps, and the rates of the next step."""
+    due = count[STEPS] % STEPS_OF_WORK == 0 or scratch[DT] == 0.0
+    if due:
+        found = contact_virial(grains, contacts.pair, contacts.force, count[CONTACTS], span)
+        # the energy U ∝ L⁻³ of dipoles has the trace 3U
+        of_dipoles = dipole_energy(grains) if parameters.dipoles else 0.0
+        add_work(cell, (found[0] + of_dipoles, found[4] + of_dipoles, found[8] + of_dipoles))
     for a in range(3):
-        cell.work[a] -= 0.5 * scratch[DT] * cell.span[RATE + a] * cell.virial[a]
-        cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if parameters.law == 1 else 1.0)
-    if parameters.law == 2:
-        follow_pressure(grains, cell, scratch[DT], parameters.time)
+        if parameters.law != 2:
+            cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if parameters.law == 1 else 1.0)
+    if due:
+        if parameters.law == 2:
+            follow_pressure(grains, cell, cell.elapsed[0], parameters.time)
+        cell.elapsed[0] = 0.0
     return 0
 
 
@@ -172,6 +140,5 @@ def deformation_stages(numbers: DeformationNumbers) -> HookStages:
     return {
         Hook.LIMIT_STEP: [(limit_strain, numbers)],
         Hook.AFTER_DRIFT: [(deform, ())],
-        Hook.BEFORE_CONTACTS: [(note_contacts, ())],
         Hook.AFTER_KICK: [(work_of_box, numbers)],
     }

@@ -22,9 +22,7 @@ import numpy as np
 from ..basics.arrays import CONTACTS_AT_ONCE
 from ..basics.state import CONTACT_LIMIT, CONTACTS, SLIPPED
 from ..compiler.jit import COMPILED, loop, rare
-from ..numerics.flow import unless_still
 from ..numerics.simd import float_bits, float_from_bits, round_up_to_simd_width
-from ..numerics.vec import add
 from . import tangential
 from .constants_table import FASTEST_MODE, column_loops, uniform_contacts
 from .damping import NONE, Held, damping_loops, store_loads
@@ -33,7 +31,7 @@ from .losses import add_damping_energies, add_slip_energies
 from .mechanics import contact_load, displacements_of, load_of_springs, scaled_stiffness
 from .pair_types import pair_type_count
 from .poses import nearest_separation, pose_at, pose_at_step_end, separation_of
-from .slip_rules import Reached, flag_contact, kept_loop, roll_contact, select, slip_contact
+from .slip_rules import Reached, flag_contact, kept_loop, roll_contact, slip_contact
 from .transitions import PENDING_FLAG, SLIPPED_FLAG
 
 BLOCK_SIZE = np.uint64(CONTACTS_AT_ONCE)
@@ -42,8 +40,6 @@ SLIP_FRACTION = 0.1
 """Fraction of a block's contacts beyond a limit in the last step, above which contacts slip in the loop."""
 OTHER_FRACTION = 0.05
 """Fraction of them that did not only slip in rolling, above which contacts slip in any mode."""
-VIRIAL = 10
-"""Index of the first number of the virial in `ContactSums`."""
 MIN_REMAINDER = 4
 """Remaining contacts from which a padded SIMD vector is faster than a scalar loop."""
 
@@ -88,16 +84,6 @@ class ContactSums(NamedTuple):
     damped_rolling: float
     damped_twisting: float
     deepest: float  # largest overlap, in radii of the smaller grain; 0 if no grains overlap
-    virial_x: float  # Σ l_a f_a [J] of contacts that have their loads, in a box that is deformed; 0 in others
-    virial_y: float
-    virial_z: float
-
-
-@unless_still(lambda n, distance, force, counts, span: (0.0, 0.0, 0.0))
-def virial_in_step(n, distance, force, counts, span):
-    """l_a f_a [J] of a contact with l = distance n [m] and f [N], if it counts; 0 in a box that keeps its shape."""
-    virial = distance * n[0] * force[0], distance * n[1] * force[1], distance * n[2] * force[2]
-    return select(counts, virial, (0.0, 0.0, 0.0))  # padding columns hold no numbers
 
 
 @functools.cache
@@ -130,7 +116,6 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
         pending = slipped = 0
         slid = rolled = twisted = 0.0
         damped1 = damped2 = damped3 = damped4 = 0.0
-        virial = (0.0, 0.0, 0.0)
         deepest = float_bits(0.0)  # the bits of a negative number are below 0
         for k in range(part.last - part.first):
             c = part.first + k
@@ -154,7 +139,6 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             damped2 += dissipated[1]
             damped3 += dissipated[2]
             damped4 += dissipated[3]
-            virial = add(virial, virial_in_step(pose.n, pose.distance, loads[0], active, step.span))
             contacts.twist[c] = pose.twist
             store_loads(contacts, c, loads)
             contacts.flag[c] = flag
@@ -166,7 +150,7 @@ def contact_loop(law: ContactLaw, handle_limits: Callable, variant: PassVariant)
             twisted += lost[2] if used else 0.0
         return ContactSums(
             float(pending), float(slipped), slid, rolled, twisted, damped1, damped2, damped3, damped4,
-            float_from_bits(deepest), virial[0], virial[1], virial[2],
+            float_from_bits(deepest),
         )  # fmt: skip
 
     return update_contacts
@@ -199,7 +183,6 @@ def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
         """
         pending = slipped = slid = rolled = twisted = deepest = 0.0
         damped1 = damped2 = damped3 = damped4 = 0.0
-        virial = (0.0, 0.0, 0.0)
         for b in range((last - first + BLOCK_SIZE - np.uint64(1)) // BLOCK_SIZE):
             begin = first + b * BLOCK_SIZE
             end = begin + BLOCK_SIZE if begin + BLOCK_SIZE < last else last
@@ -229,11 +212,7 @@ def contact_pass_loop(law: ContactLaw, variant: PassVariant) -> Callable:
             damped3 += part.damped_rolling
             damped4 += part.damped_twisting
             deepest = max(deepest, part.deepest)
-            virial = add(virial, (part.virial_x, part.virial_y, part.virial_z))
-        return ContactSums(
-            pending, slipped, slid, rolled, twisted, damped1, damped2, damped3, damped4, deepest, virial[0], virial[1],
-            virial[2],
-        )  # fmt: skip
+        return ContactSums(pending, slipped, slid, rolled, twisted, damped1, damped2, damped3, damped4, deepest)
 
     return contact_pass
 
@@ -248,7 +227,7 @@ def log_contact_sums(count, lost, sums):
 
 @loop
 def store_contact_sums(rows, b, sums):
-    """Store the sums of a pass in row b of a (B, ≥ 13) array."""
+    """Store the sums of a pass in row b of a (B, ≥ 10) array."""
     for k in range(len(sums)):
         rows[b, k] = sums[k]
 
@@ -258,7 +237,7 @@ def load_contact_sums(rows, b):
     """Sums stored in row b by `store_contact_sums`."""
     return ContactSums(
         rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4], rows[b, 5], rows[b, 6], rows[b, 7], rows[b, 8],
-        rows[b, 9], rows[b, 10], rows[b, 11], rows[b, 12],
+        rows[b, 9],
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from sand.contact.poses import displacements_before, pose_at, twist_increment
 from sand.contact.slip_rules import ROLL, STEP_KEPT
 from sand.contact.tangential import pointers_for
 from sand.contact.transitions import BROKEN_FLAG, PENDING_FLAG, SLID_FLAG, SLIPPED_FLAG
-from sand.contact.update import PassVariant, PresentStep, load_contact_sums, log_contact_sums, single_contact_loop
+from sand.contact.update import ContactSums, PassVariant, PresentStep, log_contact_sums, single_contact_loop
 from sand.integrate.motion import drift_for
 from sand.integrate.parts import ContactParameters
 from sand.integrate.stages import StageNumber, contact_event_stages, contact_pass_stage
@@ -54,7 +54,7 @@ def pass_and_update(variant):
         table = table_of(grains=grains, contacts=contacts, pair_list=near, **given)
         for block in range(len(queue.passed)):
             contact_pass.run(table, (), block)
-            passed = load_contact_sums(queue.passed, block)
+            passed = ContactSums(*queue.passed[block, : len(ContactSums._fields)])
             log_contact_sums(count, lost, passed)
             pending += passed.pending
         update.run(table)
