@@ -19,12 +19,13 @@ from .basics.paths import user_path
 from .basics.units import format_quantity, si
 from .config.build import simulation_from
 from .config.case import read_case
+from .config.folders import without_run
 from .io import run_folder as files
 from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.optics import Optics
-from .io.sweep_files import DONE, LAST, RUNS, STATE, read_sweep
+from .io.sweep_files import DONE, LAST, STATE, read_sweep
 from .io.trajectory import Frame, Frames
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -59,20 +60,7 @@ class Run:
         if not self.folder.is_dir():
             raise BadInput(f"there is no folder {folder}")
         if not (self.folder / files.TRAJECTORY).exists():
-            if any((self.folder / name).exists() for name in (files.COLLISION, files.OUTCOMES)):
-                raise BadInput(
-                    f"{folder} holds many collisions, which keep no trajectories; for the frames of one give its seed "
-                    "and a folder: sand collide CASE.toml --seeds SEED --out DIR"
-                )
-            if any((self.folder / name).exists() for name in (files.SCATTERING, files.FLIGHTS)):
-                raise BadInput(f"{folder} holds a job of sand scatter, which keeps no trajectories of grains")
-            if any(self.folder.glob("seed-*")):
-                raise BadInput(f"{folder} holds runs of several seeds; give the folder of one of them, such as seed-1")
-            if (self.folder / RUNS).is_dir():
-                raise BadInput(f"{folder} holds a sweep, none of whose runs has ended")
-            if (self.folder / files.CASE).exists():
-                raise BadInput(f"{folder} has no {files.TRAJECTORY} yet; wait until its run has written a frame")
-            raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")
+            raise BadInput(without_run(self.folder))
 
     @cached_property
     def frames(self) -> Frames:
@@ -335,7 +323,7 @@ class Sweep:
     def __init__(self, folder: str | Path):
         self.folder = user_path(folder)
         if not (self.folder / files.SWEEP_CSV).exists():
-            raise BadInput(f"{folder} is not the folder of a sweep, or none of its runs has ended")
+            raise BadInput(f"{folder} is not the folder of a sweep, or its table is not written yet")
 
     @cached_property
     def table(self) -> Columns:
@@ -371,7 +359,7 @@ class Sweep:
     @checked
     def run(self, row: int) -> Run:
         """The run of a row of the table.  Raises BadInput if the sweep keeps no files of its runs."""
-        return Run(self.folder / RUNS / str(self.table["run"][row]))
+        return Run(self.folder / files.RUNS / str(self.table["run"][row]))
 
     def to_pandas(self) -> Any:
         """Convert the table to a pandas DataFrame; needs pandas."""

@@ -22,7 +22,12 @@ CAPABILITIES = {
     "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 1274,
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
-    "packings that are compressed, stretched, sheared (sand compress, stretch, shear): laws, runs, tables": 940,
+    "packings that are compressed, stretched, sheared (sand compress, stretch, shear): laws, runs, tables": 929,
+    "undecided collisions and unfit ends, maps of outcomes, what a folder holds in words, all runs of an unfinished "
+    "sweep, values given twice": 267,
+    "signals that wait while code is compiled, linked or loaded": 28,
+    "a periodic box that is deformed: rates, ramps and pressures that it follows, work of its boundaries, dipoles of all "
+    "images in it": 484,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
     "grains in frames, pictures and page": 488,

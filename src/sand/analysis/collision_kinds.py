@@ -11,7 +11,10 @@ from ..basics.errors import BadInput, shown
 
 __all__ = ["KINDS", "collision_kind", "fragment_numbers", "growth_efficiency"]
 
+UNDECIDED = "undecided"
+"""Kind, and outcome, of a collision that ended before the bodies touched, or could not touch any more."""
 KINDS = {
+    UNDECIDED: "no contact formed until the end, but one still may",
     "miss": "no contact formed",
     "bouncing": "two bodies with the same masses as before",
     "sticking": "one body, few of whose contacts changed",
@@ -49,13 +52,14 @@ def growth_efficiency(first: float, second: float, largest: float) -> float:
 
 @checked
 def collision_kind(
-    first: float, second: float, fragments: Sequence[float], changed: float, *, touched: bool = True
+    first: float, second: float, fragments: Sequence[float], changed: float, *, touched: bool | None = True
 ) -> str:
     """Kind of an outcome, one of `KINDS`.
 
     With the masses M_t ≥ M_p of target and projectile, M = M_t + M_p, M_1 ≥ M_2 of the two largest fragments, and
     ε = 0.05 M_p, a mass that is neglected, it is the first of these whose definition holds:
 
+        undecided      no contact formed until the end, but one still may
         miss           no contact formed
         sticking       M_1 ≥ M − ε, and at most a tenth of the contacts changed
         restructuring  M_1 ≥ M − ε, and more changed
@@ -72,14 +76,14 @@ def collision_kind(
         Masses of all fragments, in any order and the same unit.
     changed : float
         Number of contacts that formed or broke, without the first one, over that before; 0 if there were none.
-    touched : bool, optional
-        Whether any contact formed.
+    touched : bool or None, optional
+        Whether any contact formed; None: not until the end, but one still may.
     """
     target, projectile = max(first, second), min(first, second)
     few, total = NEGLIGIBLE * projectile, target + projectile
     largest, other = sorted([*fragments, 0.0], reverse=True)[:2]
     if not touched:
-        return "miss"
+        return UNDECIDED if touched is None else "miss"
     if largest >= total - few:
         return "sticking" if changed <= CHANGED else "restructuring"
     if abs(largest - target) <= few and abs(other - projectile) <= few:

@@ -7,6 +7,7 @@ import importlib
 import re
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -14,6 +15,8 @@ LONGEST = 80
 """Characters of a value that a message shows."""
 MOST_ERRORS = 100
 """Errors of one input that are described; the others are counted."""
+MOST_NAMED = 5
+"""Values that a message lists."""
 LONGEST_WORD, LONGEST_LINE = 300, 1500
 """Characters of a word, which may be a path, and of a line of a message; the middle of longer ones is cut."""
 
@@ -181,3 +184,12 @@ def warn(text: str) -> None:
     while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "sand":
         frame, depth = frame.f_back, depth + 1
     warnings.warn(text, stacklevel=depth)
+
+
+def each_once(values: Sequence[Any], name: str) -> list[Any]:
+    """The values without repetitions, the first few of which a warning names."""
+    number = Counter(values)
+    if again := [one for one, times in number.items() if times > 1]:
+        more = ", …" if len(again) > MOST_NAMED else ""
+        warn(f"{name}: {', '.join(map(shown, again[:MOST_NAMED]))}{more} given more than once; each is used once")
+    return list(number)

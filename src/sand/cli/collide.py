@@ -71,8 +71,8 @@ def _collision(r: dict[str, Any]) -> str:
         energy = r["impact_energy"] / sum(r["grains_before"])
         scales = " and ".join(f"{energy / r[f'{name}_energy']:.2g} E_{name}" for name in ("roll", "break"))
         pieces += f"; {r['kind']}, f = {r['growth_efficiency']:.2f}; impact energy per grain {scales}"
-    if r["outcome"] == "miss" and r.get("end"):
-        return f"miss{unfinished}: no contact formed; {r['end']}; drift {r['drift']:.1e}"
+    if r["outcome"] in ("miss", "undecided") and r.get("end"):
+        return f"{r['outcome']}: no contact formed; {r['end']}; drift {r['drift']:.1e}"
     return (
         f"{r['outcome']}{unfinished}: {pieces}; {events}; lost {lost:.2g} of the impact energy; drift {r['drift']:.1e}"
     )

@@ -12,6 +12,7 @@ import click
 
 from ..basics.errors import BadInput
 from ..config.commands import command_for
+from ..config.folders import job_in
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
@@ -92,7 +93,7 @@ def describe_folder(path: Path) -> Description:
         if (path / name).exists() and (job := _describe_results(path / name, files.read_json(path / name))):
             heading, rows, content = job
             return heading, [*rows, listed], {**content, "folder": str(path)}
-    job_command, case, begun = report.job_in(path)
+    job_command, case, begun = job_in(path)
     if job_command in JOBS:
         return _describe_job(path, job_command, case, begun, [listed])
     return _describe_run(path, listed)
@@ -149,14 +150,13 @@ def _planned_end(case: Path) -> tuple[float | None, str | None]:
 def _describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: report.Rows) -> Description:
     """Describe an unfinished job, or the boxes of `sand grow`."""
     name, kind = JOBS[job_command]
+    name = "a collision" if case.name == files.ONE_COLLISION else name
     content: dict[str, Any] = {"kind": kind, "folder": str(path), "finished": False}
     if not begun:
         start = ("run it with", f"sand {job_command} {shlex.quote(str(case))}")
         return name, [("state", "not started"), *rows, start], content
     if job_command == "sweep":
-        from ..io.sweep_files import ROW, RUNS
-
-        rows.append(("ended", f"{sum(1 for _ in path.glob(f'{RUNS}/*/{ROW}'))} runs"))
+        rows.append(("ended", f"{sum(1 for _ in path.glob(f'{files.RUNS}/*/{files.ROW}'))} runs"))
         if (path / files.SWEEP).exists():
             found = files.read_json(path / files.SWEEP)
             numbers = f"{found['done']} of {found['runs']} done, {found['failed']} failed"
@@ -442,6 +442,7 @@ def _describe_results(path: Path, content: dict[str, Any]) -> Description | None
             (name, kind), rows = JOBS["scatter"], [("job", content["job"]), *result_rows(content)]
         elif "collisions" in content:
             (name, kind), rows = JOBS["collide"], collision_rows(content["collisions"])
+            name = "a collision" if len(content["collisions"]) == 1 else name
         elif "loading" in content:
             (name, kind), rows = JOBS[content["loading"]], run_rows(content["runs"])
         else:

@@ -12,9 +12,10 @@ from ..basics.errors import BadInput, FilesFailed, Interrupted
 from ..basics.units import format_quantity
 from ..config.case import with_absolute_files
 from ..config.commands import BODIES
+from ..config.folders import content_of
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import LOCK, refuse_locked
-from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
+from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml, refuse_sweep
 from ..simulation.outcome import Outcome, Result
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS, WALL_TIME
@@ -174,10 +175,11 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         refuse_locked(folder)
     if not is_used(folder):
         return
+    refuse_sweep(folder)
     if not overwrite:
-        advice = "give another one with --out, or --overwrite to replace the run in it"
+        advice = "give another one with --out, or --overwrite to replace what is in it"
         if report.is_resumable(folder):
-            advice += f"; or continue that run: {report.resume_line(folder)}"
+            advice += f", {content_of(folder)}; or continue it: {report.resume_line(folder)}"
         raise BadInput(f"folder {folder} exists and is not empty; {advice}")
     replaced = [folder / name for name in OWN_FILES if (folder / name).exists()]
     if any(path.samefile(case) for path in replaced):

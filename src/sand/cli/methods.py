@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
-from ..config.commands import command_for
+from ..config.folders import job_in
 from ..io import run_folder as files
 from . import options, parsing, report
 from .references import ARTICLES, bibtex, software
@@ -67,7 +67,7 @@ def described(folder: Path) -> tuple[dict[str, Any], list[str]]:
     """
     if not folder.is_dir():
         raise BadInput(f"there is no folder {folder}")
-    kind, case, begun = report.job_in(folder)
+    kind, case, begun = job_in(folder)
     if kind not in KINDS or not begun:
         known = ", ".join(map(str, KINDS))
         raise BadInput(f"{folder} holds nothing that was computed by sand {known}; give the folder of a run or job")
@@ -144,7 +144,7 @@ def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     for name, components in case.components().items():
         for one in components if isinstance(components, list) else [components] * (components is not None):
             yield f"A part of the simulation, {name}, had: {settings(one)}."
-    yield f"The end was {section(case.run, 'out', 'seed', 'frame_every', 'row_every', 'checkpoint_every')}."
+    yield f"The end was {section(case.run, 'out', 'seed', 'frame_every', 'row_every', 'checkpoint_every', 'stress')}."
 
 
 def _radii(folder: Path) -> str:
@@ -253,28 +253,29 @@ MOST_VALUES = 12
 
 
 def _of_sweep(folder: Path, path: Path) -> Sentences:
-    from ..experiments.sweep_cases import CASES
-    from ..io.sweep_files import DONE, STATE, read_sweep
+    from ..experiments.sweep_job import SweepJob
+    from ..io.sweep_files import DONE, FAILED, cell_of
     from .method_text import value_text
 
-    content = files.read_toml(path)
-    del content["sweep"]
-    command = command_for(content) or ""
-    if command not in CASES:
-        raise BadInput(f"{path} is no case that a sweep can vary")
-    swept = CASES[command](content, str(path))
-    if (folder / files.SWEEP_CSV).exists():
-        table = read_sweep(folder)
-        names = list(table)
-        varied = {name: list(dict.fromkeys(table[name].tolist())) for name in names[: names.index("seed") + 1]}
-        texts = [
-            f"{name} = {value_text(values)}" if len(values) <= MOST_VALUES else f"{name} of {len(values)} values"
-            for name, values in varied.items()
-        ]
-        done = f"{int((table[STATE] == DONE).sum())} of {len(table[STATE])} runs"
-        yield f"A sweep of {swept.NAME} varied {', '.join(texts)} (SI units); {done} were done."
-    else:
-        yield f"No run of a sweep of {swept.NAME} has ended."
+    job = SweepJob(path, folder, resume=True)
+    command, swept, rows = job.command, job.kind(job.content, str(path)), job.all_rows()
+    varied: dict[str, dict[Any, None]] = {}
+    for values, seed, _ in rows.values():
+        for key, value in (values | {"seed": seed}).items():
+            if value == value and value != "":  # rows without the key have an empty cell
+                varied.setdefault(key, {})[cell_of(value)] = None
+    varied["seed"] = varied.pop("seed")
+    texts = []
+    for name, found in varied.items():
+        ordered = list(found) if any(isinstance(value, str) for value in found) else sorted(found)
+        several = f"{name} of {len(found)} values"
+        texts.append(f"{name} = {value_text(ordered)}" if len(found) <= MOST_VALUES else several)
+    states = [state for *_, state in rows.values()]
+    counts = [
+        f"{number} {what}" for what, state in (("failed", FAILED), ("left", "")) if (number := states.count(state))
+    ]
+    done = ", ".join([f"{states.count(DONE)} of {len(states)} runs are done", *counts])
+    yield f"A sweep of {swept.NAME} varied {', '.join(texts)} (SI units); {done}."
     yield "All else, and values that are not varied, are those of this case:"
     if command in ("collide", "sequence"):
         yield from _collision(swept.case, {})

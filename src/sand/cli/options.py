@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ..basics.arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, each_once
 from ..basics.paths import checked_name
 
 
@@ -163,7 +163,7 @@ def read_seeds(_context: click.Context, _option: click.Parameter, text: str | No
         found += range(int(ends[0]), int(ends[1]) + 1)
     if not found:
         raise BadInput(f"--seeds {text!r} names no seed: the first number must not be above the last")
-    return list(dict.fromkeys(found))
+    return each_once(found, "--seeds")
 
 
 def _frames(_context: click.Context, _option: click.Parameter, text: str) -> slice:

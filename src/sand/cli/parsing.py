@@ -87,12 +87,12 @@ class Command(click.Command):
 
     def _swallowed(self, values: Mapping[str, Any]) -> dict[str, str]:
         """Errors, by parameter, of options that took the next option as their value, as in `--out --overwrite`."""
-        names = {name for param in self.params for name in (*param.opts, *param.secondary_opts)}
+        given = [param for param in self.params if isinstance(param, click.Option)]
+        names = {name for param in given for name in (*param.opts, *param.secondary_opts)}
         return {
             str(param.name): f"Option {param.opts[0]!r} requires an argument"
-            for param in self.params
-            if isinstance(param, click.Option) and isinstance(values.get(str(param.name)), str)
-            if values[str(param.name)] in names
+            for param in given
+            if isinstance(values.get(str(param.name)), str) and values[str(param.name)] in names
         }
 
     def _errors(self, ctx: click.Context, words: list[str]) -> tuple[list[str], list[str]]:

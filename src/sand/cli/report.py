@@ -17,10 +17,11 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput, FilesFailed
-from ..config.commands import command_for
+from ..basics.wall_time import format_wall_time
+from ..config.folders import job_in
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import TEMPERATURES
-from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, TRAJECTORY, is_job, plain, read_toml
+from ..io.run_folder import CASE, OWN_FILES, TRAJECTORY, plain, read_toml
 
 Rows = list[tuple[str, str]]
 """Labels and texts of a table of two columns."""
@@ -140,14 +141,6 @@ def is_resumable(folder: Path) -> bool:
     except BadInput:
         return False
     return begun and command not in (None, "run")
-
-
-def job_in(folder: Path) -> tuple[str | None, Path, bool]:
-    """Command and case file of the run or job in a folder, and whether it has begun.  Raises BadInput."""
-    one = folder / ONE_COLLISION  # then case.toml is the case of the simulation
-    case = one if one.exists() else folder / CASE
-    command = command_for(read_toml(case)) if case.exists() else None
-    return command, case, command is not None and is_job(folder, case)
 
 
 def files_of(folder: Path) -> list[str]:
@@ -375,16 +368,6 @@ def temperatures(row: dict[str, Any]) -> Rows:
         return []
     translation, rotation, median = (f"{value:.3g} K" for value in found)
     return [("bodies", f"translation {translation}, rotation {rotation} (median {median})")]
-
-
-def format_wall_time(seconds: float) -> str:
-    """Wall time for people: '5.6 s', '12 min 05 s', '3 h 07 min'."""
-    if seconds < 60.0:
-        return f"{seconds:.3g} s"
-    whole = round(seconds)
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
 def format_bytes(number: float) -> str:

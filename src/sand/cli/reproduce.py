@@ -64,9 +64,10 @@ def comparison_rows(content: dict[str, Any]) -> report.Rows:
     """Each result of the paper beside that of SAND, and where the files are."""
     rows = [
         (one["what"], ": ".join(text for text in (f"{one['ours']}; paper: {one['paper']}", one["verdict"]) if text))
-        if one["paper"]
+        if one["paper"] and "note" not in content
         else (one["what"], one["ours"])
         for one in content["comparison"]
     ]
     done = f"{content['rows']} of {content['design']}, {content['cpu_seconds'] / 3600.0:.2g} core-hours"
-    return [("rows", done), *rows, ("files", f"{content['folder']}/results/")]
+    noted = [("note", content["note"])] if "note" in content else []
+    return [("rows", done), *rows, *noted, ("files", f"{content['folder']}/results/")]

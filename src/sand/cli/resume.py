@@ -12,6 +12,7 @@ import click
 
 from ..basics.errors import BadInput
 from ..basics.threads import set_threads
+from ..config.folders import content_of, job_in
 from ..io.run_folder import CASE, COLLISION, GROWTH, LABORATORY, SCATTERING, SUMMARY, SWEEP, SWEEP_CSV, read_json
 from . import options, parsing, report
 from .collide import collide
@@ -61,7 +62,7 @@ def command(
     kind, case = _kind(place)
     if kind != "run":
         if until is not None:
-            raise BadInput(f"--until applies to runs; {folder} holds a job of `sand {kind}`")
+            raise BadInput(f"--until applies to runs; {folder} holds {content_of(place)}")
         if scheduler is not None and kind == "collide":
             raise BadInput("--scheduler applies to jobs of `sand scatter`, `sand grow` and `sand sweep`; use --workers")
         how = {"workers": workers, "scheduler": scheduler, "threads": threads, "wall_time": wall_time}
@@ -75,7 +76,7 @@ def _kind(folder: Path) -> tuple[str, Path]:
     """The command that created the content of a folder, and its case file.  Raises BadInput if it is a file."""
     if folder.is_file():
         raise BadInput(f"{folder} is a file; give the folder of a run")
-    kind, case, begun = report.job_in(folder)
+    kind, case, begun = job_in(folder)
     if kind not in (None, "run") and not begun:
         raise BadInput(
             f"{folder} is not the folder of a run or job: {case.name} in it is a case file; "

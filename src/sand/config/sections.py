@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from ..basics.arguments import MOST_SEED
-from ..basics.errors import did_you_mean
+from ..basics.errors import did_you_mean, each_once
 from ..basics.grains import moment_size
 from ..basics.paths import checked_name
 from ..basics.settings import For, List, Reading, Setting, Whole
@@ -121,9 +121,19 @@ PathName = Annotated[str, AfterValidator(lambda value, info: checked_name(value,
 """Name of a file or folder."""
 Moment = Annotated[Any, Reading(_checked_moment)]
 """A magnetic moment, absolute or per mass; stays as given."""
+
+
+class _Seeds(List):
+    """A list of seeds, each of which is used once."""
+
+    def read(self, value: Any, name: str) -> tuple[Any, ...]:
+        """The seeds."""
+        return tuple(each_once(super().read(value, name), name))
+
+
 Seed = Annotated[int, Whole(0, MOST_SEED)]
 """Seed of random numbers."""
-Seeds = Annotated[list[int], List(Whole(0, MOST_SEED), "seeds, such as [1, 2]")]
+Seeds = Annotated[list[int], _Seeds(Whole(0, MOST_SEED), "seeds, such as [1, 2]")]
 """Seeds of random numbers, at least one."""
 
 

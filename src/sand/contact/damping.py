@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiler.jit import formula, loop
-from ..numerics.flow import relative_velocity
+from ..numerics.flow import with_flow
 from ..numerics.random import LOW_WORD, WORD_BITS, philox, uniform
 from ..numerics.vec import add, axpy, cross, dot, load, put, scale, sub
 from .losses import DAMPING_ROW, add_damping_energies
@@ -255,9 +255,10 @@ def surfaces_of_pair(grains, contacts, c, held, span):
     """The two sides of contact c between grains; `held` has its pose and constants, `span` is the box."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     share, pose = held.constants.derived.radius1 * held.constants.derived.inverse_sum, held.pose
+    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))  # before the spins: the order changes last bits
     w1, w2 = load(grains.spin, i), load(grains.spin, j)
     separation = scale(pose.distance, pose.n)
-    velocity = relative_velocity(grains, i, j, separation, span)
+    velocity = with_flow(velocity, separation, span)
     rolling = surface_rotation(w1, w2, share)
     motion = relative_motion(separation, velocity, rolling, w1, w2)
     return Surfaces(share, velocity, separation, rolling, motion, (grains.id[i], grains.id[j]))

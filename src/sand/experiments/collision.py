@@ -14,21 +14,22 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..basics.arguments import MOST_STEPS, checked
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, warn
 from ..basics.grains import Grains
 from ..basics.paths import user_path
 from ..basics.settings import Reading, Settings, Whole
 from ..basics.state import BROKEN, CHANGED, MADE, SLID, SLIPPED
-from ..basics.units import is_word, seed_given, si
+from ..basics.units import format_quantity, is_word, seed_given, si
+from ..basics.wall_time import format_wall_time
 from ..config.build import resume
 from ..contact.model import Contact
 from ..forces.base import Force
-from ..integrate.integrator import Integrator, moves_bodies
+from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
 from ..simulation.cadence import FRAMES, duration
-from ..simulation.condition import EVERY, GIVEN
+from ..simulation.condition import GIVEN, OwnCondition
 from ..simulation.serialise import changed_tables
 from ..simulation.simulation import Simulation
 from .collision_outcome import Approach, Collision, classify_collision, collision_title
@@ -41,8 +42,8 @@ LONGEST = 4000.0
 """Longest time of a collision after the earliest contact, in the same units."""
 USUAL = 600.0
 """Time after the earliest contact at which a collision usually ends, in the same units."""
-LOOK_EVERY = 10
-"""Checks of the condition of a run, every `EVERY` regular steps, between two looks whether a collision has ended."""
+LOOK_EVERY = 1000
+"""Regular steps between two looks whether a collision has ended; with rigid clusters one."""
 ENDS = ("outcome", "rest")
 """Words for the end of a collision."""
 
@@ -123,7 +124,7 @@ def collide(
     """
     ending = Ending(end, frames)
     start = approach(target, projectile, speed=speed, impact_parameter=impact_parameter, along=along, seed=seed)
-    simulation = prepare(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
+    simulation = prepare(start, forces, stepping, ending, out=out, overwrite=overwrite, observers=observers)
     return run_to_end(start, simulation, ending), simulation
 
 
@@ -140,15 +141,38 @@ def approach(
 
 
 def prepare(
-    start: Approach, forces: Sequence[Force] | None = None, stepping: Integrator | None = None, **options: Any
+    start: Approach,
+    forces: Sequence[Force] | None = None,
+    stepping: Integrator | None = None,
+    ending: Ending | None = None,
+    **options: Any,
 ) -> Simulation:
-    """Set up the simulation of a collision; options are those of `Simulation`. Raises BadInput."""
-    return Simulation(
-        start.grains,
-        [Contact()] if forces is None else forces,
-        stepping=stepping,
-        seed=start.seed,
-        **options,
+    """Set up the simulation of a collision; options are those of `Simulation`. Raises BadInput.
+
+    Warns if it ends, by `ending`, before the outcome can be decided, or long after that.
+    """
+    given = [Contact()] if forces is None else forces
+    simulation = Simulation(start.grains, given, stepping=stepping, seed=start.seed, **options)
+    if ending is not None and (text := _unfit_end(start, simulation, ending)):
+        warn(text)
+    return simulation
+
+
+def _unfit_end(start: Approach, simulation: Simulation, ending: Ending) -> str:
+    """Why a time at which a collision ends is too early or too late; "" if it is neither, or no time."""
+    latest, usual = latest_end(start), expected_end(start)
+    if ending.end in ENDS or start.flight <= ending.end <= latest:
+        return ""
+    end, contact, decided, last = (format_quantity(t, "s") for t in (ending.end, start.flight, usual, latest))
+    if ending.end < start.flight:
+        return f"end = {end} is before the earliest possible contact, at {contact}: the outcome will be undecided"
+    cost, enough = (simulation.expected_cost(time) for time in (ending.end, usual))
+    takes, less = (
+        f"about {each.steps:.2g} steps and {format_wall_time(float(f'{each.seconds:.2g}'))}" for each in (cost, enough)
+    )
+    return (
+        f"end = {end} takes {takes}; outcomes are usually decided at {decided}, after {less}, and end = 'outcome' ends "
+        f"the collision then, at {last} at the latest"
     )
 
 
@@ -224,13 +248,8 @@ def _run(simulation: Simulation, start: Approach, ending: Ending) -> str:
     The end depends on regular states alone, at regular steps, and so neither on output nor on interruptions. The
     interval of frames is that of `Ending.frames` up to the expected end, and doubles whenever the time has doubled.
     """
-
-    def has_ended(simulation: Simulation) -> bool:
-        # a check is at the end of the cycle of r-RESPA in which a multiple of EVERY lies
-        is_due = moves_bodies(simulation.stepping) or simulation.steps % (EVERY * LOOK_EVERY) < EVERY
-        return is_due and bool(why_ended(simulation, start, ending))
-
-    condition = has_ended if ending.end in ENDS else None
+    looks = OwnCondition(lambda now: bool(why_ended(now, start, ending)), LOOK_EVERY)
+    condition = looks if ending.end in ENDS else None
     part, last = expected_end(start, ending), latest_end(start, ending)
     every = part / ending.frames
     while simulation.met_condition != GIVEN and simulation.time < last:
@@ -249,17 +268,18 @@ def why_ended(simulation: Simulation, start: Approach, ending: Ending = Ending()
     state, time = simulation.regular_state, simulation.time
     if time < start.flight:  # the earliest contact
         return ""
-    made, touched = state.count[MADE], state.count[[MADE, BROKEN, SLIPPED]].any()
+    made, changed = state.count[MADE], state.count[[MADE, BROKEN, SLIPPED]].any()
     across = float(np.ptp(start.grains.position, axis=0).max())
     last = float(max(state.clock[CHANGED], state.clock[SLID])) if made else start.flight + across / start.speed
     is_at_rest, is_bounded = time - last >= QUIET * start.unit_of_time, has_bound(simulation)
-    if is_at_rest and (ending.end == "rest" or not is_bounded):
-        return "contacts no longer change"
-    if not is_bounded or (ending.end == "rest" and touched):
-        return ""
+    if made and (ending.end == "rest" or not is_bounded):
+        return "contacts no longer change" if is_at_rest else ""
+    if not is_bounded:
+        parted = is_at_rest and start.has_parted(simulation.grains)
+        return "the bodies recede, and are farther apart than at the start" if parted else ""
     labels = cluster_labels(len(start.grains), simulation.contacts["pair"])
     apart = cannot_touch(simulation, labels)
-    if not (apart and touched):
+    if not (apart and changed):
         return apart
     holds = is_at_rest if forces_at_distance(simulation) else are_settled(simulation, labels)
     text = "the fragments are apart and hold together" if labels.any() else "one body is left and holds together"

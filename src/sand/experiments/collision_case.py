@@ -156,7 +156,7 @@ class CollisionCase(Section):
         BadInput
             If there are errors.
         """
-        return prepare(self.approach(self.impact.seeds[0]), *self.physics())
+        return prepare(self.approach(self.impact.seeds[0]), *self.physics(), self.ending())
 
     def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
         """Simulate one collision; options are those of `Simulation`. Raises BadInput."""

@@ -78,7 +78,9 @@ class CollisionJob(Job):
         else:  # without a checkpoint there is nothing to resume
             replace = self.overwrite or self.resume
             simulation = self._with_case_name(
-                lambda: prepare(start, *physics, out=self.folder, overwrite=replace, observers=observers)
+                lambda: prepare(
+                    start, *physics, self.case.ending(), out=self.folder, overwrite=replace, observers=observers
+                )
             )
             self.describe(ONE_COLLISION)
         return run_to_end(start, simulation, self.case.ending()).to_dict()

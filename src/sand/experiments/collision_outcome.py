@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
-from ..analysis.collision_kinds import collision_kind, growth_efficiency
+from ..analysis.collision_kinds import UNDECIDED, collision_kind, growth_efficiency
 from ..analysis.quantities import material_names
 from ..analysis.shape import coordination, filling_factor, gyration_radius
 from ..basics.box import Box
@@ -21,7 +21,13 @@ from ..setup.encounters import outer_radius
 from ..simulation.simulation import Simulation
 from .settled import strength_of
 
-ENDS = {"stick": "they stick", "bounce": "they bounce", "fragment": "they break up", "miss": "they miss"}
+ENDS = {
+    "stick": "they stick",
+    "bounce": "they bounce",
+    "fragment": "they break up",
+    "miss": "they miss",
+    UNDECIDED: "no contact yet",
+}
 """Outcomes in words."""
 ROUNDING = 1e-15
 """Impact parameter [m] below which it is one of rounding."""
@@ -40,13 +46,25 @@ class Approach(NamedTuple):
     @property
     def impact_parameter(self) -> float:
         """Distance of the centres of mass perpendicular to the flight [m]."""
-        first = len(self.target)
-        parts = [slice(first), slice(first, None)]
-        centres = [np.average(self.grains.position[p], axis=0, weights=self.grains.mass[p]) for p in parts]
-        offset = centres[1] - centres[0]
+        offset, _ = self._apart(self.grains)
         flight = self.grains.velocity[-1] - self.grains.velocity[0]
         flight = flight / np.linalg.norm(flight)
         return float(np.linalg.norm(offset - (offset @ flight) * flight))
+
+    def has_parted(self, grains: Grains) -> bool:
+        """Whether target and projectile, at later places of the grains, recede and are farther apart than here."""
+        (before, _), (now, velocity) = (self._apart(each) for each in (self.grains, grains))
+        return bool(now @ velocity > 0.0 and now @ now > before @ before)
+
+    def _apart(self, grains: Grains) -> tuple[np.ndarray, np.ndarray]:
+        """Separation [m] and relative velocity [m/s] of the centres of mass."""
+        first = len(self.target)
+        parts = [slice(first), slice(first, None)]
+        target, projectile = (
+            [np.average(values[p], axis=0, weights=grains.mass[p]) for values in (grains.position, grains.velocity)]
+            for p in parts
+        )
+        return projectile[0] - target[0], projectile[1] - target[1]
 
     @property
     def reach(self) -> float:
@@ -79,8 +97,8 @@ class Collision:
     Attributes
     ----------
     outcome : str
-        "stick" (one body), "bounce" (two bodies of the same grains as before), "miss" (no contact formed), or
-        "fragment" (all else).
+        "stick" (one body), "bounce" (two bodies of the same grains as before), "miss" (no contact formed),
+        "undecided" (none formed until the end, but one still may), or "fragment" (all else).
     kind : str
         One of `analysis.collision_kinds.KINDS`, by the masses of the fragments.
     speed, impact_parameter : float
@@ -215,8 +233,14 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, end
     strength: Any = strength_of(simulation, joined if len(joined) else np.array([[0, len(target)]]))
     per_grain = coordination(len(grains), pairs)
     return Collision(
-        outcome=_outcome(labels, len(target), made),
-        kind=collision_kind(m1, m2, masses.tolist(), max(made - 1 + broken, 0) / max(before, 1), touched=made > 0),
+        outcome=_outcome(labels, len(target), made) if made or end else UNDECIDED,
+        kind=collision_kind(
+            m1,
+            m2,
+            masses.tolist(),
+            max(made - 1 + broken, 0) / max(before, 1),
+            touched=made > 0 if made or end else None,
+        ),
         speed=speed,
         impact_parameter=start.impact_parameter,
         reach=start.reach,

@@ -11,7 +11,7 @@ from typing import Any
 from ..analysis.collision_kinds import growth_efficiency
 from ..basics.errors import BadInput, did_you_mean
 from ..contact.model import Contact
-from ..io.run_folder import COMPARISON, FIGURE, SWEEP_CSV, read_toml
+from ..io.run_folder import COMPARISON, FIGURE, RESULTS, SWEEP_CSV, read_toml
 from ..io.sweep_files import DONE, FAILED, LAST, STATE, read_sweep, write_sweep
 from ..io.table import write_table
 from ..plotting.papers import panels_figure
@@ -27,8 +27,8 @@ FIGURES: dict[str, PaperFigure] = {
     one.name: one for module in (paper_growth, paper_compression, paper_chain) for one in module.FIGURES
 }
 """Figures by name; a further one is a `PaperFigure` in `FIGURES` of a module named here."""
-RESULTS = "results"
-"""Folder, in that of the sweep, of table, comparison and figure; those of `PAPERS` have this content."""
+NO_PHYSICS = "small version: a test of the installation, no result of physics"
+"""Verdict on each number of a small version."""
 KEPT = (
     *("seed", STATE, "outcome", "largest", "second", "fragments", "impact_energy", "contacts_before", "contacts_after"),
     *("gyration_after", "time", "steps", "drift", "end", *LAST),
@@ -137,13 +137,17 @@ class Reproduction(SweepJob):
             write_sweep(place, cells)
             rows = [row for one in cells for row in self._rows_of(one)]
             compared = self.figure.compare(rows)
-            done = Compared("runs that are done", "", f"{len(cells)} of {total}, {seconds / 3600.0:.2g} core-hours", "")
+            if self.small:
+                compared = [one._replace(verdict=NO_PHYSICS) for one in compared]
+            count = f"{len(cells)} of {total}, {seconds / 3600.0:.2g} core-hours"
+            done = Compared("runs that are done", "", count, NO_PHYSICS * self.small)
             write_table(place / COMPARISON, [one._asdict() for one in (done, *compared)])
             part = "" if len(cells) == total else f"; {len(cells)} of {total} runs"
-            small = "; small version, not for comparison" if self.small else ""
+            small = f"; {NO_PHYSICS}" if self.small else ""
             save(panels_figure(self.figure.panels(rows), f"{self.figure.title}{small}{part}"), place / FIGURE)
         results = [one._asdict() for one in compared]
-        return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results}
+        note = {"note": NO_PHYSICS} if self.small else {}
+        return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results} | note
 
     def _rows_of(self, cells: dict[str, Any]) -> list[Row]:
         """Rows as figures take them of one row of the table, of a sequence one for each collision."""

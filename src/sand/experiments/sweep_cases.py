@@ -175,9 +175,9 @@ class SweptCollision(SweptCase):
 
     def expected(self, seed: int) -> Expected:
         """Set up the collision, and estimate its cost."""
-        start = self.case.approach(seed)
-        end = expected_end(start, self.case.ending())
-        simulation = prepare(start, *self.case.physics(), frame_every=end / self.case.impact.frames)
+        start, ending = self.case.approach(seed), self.case.ending()
+        end = expected_end(start, ending)
+        simulation = prepare(start, *self.case.physics(), ending, frame_every=end / ending.frames)
         cost = simulation.expected_cost(end)
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
@@ -212,7 +212,7 @@ class SweptSequence(SweptCollision):
         count = len(body) * 2 ** (case.sequence.collisions - 1)
         long = chain(count, radius=float(body.radius.mean()), material=body.materials[0])
         start = approach(long, long, speed=case.impact.speed, impact_parameter=0.0, along="x", seed=seed)
-        cost = prepare(start, *case.physics()).expected_cost(expected_end(start, case.ending()))
+        cost = prepare(start, *case.physics(), case.ending()).expected_cost(expected_end(start, case.ending()))
         seconds = _without_figure(cost)
         return Expected(None if seconds is None else 2.0 * seconds, cost.memory, 0.0)
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..basics.errors import BadInput, ErrorCollector, shown
+from ..basics.errors import BadInput, ErrorCollector, each_once, shown
 from ..basics.settings import For, Reading, Whole, Word
 from ..basics.unit_factors import factor
 from ..config.key_errors import keys_at, setting_at
@@ -59,10 +59,10 @@ class Range(NamedTuple):
         return f"{value:.{DIGITS}g} {self.unit}" if self.unit else value
 
     def values(self) -> list[Any]:
-        """The values; those of whole numbers each once.  Raises BadInput without `number`."""
+        """The values.  Raises BadInput without `number`."""
         if self.number is None:
             raise BadInput(f"how many values? give {self.scale}(FIRST, LAST, NUMBER), or a random design with samples")
-        return list(dict.fromkeys(self.at(k / (self.number - 1)) for k in range(self.number)))
+        return [self.at(k / (self.number - 1)) for k in range(self.number)]
 
 
 def range_of(text: Any, whole: bool) -> Range | None:
@@ -104,7 +104,7 @@ def _seeds(value: Any, name: str) -> list[int]:
     if type(value) is int and 1 <= value <= MOST_RUNS:
         return list(range(1, value + 1))
     if isinstance(value, list) and value and all(type(one) is int and 0 <= one < 2**63 for one in value):
-        return list(dict.fromkeys(value))
+        return each_once(value, name)
     raise BadInput(f"{name} = {shown(value)} must be a number of seeds, such as 3 (1, 2 and 3), or a list such as [7]")
 
 

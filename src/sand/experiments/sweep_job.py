@@ -19,11 +19,13 @@ from ..basics.errors import BadInput, ErrorCollector, import_optional, shown, wa
 from ..basics.paths import user_path
 from ..config.case import with_absolute_files
 from ..config.commands import command_for
+from ..config.folders import content_of
 from ..config.key_errors import validate
 from ..io import run_folder as files
 from ..io.damage import digest_of
 from ..io.lock import holder, writing
-from ..io.sweep_files import CLAIM, DONE, FAILED, PARQUET, ROW, RUNS, STATE, read_row, read_rows, write_row
+from ..io.run_folder import ROW, RUNS
+from ..io.sweep_files import CLAIM, DONE, FAILED, PARQUET, STATE, read_row, read_rows, read_sweep, write_row
 from ..results import Sweep
 from .executors import results_of
 from .job import Job, Progress, ignored
@@ -135,14 +137,20 @@ class SweepJob(Job):
         self.content = without_keys(self.content, list(given))
         self.command = command_for(self.content) or ""  # of boxes of sand grow: run, as that of case.toml
         self.defaults = self._defaults(keys)
-        found: dict[str, Row] = {}
+        found, again = dict[str, Row](), list[Row]()
         for values in design.combinations():
             read = errors.take(self._checked, values, instead={})
             for seed in self.seeds:
                 row = Row(self._name_of(read, seed), read, seed)
-                found.setdefault(row.name, row)
+                if found.setdefault(row.name, row) is not row:
+                    again.append(row)
         errors.problems = list(dict.fromkeys(errors.problems))
         errors.done()
+        if again:
+            warn(
+                f"{len(again)} of {len(found) + len(again)} runs have the values of others, such as {named(again[0])}: "
+                f"each is computed once, {len(found)} in all"
+            )
         return keys, list(found.values())
 
     def _defaults(self, keys: Sequence[str]) -> dict[str, Any]:
@@ -227,6 +235,22 @@ class SweepJob(Job):
         known = {name: row[STATE] for name, row in read_rows(self.folder)}
         return [row for row in self.rows if known.get(row.name) not in ((DONE,) if self.retry else (DONE, FAILED))]
 
+    def all_rows(self) -> dict[str, tuple[dict[str, Any], int, str]]:
+        """Values, seed and state ("": left) of all runs by name: of this design, and others in the folder.
+
+        Also of runs that are in the table alone, because the folder `runs` was removed.
+        """
+        is_finished, ended = (self.folder / self.RESULTS).exists(), dict[str, tuple[dict[str, Any], int, str]]()
+        left = {} if is_finished else {row.name: (row.values, row.seed, "") for row in self.rows}
+        if (self.folder / files.SWEEP_CSV).exists():
+            table = {name: column.tolist() for name, column in read_sweep(self.folder).items()}
+            keys = list(table)[: list(table).index("seed")]
+            columns = (table[name] for name in ("run", "seed", STATE, *keys))
+            for name, seed, state, *values in zip(*columns, strict=True):
+                ended[name] = dict(zip(keys, values, strict=True)), seed, state
+        rows = read_rows(self.folder, without=ended)
+        return left | ended | {name: (row["keys"], row["seed"], row[STATE]) for name, row in rows}
+
     def run(
         self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
     ) -> dict[str, Any]:
@@ -287,8 +311,7 @@ class SweepJob(Job):
                 pass
         content = files.read_toml(path) if files.was_written_by_sand(path) else {}
         if "sweep" not in content:
-            kind = f"a job or run of `sand {command_for(content)}`" if command_for(content) else "other files"
-            raise BadInput(f"{self.folder} holds {kind}, no sweep; give another folder with --out")
+            raise BadInput(f"{self.folder} holds {content_of(self.folder)}, no sweep; give another folder with --out")
         theirs = content.pop("sweep")
         varied = [*self.keys, *(key for part in _tables_of(theirs) for key in part)]
         before, now = without_keys(content, varied), without_keys(self.content, varied)

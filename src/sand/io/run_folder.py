@@ -51,6 +51,8 @@ CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
 """Names of checkpoints, with the number of steps; other names are those of copies that the user keeps."""
 PLOTS = "plots"
 """Subfolder of figures."""
+RUNS, ROW, RESULTS = "runs", "row.json", "results"
+"""Subfolder of the runs of a sweep, file with the row of one, and subfolder of what `sand reproduce` makes of them."""
 DERIVED = (
     *(".xyz", ".dump", ".data", ".vtp", ".pvd", ".png", ".pdf", ".svg", ".html", ".csv", ".json"),
     *(".geom", ".dat", ".pos"),
@@ -87,13 +89,12 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
         if not shared and (folder / LOCK).exists():  # those who share it wait for each other
             refuse_locked(folder)
         if is_used(folder) and not shared:
+            refuse_sweep(folder)
             if not overwrite:
                 raise BadInput(
                     f"folder {folder} exists and is not empty; give another one, remove it, "
                     "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
-            if (folder / SWEEP_CSV).exists():
-                raise BadInput(f"{folder} holds a sweep, which is not replaced: give another folder, or remove it")
             found = files_of_runs(folder)
             if found and not shows_a_run(folder):
                 names = ", ".join(path.name for path in found)
@@ -113,13 +114,28 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     "them, or make them again from the new results"
                 )
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder):
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=LOCK):
             pass
     except FilesFailed:
         raise
     except OSError as error:
         raise FilesFailed(f"cannot write to folder {folder}: {error.strerror}") from error
     return folder
+
+
+def holds_sweep(folder: Path) -> bool:
+    """Whether a folder holds a sweep, also one whose table is not written yet."""
+    if (folder / SWEEP_CSV).exists() or any(folder.glob(f"{RUNS}/*/{ROW}")):
+        return True
+    with contextlib.suppress(BadInput):
+        return was_written_by_sand(folder / CASE) and "sweep" in read_toml(folder / CASE)
+    return False
+
+
+def refuse_sweep(folder: Path) -> None:
+    """Raise BadInput if a folder for a run or job holds a sweep, whose results may have taken long."""
+    if holds_sweep(folder):
+        raise BadInput(f"{folder} holds a sweep, which is not replaced: give another folder, or remove it")
 
 
 def files_of_runs(folder: Path) -> list[Path]:
@@ -156,8 +172,8 @@ def _of_earlier_results(folder: Path) -> list[Path]:
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a folder exists and holds more than a lock file."""
-    return folder.is_dir() and any(one.name != LOCK for one in folder.iterdir())
+    """Whether a folder exists and holds more than a lock file, and the one by which `make_folder` finds it writable."""
+    return folder.is_dir() and any(not one.name.startswith(LOCK) for one in folder.iterdir())
 
 
 def replace_file(path: str | Path, content: bytes) -> None:

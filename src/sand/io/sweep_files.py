@@ -12,10 +12,10 @@ import numpy as np
 
 from ..basics.errors import BadInput, import_optional, warn
 from .damage import sealed
-from .run_folder import SWEEP_CSV, plain, read_json, read_text, replace_file, replacing, write_json
+from .run_folder import ROW, RUNS, SWEEP_CSV, plain, read_json, read_text, replace_file, replacing, write_json
 
-RUNS, ROW, CLAIM = "runs", "row.json", ".claim"
-"""Folder of the runs of a sweep; in the folder of one, its row, and the file that is locked by who computes it."""
+CLAIM = ".claim"
+"""File in the folder of a run that is locked by who computes it."""
 PARQUET = "sweep.parquet"
 """The table for programs that read Apache Parquet."""
 STATE, DONE, FAILED = "state", "done", "failed"

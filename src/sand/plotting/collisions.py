@@ -9,22 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..analysis.collision_kinds import KINDS
+from ..analysis.collision_kinds import UNDECIDED
 from ..analysis.impact_average import impact_average
 from .panels import CHANNEL_LABELS, LOSS_CHANNELS
 from .run_figure import DPI, RunFigure
-from .style import BLUE, GREEN, MUTED, ORANGE, PURPLE, RED, SKY, TEXT_COLOUR, legend_above, plot_style
+from .style import MUTED, TEXT_COLOUR, legend_above, log_axis, looks_of, no_line, plot_style
 
-COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00", "miss": "#999999"}
-LOOKS = dict(
-    zip(
-        KINDS,
-        ((MUTED, "x"), (ORANGE, "s"), (BLUE, "o"), (SKY, "o"), (GREEN, "^"), (PURPLE, "v"), (RED, "D")),
-        strict=True,
-    )
-)
-"""Colour and marker of each kind."""
-ASIDE, WIDEST = 0.03, 0.12
+ASIDE, WIDEST = 0.045, 0.12
 """Shift of the marks of a seed from those of the seed before, and the largest shift, as fractions of the speed."""
 NEGLIGIBLE = 1e-3
 """Mean share of the impact energy below which a loss is only named."""
@@ -46,11 +37,10 @@ def collision_figure(results: list[dict[str, Any]], title: str) -> Figure:
         outcomes = np.array([r["outcome"] for r in results])
         masses = np.array([r["largest_remnant"] for r in results])
         order = np.argsort(-masses, kind="stable")
-        for name, colour in COLOURS.items():
+        for name, (colour, marker) in looks_of(outcomes).items():
             selected = outcomes[order] == name
-            if selected.any():
-                rank = np.flatnonzero(selected) + 1
-                left.plot(rank, masses[order][selected], "o", color=colour, markersize=4, label=name)
+            rank = np.flatnonzero(selected) + 1
+            left.plot(rank, masses[order][selected], **no_line(marker, colour), markersize=4, label=name)
         left.set(xlim=(0.5, len(results) + 0.5), ylim=(0.0, 1.05))
         left.set(xlabel="collisions, sorted by largest remnant", ylabel="mass of the largest remnant / total mass")
         left.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -82,7 +72,7 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
     """Figure of collisions at several speeds: growth efficiency (left), kinds of outcomes against speed and b (right).
 
     The line is the average over impact parameters at each speed, with its 95 % interval over seeds where there is one;
-    without different impact parameters, the mean over seeds.
+    without different impact parameters, the mean over seeds. Undecided collisions are not part of it.
 
     Parameters
     ----------
@@ -103,20 +93,26 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
         figure = RunFigure(figsize=(9.0, 3.8), dpi=DPI, layout="constrained")
         left, right = figure.subplots(1, 2)
         left.axhline(0.0, color=MUTED, linewidth=0.7)
-        for name, (colour, marker) in LOOKS.items():
+        for name, (colour, marker) in looks_of(kinds).items():
             of = kinds == name
-            for axes, x, y in ((left, speed, growth), (right, beside, share)) if of.any() else ():
-                axes.plot(x[of], y[of], marker, color=colour, markersize=4, alpha=0.8, label=name)
-        averages = [_average(growth[speed == v], share[speed == v], seeds[speed == v]) for v in np.unique(speed)]
+            for axes, x, y in ((left, speed, growth), (right, beside, share)):
+                axes.plot(x[of], y[of], **no_line(marker, colour), markersize=4, alpha=0.8, label=name)
+        decided = kinds != UNDECIDED
+        speeds = np.unique(speed[decided])
+        averages = [_average(*(each[decided & (speed == v)] for each in (growth, share, seeds))) for v in speeds]
         mean, low, high = (np.array([getattr(one, name) for one in averages]) for name in ("mean", "low", "high"))
-        left.plot(np.unique(speed), mean, color=TEXT_COLOUR, linewidth=1.2)
+        left.plot(speeds, mean, color=TEXT_COLOUR, linewidth=1.2)
         known = np.isfinite(low)  # without equally many impact parameters for each seed there is no interval
         limits = np.array([mean - low, high - mean])[:, known]
-        left.errorbar(np.unique(speed)[known], mean[known], limits, color=TEXT_COLOUR, fmt="none", capsize=2)
+        left.errorbar(speeds[known], mean[known], limits, color=TEXT_COLOUR, fmt="none", capsize=2)
         left.set(xlabel="speed [m/s]", ylabel="growth efficiency $f$; line: average over $b$", ylim=(None, 1.1))
-        right.set(xlabel="speed [m/s]", ylabel="impact parameter / sum of outer radii", ylim=(-0.05, None))
+        right.set(
+            xlabel="speed [m/s]",
+            ylabel="impact parameter / sum of outer radii",
+            ylim=(-0.05, max(share.max() + 0.05, 0.2)),
+        )
         for axes in (left, right) if speed.max() > 3.0 * speed.min() else ():
-            axes.set_xscale("log")
+            log_axis(axes, "x")
         legend_above(right)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9.0, weight="bold")
     return figure

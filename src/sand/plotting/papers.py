@@ -9,12 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter, StrMethodFormatter
 
 from .run_figure import DPI, RunFigure
-from .style import LARGEST_COLOURS, MUTED, legend_above, panel_letter, plot_style
-
-MARKERS = "osD^vP*X"
+from .style import LARGEST_COLOURS, MARKERS, MUTED, legend_above, log_axis, panel_letter, plot_style
 
 
 class Curve(NamedTuple):
@@ -60,10 +57,7 @@ def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
 
 def _draw(axes: Axes, panel: Panel) -> None:
     for axis in panel.log:
-        getattr(axes, f"set_{axis}scale")("log")
-        shown = getattr(axes, f"{axis}axis")
-        shown.set_major_formatter(StrMethodFormatter("{x:g}"))
-        shown.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
+        log_axis(axes, axis)
     if panel.zero:
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
     for curve, colour, marker in zip(panel.curves, cycle(LARGEST_COLOURS), cycle(MARKERS), strict=False):

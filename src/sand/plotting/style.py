@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
+from itertools import cycle
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatter, StrMethodFormatter
 
 BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#0072B2",
@@ -25,6 +27,8 @@ BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
 """After Okabe & Ito (2008): distinct for colour-blind readers."""
 BROWN, INDIGO = "#8A4B08", "#4B4FA8"
 """Further colours of lines."""
+MARKERS = "osD^vP*X<>"
+"""Markers of lines."""
 LARGEST_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
 """Colours of the largest clusters, largest first."""
 OTHER_COLOURS = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
@@ -34,6 +38,18 @@ SINGLE_COLOUR = "#B9BDC3"
 TEXT_COLOUR, MUTED = "#22262B", "#7A828C"
 """Colours of text and axes, and of notes and guide lines."""
 LIGHT_BACKGROUND, DARK_BACKGROUND, TEXT_ON_DARK, MUTED_ON_DARK = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
+LOOKS = {
+    "undecided": (TEXT_COLOUR, "$?$"),
+    "miss": (MUTED, "x"),
+    "bouncing": (ORANGE, "s"),
+    "sticking": (BLUE, "o"),
+    "restructuring": (SKY, "P"),
+    "mass transfer": (GREEN, "^"),
+    "erosion": (PURPLE, "v"),
+    "fragmentation": (RED, "D"),
+}
+"""Colour and marker of each kind of outcome of a collision, in this order."""
+LOOKS |= {"bounce": LOOKS["bouncing"], "stick": LOOKS["sticking"], "fragment": LOOKS["fragmentation"]}
 ON_DARK = {
     BLUE: "#5AA9E6",
     RED: "#F08A4B",
@@ -88,6 +104,34 @@ def plot_style() -> AbstractContextManager[None]:
     # Without the backend: to set one would start it.
     defaults = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith(("backend", "interactive"))}
     return matplotlib.rc_context({**defaults, **_STYLE})
+
+
+def looks_of(words: Iterable[Any]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of each word: those of `LOOKS`, in its order, and others in turn."""
+    found = {str(word) for word in words}
+    known = {word: look for word, look in LOOKS.items() if word in found}
+    others = zip(cycle((BROWN, YELLOW, INDIGO, *OTHER_COLOURS)), cycle("*X<>8p"), strict=False)
+    return known | dict(zip(sorted(found - known.keys()), others, strict=False))  # as many as there are words
+
+
+class _Numbers(LogFormatter):
+    """Labels as 0.4, where `LogFormatter` has 4e-01."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+def log_axis(axes: Axes, axis: str) -> None:
+    """Make an axis, "x" or "y", logarithmic, with numbers in place of powers of ten."""
+    getattr(axes, f"set_{axis}scale")("log")
+    shown = getattr(axes, f"{axis}axis")
+    shown.set_major_formatter(StrMethodFormatter("{x:g}"))
+    shown.set_minor_formatter(_Numbers(minor_thresholds=(1.5, 0.5)))
+
+
+def no_line(marker: str, colour: str) -> dict[str, Any]:
+    """Settings of matplotlib for marks without a line."""
+    return {"linestyle": "none", "marker": marker, "color": colour}
 
 
 def si_prefix(largest: float, unit: str) -> tuple[float, str]:

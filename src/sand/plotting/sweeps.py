@@ -1,29 +1,43 @@
-"""Figure of a sweep: a result over the key with the most values, a line for each combination of the other keys."""
+"""Figures of a sweep: a result over the key with the most values, and the classes of runs, such as outcomes."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 
 from .run_figure import DPI, RunFigure
-from .style import LARGEST_COLOURS, OTHER_COLOURS, legend_above, plot_style
+from .style import LARGEST_COLOURS, MARKERS, OTHER_COLOURS, TEXT_COLOUR, log_axis, looks_of, no_line, plot_style
 
-MOST_LINES = 14
-"""Largest number of lines: of more combinations of the other keys, the first ones are drawn."""
+MOST_LINES, MOST_PANELS = 14, 9
+"""Largest numbers of lines and panels: of more combinations of the other keys, the first ones are drawn."""
+LEAST_ROWS = 3
+"""Least number of values of a second key for a map over both."""
 LOG_FROM = 15.0
-"""Ratio of the largest to the smallest value from which on the axis is logarithmic."""
+"""Ratio of the largest to the smallest value from which on the axis may be logarithmic."""
+MANY = 30
+"""Number of values from which on keys with more values do not come before others."""
+SIDE = 0.65
+"""Part of the distance between two places of a map that the marks of one place may take."""
 _NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)")
 
+Table = Mapping[str, np.ndarray]
 
-def sweep_figure(table: Mapping[str, np.ndarray], keys: Sequence[str], what: str) -> Figure:
+
+def sweep_figure(table: Table, keys: Sequence[str], what: str) -> Figure:
     """Figure of a column of the table of a sweep.
 
-    Points are means over all runs with the same values of the keys, bars the standard errors of these means. Of a
-    column of text, such as `outcome`, the share of each word is drawn.
+    A column of numbers is drawn as lines over the key with the most values: points are means over all runs with the
+    same values of the keys, bars the standard errors of these means. A column of text, such as `outcome`, has a mark
+    for each run over the two keys with the most values, or the share of each word over one key; combinations of the
+    other keys have a line or a panel each.
 
     Parameters
     ----------
@@ -34,32 +48,123 @@ def sweep_figure(table: Mapping[str, np.ndarray], keys: Sequence[str], what: str
     what : str
         The column.
     """
-    distinct = {key: len(set(table[key].tolist())) for key in keys}
-    x_key = max(keys, key=lambda key: distinct[key], default="seed")
-    x, unit = _numbers(table[x_key])
-    others = [key for key in keys if key != x_key and distinct[key] > 1]
-    short = {key: [f"{v:.4g}" if isinstance(v, float) else str(v) for v in table[key].tolist()] for key in others}
-    groups = [", ".join(f"{key.rpartition('.')[2]} = {short[key][k]}" for key in others) for k in range(len(x))]
-    column = table[what]
-    words = sorted(set(column.tolist())) if column.dtype.kind in "Ub" else [""]
+    number = {key: len(set(table[key].tolist())) for key in keys}
+    ordered = sorted(keys, key=lambda key: -min(number[key], MANY))
+    varied = [key for key in ordered if number[key] > 1] or [*keys, "seed"][:1]
     with plot_style():
-        figure = RunFigure(figsize=(6.0, 4.0), dpi=DPI, layout="constrained")
-        axes = figure.subplots()
-        lines = [(group, word) for group in dict.fromkeys(groups) for word in words][:MOST_LINES]
-        for (group, word), colour in zip(lines, cycle((*LARGEST_COLOURS, *OTHER_COLOURS)), strict=False):
-            chosen = np.array([one == group for one in groups]) & np.isfinite(x)
-            y = (column == word if words != [""] else column)[chosen].astype(float)
-            label = ", ".join(text for text in (group, str(word)) if text)
-            axes.errorbar(*_means(x[chosen], y), fmt="o-", color=colour, markersize=3.5, elinewidth=0.8, label=label)
-        positive = x[x > 0.0]
-        if len(positive) == len(x) and positive.max(initial=0.0) > LOG_FROM * positive.min(initial=np.inf):
-            axes.set_xscale("log")
-        axes.set(xlabel=f"{x_key} [{unit}]" if unit else x_key, ylabel=what if words == [""] else f"share of {what}")
-        if words != [""]:
-            axes.set_ylim(-0.03, 1.03)
-        if len(lines) > 1 or lines[0] != ("", ""):
-            legend_above(axes)
+        if table[what].dtype.kind not in "Ub":
+            return _lines(table, varied[0], _combinations(table, varied[1:]), what)
+        over = varied[: 2 if len(varied) > 1 and number[varied[1]] >= LEAST_ROWS else 1]
+        return _classes(table, over, _combinations(table, varied[len(over) :]), what)
+
+
+def _combinations(table: Table, keys: Sequence[str]) -> np.ndarray:
+    """The values of keys in each row, as text."""
+    short = {key: [f"{v:.4g}" if isinstance(v, float) else str(v) for v in table[key].tolist()] for key in keys}
+    rows = len(next(iter(table.values())))
+    return np.array([", ".join(f"{key.rpartition('.')[2]} = {short[key][k]}" for key in keys) for k in range(rows)])
+
+
+def _lines(table: Table, key: str, groups: np.ndarray, what: str) -> Figure:
+    """A line for each combination of the other keys."""
+    figure = RunFigure(figsize=(6.5, 4.0), dpi=DPI, layout="constrained")
+    axes, x = figure.subplots(), _Values(table, key)
+    names = list(dict.fromkeys(groups.tolist()))
+    for name, colour, marker in zip(
+        names[:MOST_LINES], cycle((*LARGEST_COLOURS, *OTHER_COLOURS)), cycle(MARKERS), strict=False
+    ):
+        of = (groups == name) & np.isfinite(x.numbers)
+        points = _means(x.numbers[of], table[what][of].astype(float))
+        axes.errorbar(*points, fmt=f"{marker}-", color=colour, markersize=4.0, elinewidth=0.8, label=name)
+    x.describe(axes, "x")
+    axes.set_ylabel(what)
+    if len(names) > 1:
+        figure.legend(loc="outside right upper")
+    _say_what_is_left(figure, len(names), MOST_LINES)
     return figure
+
+
+def _classes(table: Table, keys: Sequence[str], groups: np.ndarray, what: str) -> Figure:
+    """A panel for each combination of the other keys: a map of the words of a column, or their shares."""
+    looks = looks_of(table[what].tolist())
+    names = list(dict.fromkeys(groups.tolist()))
+    shown = names[:MOST_PANELS]
+    columns = 2 if len(shown) == 4 else min(len(shown), 3)
+    rows = math.ceil(len(shown) / columns)
+    size = (4.6, 3.6) if len(shown) == 1 else (3.1 * columns, 2.7 * rows)
+    figure = RunFigure(figsize=(size[0] + 1.5, size[1] + 0.2), dpi=DPI, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    over = [_Values(table, key) for key in keys]
+    for axes, name in zip(panels, shown, strict=False):
+        draw = _draw_map if len(keys) > 1 else _draw_shares
+        draw(axes, over, groups == name, table[what].astype(str), looks)
+        axes.set_title(name, fontsize=7.5, loc="left")
+        if len(shown) == rows * columns:
+            axes.label_outer()
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
+    marks = [Line2D([], [], **no_line(marker, colour), label=word) for word, (colour, marker) in looks.items()]
+    figure.legend(handles=marks, loc="outside right upper", title=what, alignment="left")
+    _say_what_is_left(figure, len(names), MOST_PANELS)
+    return figure
+
+
+def _draw_map(
+    axes: Axes, over: Sequence[_Values], chosen: np.ndarray, words: np.ndarray, looks: Mapping[str, tuple[str, str]]
+) -> None:
+    """A mark for each run at its values of two keys; those of one place are in rows side by side."""
+    places, index = np.unique([one.numbers[chosen] for one in over], axis=1, return_inverse=True)
+    order = np.argsort(index.ravel(), kind="stable")
+    rank = np.empty(len(order), int)
+    rank[order] = np.arange(len(order)) - np.searchsorted(index.ravel()[order], index.ravel()[order])
+    side = math.ceil(math.sqrt(rank.max(initial=0) + 1))
+    points = np.array(axes.get_window_extent().size) * 72.0 / axes.figure.dpi
+    room = min(length / len(set(one)) for length, one in zip(points, places.tolist(), strict=True))
+    step = min(SIDE * room / side, 6.0)
+    for one, axis in zip(over, "xy", strict=True):
+        one.describe(axes, axis)
+    axes.margins(0.08)
+    axes.plot(*(one.numbers for one in over), linestyle="none")  # its limits, those of all panels
+    axes.autoscale_view()
+    axes.set_autoscale_on(False)
+    for k in range(side * side):
+        right, up = (step / 72.0 * (part - 0.5 * (side - 1)) for part in (k % side, k // side))
+        moved = axes.transData + ScaledTranslation(right, up, axes.figure.dpi_scale_trans)
+        for word, (colour, marker) in looks.items():
+            of = np.flatnonzero(chosen)[(rank == k) & (words[chosen] == word)]
+            x, y = (one.numbers[of] for one in over)
+            axes.plot(x, y, **no_line(marker, colour), markersize=_size(step, side), transform=moved)
+
+
+def _size(step: float, side: int) -> float:
+    """Size of marks [points] that do not cover each other."""
+    return 5.0 if side == 1 else max(0.85 * step, 2.0)
+
+
+def _draw_shares(
+    axes: Axes, over: Sequence[_Values], chosen: np.ndarray, words: np.ndarray, looks: Mapping[str, tuple[str, str]]
+) -> None:
+    """Shares of the words at each value of a key, one above the other, each with its mark."""
+    (x,) = over
+    places, index = np.unique(x.numbers, return_inverse=True)
+    number = np.maximum(np.bincount(index[chosen], minlength=len(places)), 1)
+    bottom = np.zeros(len(places))
+    for word, (colour, marker) in looks.items():
+        share = np.bincount(index[chosen & (words == word)], minlength=len(places)) / number
+        axes.bar(np.arange(len(places)), share, 0.8, bottom, color=colour, alpha=0.75, linewidth=0.0)
+        of = share > 0.0
+        axes.plot(np.flatnonzero(of), (bottom + 0.5 * share)[of], **no_line(marker, TEXT_COLOUR), markersize=3.5)
+        bottom += share
+    every = math.ceil(len(places) / 8)
+    texts = [x.words[int(v)] if x.words else f"{v:.3g}" for v in places]
+    axes.set_xticks(range(0, len(places), every), texts[::every])
+    axes.set(xlabel=x.label, ylabel="share of the runs", ylim=(0.0, 1.0))
+
+
+def _say_what_is_left(figure: Figure, number: int, drawn: int) -> None:
+    """Say in the title how many combinations of keys are not drawn."""
+    if number > drawn:
+        figure.suptitle(f"the first {drawn} of {number} combinations of the other keys", fontsize=7.5)
 
 
 def _means(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -70,12 +175,42 @@ def _means(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     return places, mean, np.sqrt(spread / np.maximum(number - 1, 1) / number)
 
 
-def _numbers(column: np.ndarray) -> tuple[np.ndarray, str]:
-    """A column as numbers, and their unit: those of text, such as '0.5 b', or the number of each word."""
-    if column.dtype.kind not in "U":
-        return column.astype(float), ""
-    found = [_NUMBER.fullmatch(text) for text in column.tolist()]
-    units = {match[2] for match in found if match}
-    if None not in found and len(units) == 1:
-        return np.array([float(match[1]) for match in found if match]), units.pop()
-    return np.unique(column, return_inverse=True)[1].astype(float), ""
+class _Values:
+    """A column of keys as numbers: those of text, such as '0.5 b', with their unit, or the number of each word.
+
+    Attributes
+    ----------
+    numbers : ndarray
+        Of each row.
+    words : list of str
+        What the numbers stand for; empty if they are values.
+    label : str
+        The key with its unit.
+    """
+
+    def __init__(self, table: Table, key: str):
+        column, self.words, self.label = table[key], list[str](), key
+        if column.dtype.kind != "U":
+            self.numbers = column.astype(float)
+            return
+        found = [_NUMBER.fullmatch(text) for text in column.tolist()]
+        units = {match[2] for match in found if match}
+        if None not in found and len(units) == 1:
+            self.numbers = np.array([float(match[1]) for match in found if match])
+            self.label += f" [{unit}]" if (unit := units.pop()) else ""
+        else:
+            words, index = np.unique(column, return_inverse=True)
+            self.words, self.numbers = words.tolist(), index.astype(float)
+
+    def describe(self, axes: Axes, axis: str) -> None:
+        """Label and scale of an axis."""
+        getattr(axes, f"set_{axis}label")(self.label)
+        if self.words:
+            getattr(axes, f"set_{axis}ticks")(range(len(self.words)), self.words)
+        elif self._is_logarithmic():
+            log_axis(axes, axis)
+
+    def _is_logarithmic(self) -> bool:
+        """Whether the values are spread evenly in the logarithm rather than evenly."""
+        values = np.unique(self.numbers)
+        return bool(values[0] > 0.0 and values[-1] > LOG_FROM * values[0] and np.median(values) < values[-1] / 3.0)

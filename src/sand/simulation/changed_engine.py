@@ -1,9 +1,11 @@
-"""The engine after a change by the user."""
+"""A change of a simulation by the user, and the engine after it."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from ..basics.arrays import SAVED_LONG_RANGE
 from ..basics.box import Box
@@ -18,6 +20,7 @@ from ..basics.state import (
     FORMING,
     MADE,
     NEEDED,
+    OUTSIDE,
     STEP_INCREASES,
     STEPS,
     TIME,
@@ -25,6 +28,7 @@ from ..basics.state import (
     grains_from_arrays,
 )
 from ..components import components_of
+from ..components.deformation import DeformedBox
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.changed_state import regrouped_arrays
 from ..engine.component import Component, in_use
@@ -32,7 +36,44 @@ from ..engine.engine import Engine
 from ..engine.measures import force_columns
 from ..forces.base import Force, LongRangeForce
 from ..integrate.step_control import INCREASE_INTERVAL
+from ..limits.truncation import truncation_warnings
 from .change import Change
+from .stress import check_stress_rows
+
+
+def changed(simulation: Any) -> Iterator[Change]:
+    """The change that the user makes, see `Simulation.change`, and its effect on the simulation after that."""
+    present = tuple(as_chosen(force, simulation.start, simulation.box) for force in simulation.forces)
+    pair = simulation.state.contacts.pair[:, : simulation.state.count[CONTACTS]].T.copy()
+    system = simulation._system
+    change = Change(simulation.grains, present, simulation.box, pair, system.next_id, simulation.deformation)
+    yield change
+    given = system.given
+    if change.deformation is not simulation.deformation:
+        given = given | {DeformedBox.name: DeformedBox((change.deformation,))}
+    if change.is_of_own:
+        own = change.checked_grains().arrays.own
+        for grains in (simulation._engine.state.grains, simulation.regular_state.grains, simulation.start):
+            grains.arrays.own[...] = own
+        if simulation.writer:
+            simulation.writer.changed(simulation)
+        return
+    fixed = int(simulation.seed or 0), given
+    engine, forces, given = changed_engine(change, present, simulation._engine, simulation.ledger.columns, *fixed)
+    if simulation.ledger.stress:
+        check_stress_rows(engine)
+    before = simulation._log_row()["total"]
+    simulation._engine = engine
+    start, box, next_id = simulation.grains.copy(), change.box, change._next_id
+    simulation._system = replace(system, start=start, forces=forces, box=box, given=given, next_id=next_id)
+    for text in truncation_warnings(simulation.grains, forces, box):
+        simulation._warnings.show(text, text.partition(",")[0])
+    simulation._origin.choices = {}  # chosen anew
+    if change.regroups:  # the description of the grains in a case file no longer holds
+        simulation.recipe = None
+    engine.regular_state.lost[OUTSIDE] += before - simulation._log_row()["total"]
+    if simulation.writer:
+        simulation.writer.changed(simulation)
 
 
 def as_chosen(force: Force, grains: Grains, box: Box) -> Force:

@@ -7,7 +7,7 @@ import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from ..analysis.ledger_columns import AWAKE
 from ..basics.errors import BadInput, did_you_mean, shown
@@ -56,6 +56,8 @@ class Condition:
     names: tuple[str, ...]
     holds: Callable[[Row], bool] = field(compare=False)
 
+    every: ClassVar[int] = EVERY
+
     def check(self, columns: Sequence[str]) -> None:
         """Refuse columns that the ledger lacks.  Raises BadInput."""
         known = [*columns, WALL]
@@ -68,9 +70,10 @@ class Condition:
 
 @dataclass(frozen=True)
 class OwnCondition:
-    """A condition given by a function of the simulation."""
+    """A condition given by a function of the simulation, which is called every so many regular steps."""
 
     function: Callable[[Any], Any]
+    every: int = EVERY
 
     @property
     def text(self) -> str:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from ..basics.wall_time import YEAR, format_wall_time
+
 SAMPLE_SECONDS = 1.0
 """Wall time [s] of steps, compilation excluded, after which the estimate is made."""
-WARN_STEPS, WARN_SECONDS = 1e12, 365.25 * 86400.0
+WARN_STEPS, WARN_SECONDS = 1e12, YEAR
 """Remaining steps, and wall time [s], above which the estimate becomes a warning."""
 
 
@@ -48,9 +50,9 @@ class RunTimeEstimate:
         left = min((self._end - time) / step if step > 0.0 else math.inf, self._last - steps)
         rest = left * self._seconds / taken
         if left > WARN_STEPS or rest > WARN_SECONDS:
-            years = f"about {rest / WARN_SECONDS:.2g} years" if rest > WARN_SECONDS else f"{rest / 86400.0:.2g} days"
+            takes = format_wall_time(float(f"{rest:.2g}"))
             self._warn(
-                f"{LONG} {left:.1g} more steps, {years} at the present speed; stop it with Ctrl-C "
+                f"{LONG} {left:.1g} more steps, about {takes} at the present speed; stop it with Ctrl-C "
                 "and choose an earlier end or fewer steps",
                 LONG,
             )

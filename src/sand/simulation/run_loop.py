@@ -15,7 +15,7 @@ from ..basics.state import LATE
 from ..integrate.integrator import moves_bodies
 from ..integrate.parts import Stop
 from .cadence import Cadence, Chosen, Schedule, read_cadence
-from .condition import EVERY, EVERY_LONG, WALL, Condition, OwnCondition
+from .condition import EVERY_LONG, WALL, Condition, OwnCondition
 from .ledger import COUNTED, kinetic_energies
 from .observers import call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome, Result
@@ -110,8 +110,11 @@ class RunLoop:
             for name in ("frame_every", "row_every", "checkpoint_every")
             for setting in [getattr(simulation, name)]
         )
-        every = EVERY_LONG if moves_bodies(simulation.stepping) else EVERY
-        self._checks = Schedule(None if self._condition is None else Cadence("steps", every), *now)
+        checks = None
+        if self._condition is not None:
+            every = EVERY_LONG if moves_bodies(simulation.stepping) else self._condition.every
+            checks = Cadence("steps", every)
+        self._checks = Schedule(checks, *now)
         self._energy_checks = Schedule(Cadence("steps", ENERGY_CHECK_EVERY), *now)
         self.updates = UpdateSchedule(simulation)
         self._callbacks: tuple[Callback, ...] = (

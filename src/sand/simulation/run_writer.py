@@ -27,6 +27,7 @@ from ..io.run_folder import make_folder, plain, read_json, write_json, write_tom
 from ..io.trajectory import TrajectoryWriter
 from .contact_table import measured_columns
 from .displays import DISPLAYS
+from .grain_quantities import virials_of
 from .ledger import Ledger
 from .outcome import UNFINISHED, Result
 from .serialise import case_of
@@ -187,7 +188,7 @@ class RunWriter:
         assert self._trajectory is not None
         w, engine = simulation.state, simulation._engine
         contacts = measured_columns(w, engine.law, engine.table_of(w))
-        virial = simulation._virials(contacts) if simulation.ledger.stress else None
+        virial = virials_of(simulation, contacts) if simulation.ledger.stress else None
         self._trajectory.write(w.steps, w.time, w.grains, w.box, contacts, at_rest=w.at_rest, virial=virial)
 
     def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:

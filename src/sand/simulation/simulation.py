@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import copy
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,34 +17,34 @@ from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, FilesFailed
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
-from ..basics.state import CONTACTS, OUTSIDE, State
+from ..basics.state import State
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import format_quantity, seed_given
-from ..basics.virial import shares_of_virial
 from ..components import components_of, read_components
-from ..components.deformation import Deformation, DeformedBox
+from ..components.deformation import Deformation
 from ..components.driven import Driven
 from ..components.walls import Wall, WallState, wall_states
 from ..contact.model import Contact
 from ..engine.assemble import build_engine, fitting_forces
 from ..engine.component import Component, in_use
-from ..engine.measures import energies_at_grains, force_columns, refuse_forces_without_virial
+from ..engine.measures import force_columns, refuse_forces_without_virial
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
 from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..limits.solid_limits import grain_warnings
-from ..limits.truncation import truncation_warnings
 from ..neighbours.search import Neighbours
 from .cadence import Chosen, chosen_cadence
 from .change import Change
-from .changed_engine import as_chosen, changed_engine
+from .changed_engine import changed
+from .choices import choices_of
 from .condition import GIVEN, Condition
 from .contact_table import Contacts, ContactTable
 from .cost.cost import Cost, StepTimer, expected_cost
 from .displays import DISPLAYS
 from .exclusive import Exclusive, exclusive
-from .ledger import Ledger, kinetic_energies
+from .grain_quantities import loads_of, quantities_at_grains
+from .ledger import Ledger
 from .observers import Observer
 from .outcome import Result
 from .run_loop import Continuation, RunLoop
@@ -57,9 +57,6 @@ from .stress import Stress, check_stress_rows, stress_of, volume_of
 from .updater import Updater, check_updaters
 from .vibration import vibration_notes
 from .wall_clock import WallClock
-
-ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting")
-"""Columns of a contact's elastic energy."""
 
 
 @dataclass(frozen=True)
@@ -328,17 +325,7 @@ class Simulation(ReadOnlySettings):
     @exclusive
     def choices(self) -> dict[str, str]:
         """Automatic choices with their reasons: boundary, cut-offs and neighbour search."""
-        engine = self._engine
-        present = {k: text for each in engine.components for k, text in each.present_choices(engine.state).items()}
-        if self._origin.choices:
-            return self._origin.choices | present
-        choices = {"start": self.origin} if self.origin else {}
-        choices["boundary"] = self.box.describe()
-        for force in self.forces:
-            if choose := getattr(force, "choose", None):
-                choices[f"{force.name} cut-off"] = str(choose(self.start, self.box))
-        choices |= {name: text for each in engine.components for name, text in each.choices().items()}
-        return choices | {"neighbours": engine.search} | present
+        return choices_of(self)
 
     @exclusive
     def loads(self) -> dict[str, Any]:
@@ -351,15 +338,7 @@ class Simulation(ReadOnlySettings):
             Those of contacts are left out on grains of clusters that move as rigid bodies.
         """
         self._begin()
-        row = self._log_row()
-        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *force_columns(self._engine)))
-        force, torque = self._engine.stepper.loads(self._engine)
-        return {
-            "force": force,
-            "torque": torque,
-            "field": self.grains.field.copy(),
-            "energy": {name: row[name] for name in names},
-        }
+        return loads_of(self)
 
     @exclusive
     @checked
@@ -423,26 +402,7 @@ class Simulation(ReadOnlySettings):
             one for each long-range force (half of each pair energy; −½ μ·B for dipoles) and each per-grain force, under
             the names of their columns.
         """
-        state, grains, contacts = self.state, self.grains, self.contacts
-        external = [
-            at(state.time) for force in self._engine.external if (at := getattr(force, "flux_density_at", None))
-        ]
-        flux = np.sum([grains.field, *(np.broadcast_to(b, grains.field.shape) for b in external)], axis=0)
-        half = 0.5 * np.sum([contacts[name] for name in ELASTIC], axis=0)
-        elastic = np.zeros(len(grains))
-        for side in range(2):
-            np.add.at(elastic, contacts["pair"][:, side], half)
-        energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
-        shares = {name: share.copy() for name, share in energies_at_grains(self._engine).items()}
-        return {"flux_density": flux, "virial": self._virials(contacts)} | energies | shares
-
-    def _virials(self, contacts: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Share (N, 3, 3) [J] of each grain in the virial of contacts and walls."""
-        grains, pair = self.grains, contacts["pair"].astype(np.int64)
-        separation = self.box.nearest(grains.position[pair[:, 0]] - grains.position[pair[:, 1]])
-        found = shares_of_virial(grains.radius, pair, separation, contacts["force"])
-        others = (each.virials(self.state) for each in self._engine.components)
-        return found + sum(virials for virials in others if virials is not None)
+        return quantities_at_grains(self)
 
     @exclusive
     @checked
@@ -557,42 +517,8 @@ class Simulation(ReadOnlySettings):
         if "change" in self._exclusive:
             raise BadInput("a change within a change is not possible; make both in one block of `with sim.change()`")
         with self._exclusive.held("change"):
-            yield from self._change()
-
-    def _change(self) -> Iterator[Change]:
-        """The change that the user makes, and its effect at the end of the block."""
-        self._begin()
-        present = tuple(as_chosen(force, self.start, self.box) for force in self.forces)
-        pair = self.state.contacts.pair[:, : self.state.count[CONTACTS]].T.copy()
-        system = self._system
-        change = Change(self.grains, present, self.box, pair, system.next_id, self.deformation)
-        yield change
-        given = system.given
-        if change.deformation is not self.deformation:
-            given = given | {DeformedBox.name: DeformedBox((change.deformation,))}
-        if change.is_of_own:
-            own = change.checked_grains().arrays.own
-            for grains in (self._engine.state.grains, self._engine.regular_state.grains, self.start):
-                grains.arrays.own[...] = own
-            if self.writer:
-                self.writer.changed(self)
-            return
-        fixed = int(self.seed or 0), given
-        engine, forces, given = changed_engine(change, present, self._engine, self.ledger.columns, *fixed)
-        if self.ledger.stress:
-            check_stress_rows(engine)
-        before = self._log_row()["total"]
-        self._engine = engine
-        start, box, next_id = self.grains.copy(), change.box, change._next_id
-        self._system = replace(system, start=start, forces=forces, box=box, given=given, next_id=next_id)
-        for text in truncation_warnings(self.grains, forces, box):
-            self._warnings.show(text, text.partition(",")[0])
-        self._origin.choices = {}  # chosen anew
-        if change.regroups:  # the description of the grains in a case file no longer holds
-            self.recipe = None
-        engine.regular_state.lost[OUTSIDE] += before - self._log_row()["total"]
-        if self.writer:
-            self.writer.changed(self)
+            self._begin()
+            yield from changed(self)
 
     @exclusive
     @checked

@@ -36,7 +36,7 @@ def stop_criteria(
         Absolute simulation time, in seconds or as text with a unit; or a function, as for `stop`.
     steps : int, optional
         Number of further steps, at least 1.
-    stop : str or callable, optional
+    stop : str or callable or OwnCondition, optional
         A condition, see `read_condition`, or a function of the simulation.
     time : float
         Present time [s].
@@ -63,8 +63,10 @@ def stop_criteria(
         end, last, stop = planned
         if stop == GIVEN:
             raise BadInput("the condition that ends this run is a function of a script: run(until=function), or a time")
-    is_function = callable(stop) and not isinstance(stop, type)
-    condition = None if stop is None else OwnCondition(stop) if is_function else read_condition(stop)
+    if callable(stop) and not isinstance(stop, type):
+        stop = OwnCondition(stop)
+    is_given = stop is None or isinstance(stop, OwnCondition)
+    condition: Condition | OwnCondition | None = stop if is_given else read_condition(stop)
     if end == last == math.inf and condition is None:
         raise BadInput("run needs an end: until='5 us', steps=1000 or stop='clusters == 1'")
     if steps is not None and last > MOST_STEPS:

@@ -38,6 +38,7 @@ def test_equal_bodies():
     assert collision_kind(50.0, 50.0, [49, 40, 11], 1.0) == "fragmentation"
     assert collision_kind(1.0, 1.0, [1, 1], 0.0) == "bouncing"
     assert collision_kind(1.0, 1.0, [1, 1], 0.0, touched=False) == "miss"
+    assert collision_kind(1.0, 1.0, [1, 1], 0.0, touched=None) == "undecided"
 
 
 def test_numbers_of_fragments():

@@ -58,8 +58,9 @@ FOLDERS = {
     "sweep": (
         COLLIDE + '[sweep.vary]\n"impact.speed" = [2, 4]' + CONTACT,
         {
+            "sweep.json": {},
             "sweep.csv": "impact.speed,seed,state,f,message,seconds,cpu_seconds,version,run\n"
-            "2.0,5,done,1,,1,1,0.0.7,a\n4.0,5,failed,,no,1,1,0.0.7,b\n"
+            "2.0,5,done,1,,1,1,0.0.7,a\n4.0,5,failed,,no,1,1,0.0.7,b\n",
         },
     ),
 }
@@ -91,7 +92,7 @@ EXPECTED = {
         "density = 7874 kg/m^3",
     ],
     "sweep": [
-        "A sweep of sand collide varied impact.speed = (2, 4), seed = (5) (SI units); 1 of 2 runs were done",
+        "A sweep of sand collide varied impact.speed = (2, 4), seed = (5) (SI units); 1 of 2 runs are done, 1 failed.",
         "The target was: kind = chain, grains = 3, radius = 100 nm, material = silica",
         "speed = 2 m/s",
     ],
@@ -129,12 +130,12 @@ def test_each_kind_of_folder(kind, tmp_path, capsys):
 
 
 def test_a_sweep_of_sequential_collisions(tmp_path, capsys):
-    """There is one body; the table of the sweep may be missing."""
+    """There is one body; no run has ended."""
     case = "[target]\nkind = 'chain'\ngrains = 2\nradius = '1 um'\n[impact]\nspeed = '3 m/s'\n"
     case += "[sequence]\ncollisions = 4\n[sweep]\nseeds = 2"
-    assert main(["methods", str(folder_of(tmp_path / "x", case, {"sweep.json": {}}))]) == 0
+    assert main(["methods", str(folder_of(tmp_path / "x", case, {}))]) == 0
     text = capsys.readouterr().out
-    assert "No run of a sweep of sequential collisions has ended." in text
+    assert "A sweep of sequential collisions varied seed = (1, 2) (SI units); 0 of 2 runs are done, 2 left." in text
     assert "The target was: kind = chain, grains = 2" in text and "projectile" not in text
     assert "It collided with a copy of itself, and so did what grew from it: collisions = 4." in text
 
@@ -233,7 +234,7 @@ def test_settings_of_every_force():
             "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
         ),
         (
-            lambda place: folder_of(place / "x", '[sweep]\nkey = "a"', {}),
+            lambda place: folder_of(place / "x", "[sweep]\nseeds = 1", {}),
             "is no case that a sweep can vary",
         ),
         (lambda place: folder_of(place / "x", RUN, {"summary.json": [1]}), "summary.json"),

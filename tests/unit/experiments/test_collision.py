@@ -9,8 +9,18 @@ import pytest
 from matplotlib.figure import Figure
 
 import sand
+from sand.cli.collide import collision_rows
 from sand.cli.main import main
-from sand.experiments.collision import approach, collide, collide_many
+from sand.experiments import collision
+from sand.experiments.collision import (
+    Ending,
+    approach,
+    collide,
+    collide_many,
+    expected_end,
+    latest_end,
+    prepare,
+)
 from sand.experiments.collision_case import read_collision
 from sand.experiments.collision_job import CollisionJob
 from sand.experiments.collision_outcome import collision_title
@@ -70,6 +80,91 @@ def test_a_miss():
     result, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b")
     assert (result.outcome, result.made, result.rebound) == ("miss", 0, pytest.approx(1.0, rel=1e-6, abs=0.0))
     assert sum(result.lost.values()) == 0.0
+
+
+def test_a_time_that_is_no_good_end():
+    """A warning in one line: too early for a contact, or far beyond the outcome, with steps of both; no other one.
+
+    The steps of an end at 5 s are those of the usual end in proportion to the times, as all have the same length.
+    """
+    start = approach(*two(0), speed=1.0, impact_parameter=0.0, along="x", seed=None)
+    usual, latest = expected_end(start), latest_end(start)
+    with pytest.warns(UserWarning) as noted:
+        simulation = prepare(start, ending=Ending("5 s"))
+    (text,) = (str(one.message) for one in noted)
+    few, many = (simulation.expected_cost(time).steps for time in (usual, 5.0))
+    assert many / few == pytest.approx(5.0 / usual, rel=0.01, abs=0.0)
+    assert text.startswith(f"end = 5 s takes about {many:.2g} steps and ") and "; outcomes are usually decided" in text
+    assert f", after about {few:.2g} steps and " in text and text.count("\n") == 0
+    with pytest.warns(UserWarning, match="is before the earliest possible contact, at .* will be undecided"):
+        prepare(start, ending=Ending(0.5 * start.flight))
+    for end in ("outcome", "rest", 1.01 * start.flight, usual, latest):  # without a warning
+        prepare(start, ending=Ending(end))
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:end = .* is before the earliest possible contact")
+def test_an_end_before_the_first_contact(capsys):
+    """Bodies that would touch are undecided, not a miss; a title and a row of the command say so."""
+    start = approach(*two(0), speed=1.0, impact_parameter=0.0, along="x", seed=None)
+    result, _ = collide(*two(0), speed=1.0, end=0.5 * start.flight)
+    assert (result.outcome, result.kind, result.quiet, result.made) == ("undecided", "undecided", False, 0)
+    assert collision_title([result.to_dict()], "X") == "Collision of X at 1 m/s, head-on: no contact yet"
+    (_, text), (_, counts) = collision_rows([result.to_dict()])
+    assert text.startswith("undecided: no contact formed; stopped before") and counts == "1 × undecided"
+    later, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b", end=2.0 * expected_end(start))
+    assert (later.outcome, later.kind, later.quiet) == ("miss", "miss", True)
+
+
+@pytest.mark.compiled("listed")
+@pytest.mark.filterwarnings("ignore:gas")
+def test_a_gas_that_stops_the_bodies(monkeypatch):
+    """Bodies that a gas brings to rest before they touch are undecided; in a thin gas, bodies that pass are a miss.
+
+    A grain stops after the distance v τ, here a tenth of the gap.  The latest end is shortened.
+    """
+    monkeypatch.setattr(collision, "LONGEST", 100.0)
+    start = approach(*two(0), speed=1.0, impact_parameter=0.0, along="x", seed=None)
+    thin = sand.Gas(temperature="10 K", density=1e-9, brownian=False)
+    density = 1e-9 * thin.shortest_time(start.grains) / (0.1 * start.flight)
+    dense = sand.Gas(temperature="10 K", density=density, brownian=False)
+    stopped, sim = collide(*two(0), speed=1.0, forces=[sand.Contact(), dense])
+    assert np.abs(sim.grains.velocity).max() < 1e-3
+    assert (stopped.outcome, stopped.kind, stopped.quiet) == ("undecided", "undecided", False)
+    passed, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b", forces=[sand.Contact(), thin])
+    assert (passed.outcome, passed.kind, passed.quiet) == ("miss", "miss", True)
+    assert passed.end == "the bodies recede, and are farther apart than at the start"
+
+
+def test_bodies_that_have_parted():
+    """Along the path they part when they recede beyond their first distance; bodies that come back have not."""
+    start = approach(*two(0), speed=1.0, impact_parameter="1.1 b", along="x", seed=None)
+    for factor, speed, parted in ((0.5, 1.0, False), (-0.9, 1.0, False), (-1.1, 1.0, True), (-1.1, -1.0, False)):
+        later = start.grains.copy()
+        later.arrays.position[0] *= factor
+        later.arrays.velocity[0] *= speed
+        assert start.has_parted(later) == parted
+
+
+@pytest.mark.compiled("dipoles")
+def test_looks_with_long_cycles(monkeypatch):
+    """r-RESPA cycles of up to 300 steps: there is a look at the first end of a cycle from each thousandth step on.
+
+    Looks every step find the ends of all cycles.  Some looks are more than 100 steps after a thousandth step.
+    """
+    looks = []
+    monkeypatch.setattr(collision, "why_ended", lambda simulation, *_: looks.append(simulation.steps) or "")
+    monkeypatch.setattr(collision, "LONGEST", 40.0)
+    bodies = [chain(3, radius=R, material="silica", moment=1e-19) for _ in range(2)]
+    how = {"forces": [sand.Contact(), sand.Dipoles()], "stepping": sand.Verlet(far_steps=300), "end": "rest"}
+    _, sim = collide(*bodies, speed=1.0, **how)
+    found = looks[1:-1]  # without those of the start and the end
+    looks.clear()
+    monkeypatch.setattr(collision, "LOOK_EVERY", 1)
+    collide(*bodies, speed=1.0, **how)
+    assert sim.steps > 5000
+    assert found == [next(s for s in looks[1:] if s >= 1000 * k) for k in range(1, sim.steps // 1000 + 1)]
+    assert max(step % 1000 for step in found) > 100
 
 
 def aggregates(seed):

@@ -218,6 +218,8 @@ def test_the_small_version(tmp_path, monkeypatch, capsys, name):
     assert first["rows"] == first["design"] == first["done"] and first["cpu_seconds"] > 0.0
     assert {path.name for path in place.iterdir()} == {"sweep.csv", "comparison.csv", "figure.png"}
     assert len(sand.open(place).table["seed"]) == first["rows"]
+    lines = (place / "comparison.csv").read_text("utf-8").splitlines()
+    assert len(lines) > 1 and all("small version" in line and "no result of physics" in line for line in lines[1:])
     if name.startswith("wada"):
         assert first["comparison"][-1].keys() == {"what", "paper", "ours", "verdict"}
     table = (place / "sweep.csv").read_bytes()

@@ -2,7 +2,9 @@
 
 import csv
 import json
+import shutil
 import sys
+import tempfile
 import threading
 import time
 import warnings
@@ -17,6 +19,7 @@ from sand.cli.main import main
 from sand.experiments import sweep_job, sweep_row, sweep_table
 from sand.experiments.sweep_cases import Expected, SweptCollision
 from sand.experiments.sweep_job import SweepJob
+from sand.experiments.sweep_row import run_row
 from sand.io.lock import FolderLock
 from sand.io.run_folder import make_folder, write_json
 from sand.io.sweep_files import CLAIM, COST
@@ -118,6 +121,23 @@ def test_a_further_key(case):
     assert len(computed) == 8 and sorted(r["impact.along"] for r in rows("out")) == ["x"] * 4 + ["y"] * 4
 
 
+def test_values_that_are_given_twice(case, capsys):
+    """One line says how many runs are the same, and names one: by values in another unit, a random design, or seeds."""
+    path, computed = case
+    words = ["sweep", str(path), "--quiet", "--out"]
+    assert main([*words, "out", "--vary", "impact.speed=2,3,2.0 m/s"]) == 0 and len(computed) == 4
+    note = "have the values of others, such as impact.speed = 2.0, seed 4: each is computed once, 4 in all"
+    assert capsys.readouterr().err == f"sand: note: 2 of 6 runs {note}\n"
+    assert main([*words, "random", "--vary", "target.grains=3,4", "--samples", "9", "--seeds", "1,2,1"]) == 0
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == "sand: note: --seeds: 1 given more than once; each is used once"
+    assert second.startswith("sand: note: 14 of 18 runs have the values of others, such as target.grains = ")
+    path.write_text(CASE.replace("[4, 5]", "[4, 5, 4, 6, 6]"))
+    computed.clear()
+    assert main([*words, "case", "--vary", "impact.speed=2"]) == 0 and len(computed) == 3
+    assert capsys.readouterr().err == "sand: note: seeds: 4, 6 given more than once; each is used once\n"
+
+
 def test_the_order_of_completion_does_not_matter(case):
     """Four threads that end in any order give the same table as this process."""
     path, _ = case
@@ -142,6 +162,22 @@ def test_two_processes_in_one_folder(case):
     assert len(computed) == len(set(computed)) == 12
     swept(path, folder="whole")
     assert rows("out") == rows("whole")
+
+
+def test_another_process_has_just_made_the_folder(case, monkeypatch):
+    """A file by which it finds out whether it can write there does not count as one of others."""
+    path, _ = case
+    seen, real = [], tempfile.NamedTemporaryFile
+
+    def made(**how):
+        file = real(**how)
+        SweepJob(path, "out", VARY).refuse_others()
+        seen.append(file.name)
+        return file
+
+    monkeypatch.setattr(tempfile, "NamedTemporaryFile", made)
+    make_folder("out", shared=True)
+    assert len(seen) == 1
 
 
 def test_a_run_of_another_process_is_left_to_it(case, monkeypatch):
@@ -435,11 +471,11 @@ def test_parquet_goes_on(case, monkeypatch):
         (["--vary", "impact.speed=1", "--out", "case.toml"], ("case.toml is a file; give another folder with --out",)),
         (
             ["--vary", "impact.speed=1", "--out", "."],
-            (". holds other files, no sweep; give another folder with --out",),
+            (". holds a case of `sand collide` that has not been run, no sweep; give another folder with --out",),
         ),
         (
             ["--vary", "impact.speed=1", "--out", "job"],
-            ("job holds a job or run of `sand collide`, no sweep; give an",),
+            ("job holds collisions of `sand collide`, no sweep; give another folder",),
         ),
         (
             ["--vary", "impact.speed=1", "--out", "sweep"],
@@ -507,13 +543,87 @@ def test_growth_of_a_sweep_is_drawn(case, monkeypatch, capsys):
 
 
 def test_others_do_not_replace_a_sweep(case, capsys):
-    """A run or collision with --overwrite leaves the table of a sweep as it is."""
+    """A run or collision with --overwrite leaves a sweep as it is, also one without a table, or without a row."""
     path, _ = case
     SweepJob(path, "out", VARY).run()
-    before = Path("out/sweep.csv").read_bytes()
-    with pytest.raises(BadInput, match="out holds a sweep, which is not replaced: give another folder, or remove it"):
-        make_folder("out", overwrite=True)
-    assert Path("out/sweep.csv").read_bytes() == before and Path("out/case.toml").exists()
+    shutil.copytree("out", "rows")
+    Path("rows/sweep.csv").unlink()
+    Path("rows/case.toml").unlink()
+    SweepJob(path, "begun", VARY).begin()
+    for folder in ("out", "rows", "begun"):
+        before = {one: one.read_bytes() for one in Path(folder).rglob("*") if one.is_file()}
+        text = f"{folder} holds a sweep, which is not replaced: give another folder, or remove it"
+        for overwrite in (True, False):
+            with pytest.raises(BadInput, match=text):
+                make_folder(folder, overwrite=overwrite)
+        assert main(["collide", str(path), "--out", folder, "--overwrite"]) == 2
+        assert text in capsys.readouterr().err
+        assert before == {one: one.read_bytes() for one in Path(folder).rglob("*") if one.is_file()}
+
+
+def test_what_a_folder_holds(case, capsys):
+    """`sand.open` of a folder without a run, and a sweep into that of another command, name what is in it."""
+    path, _ = case
+    job = SweepJob(path, "begun", VARY)
+    job.begin()
+    message = "begun holds a sweep, whose table is not written yet; to continue it: sand resume begun"
+    run_row(job.command, job.content, "begun", True, job.rows[0])
+    with pytest.raises(BadInput, match=message):
+        sand.open("begun")
+    job.run()
+    with pytest.raises(BadInput, match="begun holds a sweep; give the folder of one of its runs, begun/runs/NAME"):
+        sand.open(["begun"])
+    shutil.copytree("begun", "figure/results")
+    with pytest.raises(BadInput, match="figure holds results of sand reproduce; their table is in figure/results"):
+        sand.open("figure")
+    assert len(sand.open("figure/results").table["run"]) == 12
+    written = "# Written by SAND: settings\n"
+    for name, texts in {
+        "empty": {},
+        "new": {"case.toml": CASE},
+        "one": {"case.toml": written + "[run]\nuntil = 1", "collision.toml": written + CASE},
+        "many": {"case.toml": written + CASE},
+        "gas": {"case.toml": written + "[run]\nuntil = 1"},
+    }.items():
+        Path(name).mkdir()
+        for file, text in texts.items():
+            Path(name, file).write_text(text)
+    said = {"empty": r"no trajectory.gsd in it; it is empty", "new": "a case of `sand collide` that has not been run"}
+    for name, text in said.items():
+        with pytest.raises(BadInput, match=text):
+            sand.open(name)
+    held = {
+        "one": "a collision of `sand collide`",
+        "many": "collisions of `sand collide`",
+        "gas": "a run of `sand run`",
+    }
+    for name, text in held.items():
+        assert main(["sweep", str(path), "--seeds", "2", "--out", name]) == 2
+        assert f"{name} holds {text}, no sweep; give another folder with --out" in capsys.readouterr().err
+    assert main(["collide", str(path), "--out", "one"]) == 2
+    assert (
+        "or --overwrite to replace what is in it, a collision of `sand collide`; or continue it: sand resume one"
+        in (capsys.readouterr().err)
+    )
+
+
+def test_methods_of_an_unfinished_sweep(case, capsys):
+    """All values of the design, and how many runs are done, failed and left; also once the folder `runs` is removed."""
+    path, _ = case
+    job = SweepJob(path, "out", {"vary": {"impact.speed": [2, 13], "target.grains": [3, 6]}})
+    job.begin()
+    for row in (job.rows[0], job.rows[1], job.rows[-1]):
+        run_row(job.command, job.content, "out", True, row)
+    values = "impact.speed = (2, 13), target.grains = (3, 6), seed = (4, 5) (SI units)"
+    assert main(["methods", "out"]) == 0
+    assert f"varied {values}; 2 of 8 runs are done, 1 failed, 5 left." in capsys.readouterr().out
+    job.run()
+    swept(path, {"vary": {"impact.speed": 7}})  # a further value
+    shutil.rmtree("out/runs")
+    assert main(["methods", "out"]) == 0
+    values = "impact.speed = (2, 7, 13), target.grains = (3, 6), seed = (4, 5) (SI units)"
+    found = capsys.readouterr().out.split("varied ")[1]
+    assert found.startswith(f"{values}; 6 of 10 runs are done, 4 failed.")
 
 
 def test_resume_of_a_sweep_with_failed_runs(case, capsys):

@@ -159,7 +159,7 @@ def test_columns_of_the_ledger():
     page = (PAGES / "ledger.md").read_text("utf-8")
     rows = [row for row in re.findall(r"^\| (.*?) \|", page, re.M) if row != "column"]
     columns = [name for row in rows for name in (re.findall(r"`(\w+)`", row) or ["force"])]
-    assert columns == list(Ledger(["force"], awake=True).columns)
+    assert columns == list(Ledger(["force"], awake=True, stress=True).columns)
 
 
 def test_tables_that_follow_the_source():
