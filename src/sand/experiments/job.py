@@ -134,7 +134,7 @@ class Job:
 
         def show(line: str = "") -> None:
             done, total = len(kept.found.keys() & set(tasks)), len(set(tasks))
-            progress(f"{done} of {total} {self.PARTS}", done / max(total, 1), line)
+            progress(f"{done} of {total} {self.PARTS}", done / max(total, 1), *([line] if line else ()))
 
         show()
         left = [task for task in dict.fromkeys(tasks) if task not in kept.found]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from ..basics.box import Box
 from ..io.trajectory import Frames
 from ..simulation.observers import Observer
 
-if TYPE_CHECKING:
-    from .laboratory import Plan
+Plan = Any
+"""`laboratory.Plan`, whose module imports this one."""
 
 
 class Percolation(Observer):
