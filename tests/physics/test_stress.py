@@ -341,19 +341,20 @@ def test_clusters_at_rest_carry_their_inertia():
     assert found["rigid"].parts["contacts"].trace() < -0.9 * found["rigid"].parts["kinetic"].trace()
 
 
-def gas(out=None, stress=True):
+def gas(out=None, stress=True, stepping=None):
     """Magnetic grains that stick, in a periodic box."""
     kind = {"radius": "10 nm", "material": "iron", "moment": "material", "temperature": "100 K"}
     grains = sand.setup.gas(20, "0.25 um", **kind, seed=11)
     forces = [sand.Contact(damping="critical"), sand.Dipoles()]
-    return sand.Simulation(grains, forces, box="0.25 um", stress=stress, out=out, frame_every="2 ns")
+    return sand.Simulation(grains, forces, box="0.25 um", stress=stress, stepping=stepping, out=out, frame_every="2 ns")
 
 
 @pytest.mark.compiled("dipoles")
-@pytest.mark.filterwarnings("ignore:grains in contact vibrate")
-def test_rows_and_frames(tmp_path):
+@pytest.mark.filterwarnings("ignore:grains in contact vibrate", "ignore:without settling_time")
+@pytest.mark.parametrize("stepping", [sand.Verlet(), sand.RigidClusters()], ids=["grains", "bodies"])
+def test_rows_and_frames(stepping, tmp_path):
     """With `stress` rows have the present tensor and frames the shares; the motion has the bits of a run without it."""
-    sim, plain = gas(tmp_path / "run"), gas(stress=False)
+    sim, plain = gas(tmp_path / "run", stepping=stepping), gas(stress=False, stepping=stepping)
     for one in (sim, plain):
         one.run(until="20 ns")
     assert state(sim) == state(plain) and not set(PRESSURES) & set(plain.ledger.columns)

@@ -26,11 +26,11 @@ CAPABILITIES = {
     "undecided collisions and unfit ends, maps of outcomes, what a folder holds in words, all runs of an unfinished "
     "sweep, values given twice": 267,
     "signals that wait while code is compiled, linked or loaded": 28,
-    "a periodic box that is deformed: rates, ramps and pressures that it follows, work of its boundaries, dipoles of all "
-    "images in it": 484,
+    "a periodic box that is deformed: rates, ramps and pressures that it follows, work of its boundaries, dipoles of "
+    "all images in it": 484,
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
-    "grains in frames, pictures and page": 488,
+    "grains in frames, pictures and page": 491,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8

@@ -32,7 +32,6 @@ REFUSED = {
     "walls": "walls",
     "driven": "driven grains",
     "settling": "settling_time of contacts",
-    "cluster_cutoff": "a cut-off that follows the clusters",
 }
 """Components that do not work in a box that is deformed, and what sentences call them."""
 

@@ -47,7 +47,8 @@ class Component:
     `contacts_changed`, between regular steps.  The ledger has `columns` and `losses` of the components that the user
     gave, and asks `row` for the values of both (energies stored in its contacts are added to those of all contacts by a
     stage of `Hook.ENERGIES`).  A change asks `problems_of_motion` and `problems_of_arrays`, continues with what is
-    `kept`, and calls `saved_for_change` and `changed`; case.toml has `parameters` and `materials`.
+    `kept`, and calls `saved_for_change` and `changed`; case.toml has `parameters` and `materials`.  The stress asks for
+    `virials` and `volume`.
 
     Attributes
     ----------

@@ -126,11 +126,10 @@ class Change:
         return own[name]
 
     def _checked_deformation(self, value: Any) -> Any:
-        """A deformation in place of that at the start.  Raises BadInput."""
-        if self._before[3] is None and value is not None:
-            raise BadInput("deformation: the ledger of this run has no columns for it; start with sand.Deformation(0)")
-        if self._before[3] is not None and value is None:
-            raise BadInput("deformation = None would leave columns of the ledger empty; give sand.Deformation(0)")
+        """A deformation in place of that before.  Raises BadInput."""
+        if (value is None) != (self._before[3] is None):
+            columns = "the ledger has the columns of its start: with those of a deformation or without"
+            raise BadInput(f"deformation: {columns}; for a box at rest give sand.Deformation(0)")
         return next(iter(read_deformation(value)), None)
 
     @property

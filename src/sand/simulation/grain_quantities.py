@@ -45,7 +45,7 @@ def quantities_at_grains(simulation: Any) -> dict[str, np.ndarray]:
 def virials_of(simulation: Any, contacts: Mapping[str, np.ndarray]) -> np.ndarray:
     """Share (N, 3, 3) [J] of each grain in the virial of contacts, with their columns `pair` and `force`, and walls."""
     grains, pair = simulation.grains, contacts["pair"].astype(np.int64)
-    separation = simulation.box.nearest(grains.position[pair[:, 0]] - grains.position[pair[:, 1]])
+    separation = simulation.state.box.nearest(grains.position[pair[:, 0]] - grains.position[pair[:, 1]])
     found = shares_of_virial(grains.radius, pair, separation, contacts["force"])
     others = (each.virials(simulation.state) for each in simulation._engine.components)
     return found + sum(virials for virials in others if virials is not None)

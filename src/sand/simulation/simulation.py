@@ -317,7 +317,6 @@ class Simulation(ReadOnlySettings):
     @exclusive
     def strain_rate(self) -> np.ndarray:
         """Present rates of strain A (3, 3) [1/s] of the box: velocities in the laboratory are velocity + A position."""
-        self._begin()
         cell = self.state.cell
         return np.zeros((3, 3)) if cell is None else np.diag(cell.span[6:])
 
