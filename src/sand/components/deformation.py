@@ -192,6 +192,10 @@ class DeformedBox(Component):
             arrays["cell/start"] = self._lengths.copy()
             arrays["cell/span"] = np.concatenate([self._lengths, 1.0 / self._lengths, arrays["cell/span"][RATE:]])
 
+    def choices(self) -> dict[str, str]:
+        """The settings, for the description of a run."""
+        return {self.name: ", ".join(f"{name} = {value}" for name, value in self.given.parameters().items())}
+
     def columns(self) -> list[str]:
         """Lengths of the box, filling factor, work of the boundaries and pressure."""
         each = [f"{kind}_{axis}" for kind in ("box", "work") for axis in AXES]
