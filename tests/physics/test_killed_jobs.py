@@ -22,6 +22,7 @@ from sand.io.trajectory import read_frames
 from ..systems import KILL
 
 pytestmark = [
+    pytest.mark.filterwarnings("ignore:the rate,"),
     pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes of a group are listed in /proc"),
     pytest.mark.compiled("contacts"),
 ]
@@ -73,8 +74,23 @@ relative_error = 0.01
 seed = 3
 """,
 }
+CASES["compress"] = """
+[aggregate]
+kind = "rbd"
+grains = 12
+radius = "0.1 um"
+material = "ice"
+[compression]
+rate = "0.2 m/s"
+to = 0.3
+by = "walls"
+seeds = [1, 2, 3, 4, 5, 6]
+[forces.contact]
+damping = "critical"
+"""
 CASES["sweep"] = f"{CASES['collide']}[sweep]\nseeds = 2\n[sweep.vary]\nimpact.speed = [2, 3, 4]\n"
 RESULTS = {"grow": "growth.json", "collide": "collision.json", "scatter": "results.csv", "sweep": "sweep.csv"}
+RESULTS["compress"] = "laboratory.json"
 WAYS = ("Ctrl-C", "SIGTERM", "parent killed", "worker killed")
 
 
@@ -128,8 +144,8 @@ def begun(command, folder, rows=0):
     """Whether the first results of a job are in its folder, and so many rows of them."""
     if command == "sweep":
         return len(list(folder.glob("runs/*/row.json"))) >= max(rows, 1)
-    name = {"grow": "seed-2/ledger.csv", "collide": "collisions.jsonl", "scatter": "flights.csv"}[command]
-    path = folder / name
+    names = {"collide": "collisions.jsonl", "scatter": "flights.csv"}
+    path = folder / names.get(command, "seed-2/ledger.csv")
     return path.exists() and len(path.read_text().splitlines()) >= rows
 
 
@@ -143,6 +159,8 @@ def results(command, folder):
     found = json.loads((folder / RESULTS[command]).read_text())
     if command == "collide":
         return found["collisions"]
+    if command == "compress":
+        return [(folder / "results.csv").read_text(), found["runs"]]
     boxes = [folder / f"seed-{seed}" for seed in found["seeds"]]
     frames = [read_frames(box / "trajectory.gsd") for box in boxes]
     return [
@@ -206,6 +224,7 @@ def stop_and_check(job, folder, way):
         pytest.param("collide", "parent killed", marks=pytest.mark.validate),
         ("scatter", "SIGTERM"),
         ("sweep", "parent killed"),
+        ("compress", "worker killed"),
     ],
 )
 def test_stopped_once(tmp_path, command, way):
@@ -214,7 +233,7 @@ def test_stopped_once(tmp_path, command, way):
     case.write_text(CASES[command])
     assert main([command, str(case), "--out", str(undisturbed), "--workers", "1", "--quiet"]) == DONE
     job = start(command, case, folder)
-    wait_until(lambda: begun(command, folder, rows=7 if command == "grow" else 2))
+    wait_until(lambda: begun(command, folder, rows=7 if command in ("grow", "compress") else 2))
     assert job.poll() is None and workers(job)
     stop_and_check(job, folder, way)
     assert job.returncode != DONE

@@ -22,6 +22,7 @@ CAPABILITIES = {
     "sweeps over keys of any case (sand sweep): designs, table, figure, resume by several processes": 1274,
     "presets of papers, the text of methods, files for optics and for codes of dust growth": 890,
     "awake clusters copied to and from their part, kicked and searched for rest by compiled loops": 199,
+    "packings that are compressed, stretched, sheared (sand compress, stretch, shear): laws, runs, tables": 925,
     "undecided collisions and unfit ends, maps of outcomes, what a folder holds in words, all runs of an unfinished "
     "sweep, values given twice": 267,
     "signals that wait while code is compiled, linked or loaded": 28,

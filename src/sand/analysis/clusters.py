@@ -132,9 +132,19 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box, refuse_percolat
 def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     """Which clusters (K,) percolate: a path along contacts leads from a grain to its own periodic image.
 
-    Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration. On a path that
-    closes within the box the separations of neighbours (nearest images) add up to 0, on one that percolates to a
-    multiple of the side of the box.
+    Such a cluster is infinite in the periodic lattice of boxes, so that it has no radius of gyration.
+    `percolation_axes` has the parameters, and says along which axes.
+    """
+    return np.asarray(percolation_axes(position, pairs, box).any(axis=1))
+
+
+@checked
+def percolation_axes(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Axes (K, 3) along which each cluster percolates, as True and False.
+
+    True where a path along contacts leads from a grain to an image of itself that is displaced along this axis. On a
+    path that closes within the box the separations of neighbours (nearest images) add up to 0, on one that percolates
+    to multiples of the sides of the box.
 
     Parameters
     ----------
@@ -147,10 +157,31 @@ def percolating_clusters(position: np.ndarray, pairs: np.ndarray, box: Box) -> n
     """
     ends = checked_pairs(len(position), pairs)
     labels = labels_of(len(position), ends)
-    whole = in_one_piece(np.array(position, dtype=np.float64), ends, box, labels)
-    found = np.zeros(labels.max(initial=-1) + 1, dtype=bool)
-    found[labels[ends[closes_through_boundary(whole, ends, box), 0]]] = True
+    found = np.zeros((labels.max(initial=-1) + 1, 3), dtype=bool)
+    crossed = box.image(np.asarray(position)[ends[:, 1]] - np.asarray(position)[ends[:, 0]])
+    if crossed.any():
+        image = _images(len(position), ends, crossed)
+        np.logical_or.at(found, labels[ends[:, 0]], image[ends[:, 0]] - crossed != image[ends[:, 1]])
     return found
+
+
+def _images(count: int, ends: np.ndarray, crossed: np.ndarray) -> np.ndarray:
+    """Images (N, 3) by which grains make their clusters whole, from the lengths (C, 3) by which contacts cross."""
+    neighbours: list[list[tuple[int, int, int]]] = [[] for _ in range(count)]
+    for k, (a, b) in enumerate(ends.tolist()):
+        neighbours[a].append((b, k, -1))
+        neighbours[b].append((a, k, 1))
+    image, seen, steps = [[0, 0, 0] for _ in range(count)], [False] * count, crossed.tolist()
+    for start in range(count):
+        queue = [] if seen[start] else [start]
+        seen[start] = True
+        while queue:
+            i = queue.pop()
+            for j, k, sign in neighbours[i]:
+                if not seen[j]:
+                    seen[j], image[j] = True, [n + sign * step for n, step in zip(image[i], steps[k], strict=True)]
+                    queue.append(j)
+    return np.array(image)
 
 
 @checked

@@ -18,6 +18,7 @@ from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
 from . import options, parsing, report
 from .collide import collision_rows
+from .laboratory import run_rows
 from .scatter import result_rows
 
 COMPILATION = 5.0
@@ -28,6 +29,7 @@ JOBS = {
     "scatter": ("a scattering job", "scattering"),
     "collide": ("collisions", "collision"),
     "grow": ("boxes", "growth"),
+    **{name: (f"a job of sand {name}", name) for name in ("compress", "stretch", "shear")},
     "sweep": ("a sweep", "sweep"),
 }
 """Names of jobs by command: for people, and the `kind` for machines."""
@@ -87,7 +89,7 @@ def describe_folder(path: Path) -> Description:
     if not any((path / name).exists() for name in (files.CASE, files.ONE_COLLISION)):
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
     listed = ("files", "  ".join(report.files_of(path)))
-    for name in (files.SCATTERING, files.COLLISION):
+    for name in (files.SCATTERING, files.COLLISION, files.LABORATORY):
         if (path / name).exists() and (job := _describe_results(path / name, files.read_json(path / name))):
             heading, rows, content = job
             return heading, [*rows, listed], {**content, "folder": str(path)}
@@ -304,6 +306,48 @@ def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     return "a valid growth case", rows, content
 
 
+def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..basics.units import format_quantity
+    from ..experiments.laboratory import simulation_of, slow_from
+    from ..experiments.laboratory_case import read_laboratory
+
+    content = files.read_toml(path)
+    case = read_laboratory(path, command_for(content) or "")
+    seeds = case.section.seeds
+    with report.naming(path):
+        planned = case.plan(seeds[0])
+        good = slow_from(planned)
+        simulation = simulation_of(planned, case.physics(), stepping=case.stepping)
+    limits = _limits(simulation)
+    cost, costs = _cost(simulation, planned.until, math.inf, None, len(seeds), len(seeds))
+    rate = f"{planned.rate:.3g} 1/s, or {planned.rate * planned.scales.time:.2g} /t_c"
+    rows = [
+        ("aggregate", f"{len(simulation.grains)} grains, filling factor {planned.filling(planned.sides):.3g}"),
+        ("between", " x ".join(format_quantity(float(f"{side:.3g}"), "m") for side in planned.sides)),
+        ("rate of strain", f"{rate}; the largest that is slow enough: {good}"),
+        (
+            "E_roll",
+            f"12 pi^2 gamma R xi_c = {planned.scales.roll_energy:.3g} J; E_roll/r^3 = {planned.scales.pressure:.3g} Pa",
+        ),
+        (
+            "dashpots",
+            f"1 % of the critical one is damping_constant = {0.01 * planned.scales.critical_damping:.2g} kg/s",
+        ),
+        ("seeds", str(len(seeds))),
+        *_of_each(costs, len(seeds), "run"),
+        ("end", f"at {format_quantity(planned.until, 's')}"),
+        *limits.items(),
+        start,
+    ]
+    numbers = {
+        "rate": planned.rate,
+        "until": planned.until,
+        "sides": planned.sides.tolist(),
+        **planned.scales._asdict(),
+    }
+    return "a valid case", rows, {"kind": "laboratory case", "case": content, "cost": cost, "limits": limits} | numbers
+
+
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
     from ..basics.units import format_quantity
     from ..experiments.scattering.flight_cost import expected_flights
@@ -399,6 +443,8 @@ def _describe_results(path: Path, content: dict[str, Any]) -> Description | None
         elif "collisions" in content:
             (name, kind), rows = JOBS["collide"], collision_rows(content["collisions"])
             name = "a collision" if len(content["collisions"]) == 1 else name
+        elif "loading" in content:
+            (name, kind), rows = JOBS[content["loading"]], run_rows(content["runs"])
         else:
             return None
     except (KeyError, TypeError, ValueError, AttributeError, IndexError):
@@ -426,6 +472,7 @@ JOB_CASES: dict[str, Callable[[Path, tuple[str, str]], Description]] = {
     "scatter": _scattering_case,
     "collide": _collision_case,
     "grow": _growth_case,
+    **dict.fromkeys(("compress", "stretch", "shear"), _laboratory_case),
     "sweep": _sweep_case,
 }
 """Description of the case files of jobs; the second argument is the row with the command that runs the case."""

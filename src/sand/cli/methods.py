@@ -71,7 +71,7 @@ def described(folder: Path) -> tuple[dict[str, Any], list[str]]:
     if kind not in KINDS or not begun:
         known = ", ".join(map(str, KINDS))
         raise BadInput(f"{folder} holds nothing that was computed by sand {known}; give the folder of a run or job")
-    names = (files.SUMMARY, files.COLLISION, files.SCATTERING)
+    names = (files.SUMMARY, files.COLLISION, files.SCATTERING, files.LABORATORY)
     places = [*(folder / name for name in names), *sorted(folder.glob(f"seed-*/{files.SUMMARY}"))]
     results = next((found for place in places if "sand" in (found := _content(place))), {})
     if (folder / files.SWEEP_CSV).exists():
@@ -206,6 +206,25 @@ def _collision(case: Any, summary: dict[str, Any]) -> Sentences:
     yield from _common(case, used, summary, case.physics()[0])
 
 
+def _of_loading(folder: Path, path: Path) -> Sentences:
+    from ..experiments.laboratory_case import check_laboratory
+
+    case = check_laboratory(files.read_toml(path), str(path))
+    runs = _content(folder / files.LABORATORY).get("runs", [])
+    seeds = case.section.seeds
+    yield f"Packings that differ by the seed alone were loaded, seeds {_seeds(seeds)}; {len(runs)} are finished."
+    yield from _loading(case)
+
+
+def _loading(case: Any) -> Sentences:
+    """Sentences on a case of `sand compress`, `sand stretch` or `sand shear`."""
+    from .method_text import section
+
+    yield f"The packing was: {section(case.aggregate)}."
+    yield f"What was done, {case.section.kind}: {section(case.section, 'seeds', 'out')}; t_c is the time of a contact."
+    yield from _common(case, [case.aggregate.material, *case.materials], {}, case.physics())
+
+
 def _of_scattering(folder: Path, path: Path) -> Sentences:
     from ..experiments.scattering.scatter_case import read_scattering
 
@@ -262,6 +281,8 @@ def _of_sweep(folder: Path, path: Path) -> Sentences:
         yield from _collision(swept.case, {})
     elif command == "scatter":
         yield from _scattering(swept.case, swept.case.flights())
+    elif hasattr(swept.case, "aggregate"):
+        yield from _loading(swept.case)
     else:
         yield from _of_case(swept.case, {})
 
@@ -271,6 +292,7 @@ KINDS: dict[str | None, Callable[[Path, Path], Sentences]] = {
     "collide": _of_collisions,
     "grow": _of_growth,
     "scatter": _of_scattering,
+    **dict.fromkeys(("compress", "stretch", "shear"), _of_loading),
     "sweep": _of_sweep,
 }
 """What describes the folder of each command; the arguments are the folder and its case file."""

@@ -10,7 +10,7 @@ import click
 from ..basics.errors import BadInput
 from . import options, parsing, report
 
-COMMANDS = ("run", "collide", "scatter", "grow", "sweep")
+COMMANDS = ("run", "collide", "scatter", "grow", "compress", "stretch", "shear", "sweep")
 """Commands that read a case file; as `experiments.templates.TEMPLATES`, which takes long to import."""
 
 
@@ -30,11 +30,14 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
     """Write NAME.toml, a case file with every key, its meaning, unit, default and allowed values.
 
     \b
-    run      a gas of silica grains
-    collide  two fluffy aggregates of silica
-    scatter  cross-sections of two magnetic grains of iron
-    grow     the gas, for several seeds
-    sweep    the aggregates, for several speeds, impact parameters and seeds
+    run       a gas of silica grains
+    collide   two fluffy aggregates of silica
+    scatter   cross-sections of two magnetic grains of iron
+    grow      the gas, for several seeds
+    compress  a fluffy aggregate of ice, in a periodic box
+    stretch   a compact aggregate of ice, between two walls
+    shear     a compact aggregate of ice, between two walls
+    sweep     the aggregates, for several speeds, impact parameters and seeds
 
     It can be run as it is; keys that are not in use are comments.
     """

@@ -17,6 +17,7 @@ from . import (
     cite,
     collide,
     completion,
+    compress,
     export,
     grow,
     info,
@@ -30,13 +31,15 @@ from . import (
     resume,
     run,
     scatter,
+    shear,
+    stretch,
     sweep,
     view,
 )
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 COMMANDS = (
-    *(new, run, resume, build, collide, scatter, grow, sweep, reproduce),
+    *(new, run, resume, build, collide, scatter, grow, compress, stretch, shear, sweep, reproduce),
     *(analyse, plot, view, export, info, methods, cite, completion),
 )
 """One module per command, with a click command named `command`."""

@@ -13,11 +13,12 @@ import click
 from ..basics.errors import BadInput
 from ..basics.threads import set_threads
 from ..config.folders import content_of, job_in
-from ..io.run_folder import CASE, COLLISION, GROWTH, SCATTERING, SUMMARY, SWEEP, SWEEP_CSV, read_json
+from ..io.run_folder import CASE, COLLISION, GROWTH, LABORATORY, SCATTERING, SUMMARY, SWEEP, SWEEP_CSV, read_json
 from . import options, parsing, report
 from .collide import collide
 from .exits import PHYSICS
 from .grow import grow
+from .laboratory import laboratory
 from .scatter import scatter
 from .sweep import sweep
 
@@ -25,6 +26,7 @@ JOBS = {
     "collide": (COLLISION, "collision_job", "CollisionJob", collide),
     "scatter": (SCATTERING, "scattering.job", "ScatterJob", scatter),
     "grow": (GROWTH, "growth_boxes", "GrowthJob", grow),
+    **dict.fromkeys(("compress", "stretch", "shear"), (LABORATORY, "laboratory_job", "LaboratoryJob", laboratory)),
     "sweep": (SWEEP, "sweep_job", "SweepJob", sweep),
 }
 """Results file, module and class of each job, and what runs it and prints its results."""
@@ -52,8 +54,8 @@ def command(
 
     A run whose condition (`stop`) was met goes on with another condition in its case.toml, or to --until.
 
-    Jobs of `sand collide`, `sand scatter`, `sand grow` and `sand sweep` are continued as well: finished parts are kept,
-    and the results are those of an uninterrupted job.
+    Jobs of all other commands, such as `sand collide`, are continued as well: finished parts are kept, and the results
+    are those of an uninterrupted job.
     """
     set_threads(threads)
     place = Path(folder)

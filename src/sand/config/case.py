@@ -27,7 +27,7 @@ from ..setup.gas import SPINS
 from ..setup.grain_classes import GrainClass, Materials, Radii, class_numbers
 from ..simulation.condition import GIVEN, read_condition
 from ..simulation.ledger import Ledger
-from .commands import BODIES, refuse_other_command
+from .commands import OF_FILES, refuse_other_command
 from .key_errors import validate
 from .sections import (
     Cadence,
@@ -358,8 +358,8 @@ def read_content(path: str | Path, command: str) -> dict[str, Any]:
 
 def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, Any]:
     """The content of a case file with absolute paths, from names relative to the case file, of grains and bodies."""
-    whole = {name: copy.deepcopy(table) if name in ("grains", *BODIES) else table for name, table in content.items()}
-    tables = [whole[name] for name in ("grains", *BODIES) if isinstance(whole.get(name), dict)]
+    whole = {name: copy.deepcopy(table) if name in OF_FILES else table for name, table in content.items()}
+    tables = [whole[name] for name in OF_FILES if isinstance(whole.get(name), dict)]
     for table in [*tables, *(one for each in tables for one in _tables_in(each.get("classes")))]:
         file = table.get("file")
         if isinstance(file, str) and file.strip() and "\0" not in file:  # others are reported by the validation

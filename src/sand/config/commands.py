@@ -12,6 +12,9 @@ OWN_TABLES = {
     "sequence": {"sequence"},  # of sequential collisions, which only a sweep reads
     "grow": {"grow"},
     "scatter": {"flight", "measure"},
+    "compress": {"compression"},
+    "stretch": {"stretch"},
+    "shear": {"shear"},
     "collide": {"impact"},
     "run": {"run", "grains", "box", "neighbours"},
 }
@@ -19,6 +22,8 @@ OWN_TABLES = {
 sweep` those of any other command."""
 BODIES = {"target", "projectile"}
 """Tables of the bodies of `sand collide` and `sand scatter`."""
+OF_FILES = ("grains", "aggregate", *BODIES)
+"""Tables that may name a file of grains, relative to the case file."""
 
 
 def command_for(content: dict[str, Any]) -> str | None:

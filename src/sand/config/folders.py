@@ -10,6 +10,7 @@ from ..io import run_folder as files
 from .commands import command_for
 
 CONTENTS = {"run": "a run", "scatter": "a job", "collide": "collisions", "grow": "boxes", "sweep": "a sweep"}
+CONTENTS |= dict.fromkeys(("compress", "stretch", "shear"), "packings")
 """What commands leave in a folder."""
 
 
@@ -53,7 +54,7 @@ def without_run(folder: Path) -> str:
     if any((folder / name).exists() for name in (files.SCATTERING, files.FLIGHTS)):
         return f"{folder} holds a job of sand scatter, which keeps no trajectories of grains"
     if any(folder.glob("seed-*")):
-        return f"{folder} holds the boxes of sand grow; give the folder of one of them, such as seed-1"
+        return f"{folder} holds runs of several seeds; give the folder of one of them, such as seed-1"
     if (folder / files.CASE).exists():
         if (content := content_of(folder)).endswith("not been run"):
             return f"{folder} holds {content}"

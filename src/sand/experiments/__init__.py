@@ -10,7 +10,7 @@ from typing import Any
 
 from ..basics.errors import NoSuchAttribute, did_you_mean
 
-MODULES = ("chain_impact", "collision", "kernel_table", "scattering", "sequential")
+MODULES = ("chain_impact", "collision", "kernel_table", "laboratory", "scattering", "sequential")
 """Public submodules; the others are used by these and by the command line."""
 
 

@@ -78,6 +78,10 @@ class Job:
         """
         raise NotImplementedError
 
+    def line(self, outcome: dict[str, Any]) -> str:
+        """A line of progress that stays after a part is finished; none by default."""
+        return ""
+
     def results(self, outcomes: list[dict[str, Any]]) -> dict[str, Any]:
         """The content of the results file, of the outcomes in the order of the tasks; draws the figure."""
         raise NotImplementedError
@@ -128,13 +132,13 @@ class Job:
         work = partial(self.work(), observers=observers) if executor is None else self.work()
         kept = GrowingOutcomes(self.folder / self.KEPT, self.content, resume=self.resume)
 
-        def show() -> None:
+        def show(line: str = "") -> None:
             done, total = len(kept.found.keys() & set(tasks)), len(set(tasks))
-            progress(f"{done} of {total} {self.PARTS}", done / max(total, 1))
+            progress(f"{done} of {total} {self.PARTS}", done / max(total, 1), *([line] if line else ()))
 
         show()
         left = [task for task in dict.fromkeys(tasks) if task not in kept.found]
         for task, outcome in results_of(executor, work, left):
             kept.add(task, outcome)
-            show()
+            show(self.line(outcome))
         return self.results([kept.found[task] for task in tasks])

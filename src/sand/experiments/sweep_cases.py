@@ -21,6 +21,10 @@ from ..simulation.run_writer import summary_of
 from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
 from .growth_case import GrowSection
+from .laboratory import simulation_of as simulation_of_plan
+from .laboratory import slow_from
+from .laboratory_case import OF_COMMAND, LaboratoryCase, check_laboratory, model_of
+from .laboratory_job import loaded
 from .sequential import SequenceCase
 
 SEQUENCE = ("outcome", "impact_energy", "contacts_before", "contacts_after", "gyration_after", "time", "steps", "drift")
@@ -267,6 +271,35 @@ class SweptScattering(SweptCase):
         return {key: value for key, value in found.items() if key not in self.NO_RESULTS}
 
 
+class SweptLoading(SweptCase):
+    """A case of `sand compress`, `sand stretch` or `sand shear`; see `SweptCase`."""
+
+    NAME = "packings that are loaded"
+    GIVEN = tuple(f"{table}.{key}" for table in OF_COMMAND.values() for key in ("seeds", "out"))
+
+    def __init__(self, content: dict[str, Any], name: str):
+        self.case: LaboratoryCase = check_laboratory(content, name)
+        self.seeds = list(self.case.section.seeds)
+
+    @staticmethod
+    def model(content: dict[str, Any]) -> type:
+        """Model of the case file."""
+        return model_of(content)
+
+    def expected(self, seed: int) -> Expected:
+        """Set up the packing, and estimate its cost."""
+        planned = self.case.plan(seed)
+        slow_from(planned)
+        cost = simulation_of_plan(planned, self.case.physics(), stepping=self.case.stepping).expected_cost(
+            planned.until
+        )
+        return Expected(_without_figure(cost), cost.memory, cost.disk)
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Load the packing; the columns of its table are lists."""
+        return loaded(self.case, seed, folder, observers, resumed=True)
+
+
 def _resumed(folder: Path | None, make: Callable[[], Any]) -> Any:
     """The simulation of an interrupted run; None if there is none, or none that can be continued, which is noted."""
     if folder is None or not checkpoint_files(folder):
@@ -293,5 +326,6 @@ CASES: dict[str, type[SweptCase]] = {
     "collide": SweptCollision,
     "sequence": SweptSequence,
     "scatter": SweptScattering,
+    **dict.fromkeys(OF_COMMAND, SweptLoading),
 }
 """The cases that a sweep can vary, by the command that reads them: one line for each."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from ..config.template import (
     EXAMPLES,
@@ -20,6 +22,7 @@ from ..config.template import (
 )
 from .collision_case import BodySection, ImpactSection
 from .growth_case import GrowSection
+from .laboratory_case import CASES, OF_COMMAND, PackingSection
 from .scattering.scatter_case import FlightSection, MeasureSection, ScatterBody
 from .sweep_design import SweepSection
 
@@ -39,6 +42,26 @@ SCATTERING: Values = {
 """Keys in use of `sand scatter`: cross-sections of two magnetic grains of iron at two speeds."""
 GROWTH: Values = {**EXAMPLES, "grow": {"seeds": [1, 2, 3, 4]}, "run": {"until": "20 us", "frame_every": "0.1 us"}}
 """Keys in use of `sand grow`: the gas of the case of `sand run`, for four seeds."""
+DAMPED = {"damping": "constant", "damping_constant": "2.2e-10 kg/s"}
+PACKED = {"kind": "rbd", "grains": 64, "radius": "0.1 um", "material": "ice"}
+LOADINGS: dict[str, Values] = {
+    "compress": {
+        "aggregate": {"kind": "bcca", "grains": 64, "radius": "0.1 um", "material": "ice"},
+        "compression": {"rate": "3e-5 /t_c", "to": 0.2, "seeds": [1, 2]},
+        "forces.contact": DAMPED,
+    },
+    "stretch": {
+        "aggregate": PACKED,
+        "stretch": {"rate": "1e-4 /t_c", "to": 0.5, "by": "walls", "seeds": [1, 2]},
+        "forces.contact": DAMPED,
+    },
+    "shear": {
+        "aggregate": PACKED,
+        "shear": {"rate": "1e-4 /t_c", "to": 1.0, "by": "walls", "seeds": [1, 2]},
+        "forces.contact": DAMPED,
+    },
+}
+"""Keys in use of `sand compress`, `sand stretch` and `sand shear`: aggregates of ice, slightly damped."""
 SWEEP = {"vary": {"impact.speed": "log(0.3 m/s, 3 m/s, 4)", "impact.impact_parameter": ["0 b", "0.5 b"]}, "seeds": 2}
 """Keys in use of [sweep], for the collisions above."""
 
@@ -78,6 +101,20 @@ def _scattering(name: str) -> str:
     return template(name, "scatter", tables, SCATTERING)
 
 
+def _loading(name: str, command: str) -> str:
+    table = OF_COMMAND[command]
+    section: Any = CASES[command].model_fields[table].annotation
+    note = summary(section).removeprefix(f"Section [{table}]: ").capitalize()
+    tables = [
+        Table("[aggregate]", summary(PackingSection).removeprefix("Section [aggregate]: "), keys_of(PackingSection)),
+        Table(f"[{table}]", note, keys_of(section)),
+        material_table(),
+        *force_tables(),
+        *stepping_tables(),
+    ]
+    return template(name, command, tables, LOADINGS[command])
+
+
 def _flight_keys() -> list[Key]:
     """Keys of [flight], of which the speed is required."""
     return [key._replace(default=REQUIRED) if key.name == "speed" else key for key in keys_of(FlightSection)]
@@ -96,6 +133,7 @@ TEMPLATES: dict[str, Callable[[str], str]] = {
     "collide": _collision,
     "scatter": _scattering,
     "grow": _growth,
+    **{command: partial(_loading, command=command) for command in LOADINGS},
     "sweep": _sweep,
 }
 """Text of a case file, from its name, by command."""

@@ -25,7 +25,7 @@ from .lock import LOCK, refuse_locked, writing
 
 OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS_CSV, FLIGHTS,
-    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON,
+    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON, LABORATORY, LOADED,
 ) = (
     "case.toml",
     "trajectory.gsd",
@@ -43,6 +43,8 @@ OWN_FILES = (
     "sweep.json",
     "sweep.csv",
     "comparison.csv",
+    "laboratory.json",
+    "loaded.jsonl",  # outcomes of the finished runs of sand compress, stretch or shear until all are
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
 CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")
@@ -411,7 +413,7 @@ def was_written_by_sand(path: Path) -> bool:
 def is_job(folder: Path, case: Path) -> bool:
     """Whether SAND works or worked in a folder with a case file, and the case file is not just one of the user."""
     names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    results = {COLLISION, FLIGHTS, GROWTH, OUTCOMES, SCATTERING, SWEEP, TRAJECTORY}
+    results = {COLLISION, FLIGHTS, GROWTH, LABORATORY, OUTCOMES, SCATTERING, SWEEP, TRAJECTORY}
     return (
         was_written_by_sand(case)
         or bool(results & names)

@@ -66,6 +66,18 @@ speed = "2 m/s"
 seeds = [1, 2]
 [forces.contact]
 """
+LOADING = """
+[aggregate]
+kind = "lattice"
+shape = [3, 3, 3]
+radius = "0.1 um"
+material = "ice"
+[TABLE]
+rate = "1 mm/s"
+to = 0.6
+by = "walls"
+[forces.contact]
+"""
 SCATTERING = """
 [projectile]
 radius = "10 nm"
@@ -81,6 +93,11 @@ relative_error = 0.05
 seed = 3
 """
 KINDS = {"target": ("collide", COLLISION), "impact": ("collide", COLLISION), "projectile": ("collide", COLLISION)}
+KINDS["aggregate"] = ("compress", LOADING.replace("TABLE", "compression"))
+KINDS |= {
+    table: (command, LOADING.replace("TABLE", table))
+    for command, table in {"compress": "compression", "stretch": "stretch", "shear": "shear"}.items()
+}
 KINDS |= {"flight": ("scatter", SCATTERING), "measure": ("scatter", SCATTERING)}
 """Command and case of a use that begins with a change of this section; of other sections: `sand run` and CASE."""
 

@@ -38,7 +38,17 @@ temperature = "100 K"
 speed = "1 m/s"
 """
 GROW = RUN + "[grow]\nseeds = [1, 2]\n"
-CASES = {"run": RUN, "collide": COLLIDE, "scatter": SCATTER, "grow": GROW}
+SHEAR = """
+[aggregate]
+kind = "chain"
+grains = 3
+radius = "0.1 um"
+[shear]
+rate = "1 mm/s"
+to = 0.5
+by = "walls"
+"""
+CASES = {"run": RUN, "collide": COLLIDE, "scatter": SCATTER, "grow": GROW, "shear": SHEAR}
 
 
 @pytest.mark.parametrize("meant", list(CASES))

@@ -50,6 +50,11 @@ FOLDERS = {
     ),
     "grow": (GROW + CONTACT, {f"seed-{k}/summary.json": SUMMARY for k in (1, 2)} | {"growth.json": {}}),
     "scatter": (SCATTER, {"scattering.json": {"job": "cross-section", "sand": "0.0.7"}}),
+    "stretch": (
+        '[aggregate]\nkind = "rbd"\ngrains = 30\nradius = "0.1 um"\nmaterial = "iron"\n[stretch]\nrate = "2 m/s"\n'
+        f'to = 0.5\nby = "walls"\nseeds = [1, 2, 3]\n{CONTACT}',
+        {"laboratory.json": {"runs": [{}, {}], "sand": "0.0.7"}},
+    ),
     "sweep": (
         COLLIDE + '[sweep.vary]\n"impact.speed" = [2, 4]' + CONTACT,
         {
@@ -80,6 +85,12 @@ EXPECTED = {
         "density = 2650 kg/m^3",
     ],
     "grow": ["seeds 1, 2", "8 grains, a gas", "2 boxes have run", "was 1.5e-05 of"],
+    "stretch": [
+        "seeds 1 to 3; 2 are finished",
+        "The packing was: kind = rbd, grains = 30, radius = 100 nm, material = iron",
+        "to = 0.5, by = walls, along = auto",
+        "density = 7874 kg/m^3",
+    ],
     "sweep": [
         "A sweep of sand collide varied impact.speed = (2, 4), seed = (5) (SI units); 1 of 2 runs are done, 1 failed.",
         "The target was: kind = chain, grains = 3, radius = 100 nm, material = silica",
@@ -93,6 +104,9 @@ EXPECTED = {
         "density = 7874 kg/m^3",
     ],
 }
+for _table, _kind in (("compression", "compress"), ("shear", "shear")):
+    _case, _results = FOLDERS["stretch"]
+    FOLDERS[_kind], EXPECTED[_kind] = (_case.replace("[stretch]", f"[{_table}]"), _results), EXPECTED["stretch"]
 OF_FORCES = [
     "the JKR law (Johnson et al. 1971), with critical damping",
     "slide factor = 2.5, roll factor = 8",
@@ -213,11 +227,11 @@ def test_settings_of_every_force():
         (lambda place: place / "none", "there is no folder"),
         (
             lambda place: place,
-            "holds nothing that was computed by sand run, collide, grow, scatter, sweep; give the folder",
+            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
         ),
         (
             lambda place: (place / "case.toml").write_text(RUN, "utf-8") and place,
-            "holds nothing that was computed by sand run, collide, grow, scatter, sweep; give the folder",
+            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
         ),
         (
             lambda place: folder_of(place / "x", "[sweep]\nseeds = 1", {}),

@@ -24,6 +24,7 @@ from sand.config.key_errors import keys_at
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
+from sand.experiments.laboratory_case import CASES as LOADINGS
 from sand.experiments.scattering.scatter_case import ScatterCase
 from sand.experiments.sweep_design import SweepSection
 from sand.experiments.templates import TEMPLATES
@@ -115,7 +116,7 @@ def test_parts_of_a_class_are_documented():
     assert {key.name: key.default for key in keys_of(sand.Gas)}["temperature"] is REQUIRED
 
 
-MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case, "sweep": CollisionCase}
+MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case, "sweep": CollisionCase} | LOADINGS
 
 
 @pytest.mark.parametrize("command", list(TEMPLATES))

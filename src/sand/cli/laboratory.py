@@ -1,0 +1,71 @@
+"""What `sand compress`, `sand stretch` and `sand shear` share: their options, and the rows that they print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..basics.threads import set_threads
+from . import options, parsing, report
+
+SHOWN = 12
+"""Runs listed one by one on the screen; laboratory.json has all of them."""
+
+
+def command_of(name: str, short: str, what: str) -> click.Command:
+    """The command of a kind of loading."""
+
+    @parsing.command(name, short_help=short)
+    @click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
+    @click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
+    @options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
+    @options.workers
+    @options.scheduler
+    @options.wall_time
+    @options.imports
+    @options.threads
+    @click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
+    @options.output
+    def command(
+        case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
+    ) -> None:
+        set_threads(threads)
+        from ..experiments.laboratory_job import LaboratoryJob
+        from .launch import refuse_folder
+
+        job = LaboratoryJob(case, out, seeds, name, overwrite=overwrite)
+        refuse_folder(job.folder, Path(case), overwrite=overwrite)
+        laboratory(job, threads=threads, **how)
+
+    command.help = (
+        f"{what}\n\nRuns each seed in DIR/seed-N, with all files of `sand run`, and writes laboratory.json, "
+        "results.csv with the rows of all seeds, and a figure to the folder. Ctrl-C interrupts it; continue with "
+        "`sand resume`."
+    )
+    return command
+
+
+def laboratory(job: Any, *, as_json: bool, quiet: bool, **execution: Any) -> None:
+    """Run a `LaboratoryJob` and print the results; `execution` as for `job.run_job`. Raises BadInput as it does."""
+    from .job import run_job
+
+    content = run_job(job, as_json=as_json, quiet=quiet or as_json, lines=True, **execution)
+    heading = f"resume {job.folder}" if job.resume else f"{job.COMMAND} {job.path}"
+    rows = [*run_rows(content["runs"]), ("files", report.listed(job.folder))]
+    report.answer(content, heading, rows, as_json=as_json, quiet=quiet)
+
+
+def run_rows(runs: list[dict[str, Any]]) -> report.Rows:
+    """The first SHOWN runs."""
+    from ..basics.units import format_quantity
+
+    def text(run: dict[str, Any]) -> str:
+        last, most = (format_quantity(float(f"{run[name]:.3g}"), "Pa") for name in ("stress", "largest_stress"))
+        ends = f"filling factor {run['filling_at_start']:.3g} to {run['filling']:.3g}, strain {run['strain']:.3g}"
+        stress = f"stress {last} at the end, {most} at most; {run['coordination']:.2f} contacts per grain"
+        return f"{ends}; {stress}; {run['step']} steps, drift {run['drift']:.1e}"
+
+    rows = [(f"seed {run['seed']}", text(run)) for run in runs[:SHOWN]]
+    return [*rows, ("…", f"and {len(runs) - SHOWN} more")] if len(runs) > SHOWN else rows

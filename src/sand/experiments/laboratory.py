@@ -1,0 +1,368 @@
+"""Numerical laboratory: a packing is compressed, stretched or sheared, by its periodic box or between two walls."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import re
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ..basics.arguments import checked
+from ..basics.box import Box, as_box
+from ..basics.errors import BadInput, shown, warn
+from ..basics.grains import Grains
+from ..basics.settings import Number, Reading, Settings, Word
+from ..basics.units import si
+from ..contact.model import Contact
+from ..forces.base import Force
+from ..integrate.integrator import Integrator
+from ..io.run_folder import TRAJECTORY
+from ..setup.checks import pairs_in_contact, refuse_pieces
+from ..setup.from_frame import Start
+from ..simulation.simulation import Simulation
+from ..theory.compression import CLOSEST, PackingScales, packing_scales
+from .laboratory_table import Percolation, table_of
+
+KINDS = ("compress", "stretch", "shear")
+"""What is done to a packing."""
+WAYS = ("box", "walls")
+"""What moves: the periodic box, or one of two walls. The functions of each are in the module laboratory_WAY."""
+OF_STATE = (
+    *("contacts", "made", "moved", "broken", "clusters", "translation", "rotation"),
+    *("normal", "sliding", "rolling", "twisting", "total"),
+)
+"""Columns of the ledger that the table repeats, besides pressures and losses."""
+
+
+class Rate(NamedTuple):
+    """A rate of strain as given."""
+
+    value: float
+    unit: str  # "1/s", "/t_c", or "m/s" for the speed of a wall
+
+    def __str__(self) -> str:
+        return f"{self.value!r} {self.unit}"
+
+
+_PER_CONTACT_TIME = re.compile(r"(.+?)(?:\s+1)?\s*/\s*t_?c")
+
+
+def read_rate(value: Any, name: str) -> Rate:
+    """Read a rate of strain, or a speed.  Raises BadInput for a number without a unit, and for all else."""
+    if isinstance(value, Rate):
+        return value
+    advice = "give '1e-5 /t_c', with the time t_c of a contact, '1e4 1/s', or, by = 'walls', a speed such as '10 cm/s'"
+    if isinstance(value, (int, float)):
+        raise BadInput(f"{name} = {shown(value)} has no unit; {advice}")
+    match = _PER_CONTACT_TIME.fullmatch(value.strip()) if isinstance(value, str) else None
+    candidates = [(value, "1/s", "1/s"), (value, "m/s", "m/s")] if match is None else [(match[1], "1", "/t_c")]
+    for number, unit, called in candidates:
+        try:
+            found = si(number, unit, name)
+        except BadInput:
+            continue
+        if found > 0.0:
+            return Rate(found, called)
+        raise BadInput(f"{name} = {shown(value)} must be above 0: what is done gives the direction")
+    raise BadInput(f"{name} = {shown(value)} is no rate of strain; {advice}")
+
+
+BOX = Reading(lambda value, name: as_box(value), write=lambda box: list(box.lengths))
+
+
+@checked
+@dataclass(frozen=True)
+class Loading(Settings):
+    """How a packing is loaded.
+
+    Parameters
+    ----------
+    kind : str
+        "compress", "stretch" or "shear".
+    rate : float or str
+        Rate of strain > 0: in units of the time t_c = √(m̄ δ_c/F_c) of a contact of two mean grains, "1e-5 /t_c", or
+        "1e4 1/s". The box shrinks or grows exponentially, dL/dt = ∓rate × L. A wall moves with a constant speed: rate
+        times the distance of the walls at the start, or a speed, "10 cm/s".
+    to : float
+        Where it ends: of "compress" a filling factor φ, at most 0.74; of "stretch" the strain L/L₀ − 1, and of "shear"
+        the strain, the distance that the faces have slid over the distance between them.
+    by : str, optional
+        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y; "shear"
+        needs walls.
+    along : str, optional
+        Axis of the strain, "x", "y" or "z"; "all" for equal strains of a box that is compressed. "auto", the default:
+        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear moves the lid along x.
+    box : float or str or sequence, optional
+        Sides of the box at the start [m], one or three; between walls those along x and y count. By default those of a
+        frame, or of a cube that holds the body with a gap of a tenth of a radius.
+    every : float, optional
+        Change of ln φ, or strain, from row to row of the table, 0.02 by default.
+
+    Raises
+    ------
+    BadInput
+        If a setting is unknown, out of range, or contradicts another one; one line for each.
+    """
+
+    kind: Annotated[str, Word(*KINDS)]
+    rate: Annotated[Any, Reading(read_rate, write=str)]
+    to: Annotated[Any, Number(above=0.0)]
+    by: Annotated[str, Word(*WAYS)] = "box"
+    along: Annotated[str, Word("auto", "all", "x", "y", "z")] = "auto"
+    box: Annotated[Any, BOX] = None
+    every: Annotated[Any, Number(least=1e-4, most=0.5)] = 0.02
+
+    place: ClassVar[str] = ""
+
+    def contradictions(self, wrong: Set[str]) -> Iterator[str]:
+        """Keys that are for another kind of test."""
+        if not {"kind", "to"} & wrong and self.kind == "compress" and self.to > CLOSEST:
+            yield f"to = {self.to:g} is above {CLOSEST}, the filling factor of the closest packing of equal grains"
+        if wrong & {"kind", "rate", "by", "along"}:
+            return
+        if (self.kind, self.by) == ("shear", "box"):
+            yield "by = 'box' is for a box that is compressed or stretched; shear needs by = 'walls'"
+            return
+        if self.by == "box" and self.rate.unit == "m/s":
+            yield "rate is a speed, which is for by = 'walls'; give a rate such as '1e-5 /t_c'"
+        allowed = self.axes_allowed
+        if self.along not in ("auto", *allowed):
+            advice = f"give {' or '.join(map(repr, allowed))}" if allowed else "leave it out"
+            yield f"along = {self.along!r} is not for {self.kind} with by = {self.by!r}; {advice}"
+
+    @property
+    def axes_allowed(self) -> tuple[str, ...]:
+        """Values of `along` besides "auto", the default first."""
+        if self.kind == "shear":
+            return ()
+        return ("z",) if self.by == "walls" else ("all", "x", "y", "z") if self.kind == "compress" else ("x", "y", "z")
+
+    @property
+    def axes(self) -> str:
+        """Axes whose length changes; of shear the axis along which the velocity changes."""
+        if self.kind == "shear":
+            return "z"
+        axis = self.axes_allowed[0] if self.along == "auto" else self.along
+        return "xyz" if axis == "all" else axis
+
+
+class Plan(NamedTuple):
+    """A packing at its start, and how it is loaded; made by `plan`."""
+
+    loading: Loading
+    start: Start
+    moved: dict[str, Any]  # arguments of `Simulation`: what moves
+    sides: np.ndarray  # lengths of the box (3,) [m]; along z the distance of the walls
+    rate: float  # of strain, at the start [1/s]
+    until: float  # [s]
+    row_every: float  # [s]
+    scales: PackingScales
+
+    def filling(self, sides: np.ndarray) -> float:
+        """Filling factor φ in a box of these lengths (3,) [m]."""
+        return 4.0 / 3.0 * math.pi * float((self.start.grains.radius**3).sum()) / float(np.prod(sides))
+
+    def rate_ratio(self, sides: np.ndarray) -> float:
+        """The rate over the largest one that is slow enough at these lengths, see `PackingScales.largest_rate`."""
+        moved = ["xyz".index(axis) for axis in self.loading.axes]
+        speeds = self.rate * (self.sides if self.loading.by == "walls" else sides)[moved]  # that of a wall is constant
+        return float(speeds.max()) / self.scales.largest_rate(self.filling(sides), 1.0)
+
+    def row(self, before: dict[str, float] | None, row: dict[str, float]) -> dict[str, Any]:
+        """Row of the table, of two rows of the ledger; the first one has no mean values."""
+        way, grains = _way(self.loading), len(self.start.grains)
+        sides = way.sides(self, row)
+        filling = self.filling(sides)
+        axis = "xyz".index(self.loading.axes[0])
+        sheared = self.loading.kind == "shear"
+        known = {
+            "time": row["time"],
+            "step": row["step"],
+            "filling": filling,
+            "mean_filling": math.nan if before is None else math.sqrt(filling * self.filling(way.sides(self, before))),
+            "strain": self.rate * row["time"] if sheared else float(sides[axis] / self.sides[axis]) - 1.0,
+            **{f"side_{name}": float(side) for name, side in zip("xyz", sides, strict=True)},
+            "stress": math.nan if before is None else way.stress(self, before, row),
+            "coordination": 2.0 * row["contacts"] / grains,
+            "rate_ratio": self.rate_ratio(sides),
+        }
+        more = {
+            name: row[name]
+            for name in row
+            if name in OF_STATE or name.startswith(("pressure", "mean_pressure", "lost_"))
+        }
+        return known | more
+
+
+def _way(loading: Loading) -> Any:
+    """The module of what moves, with the functions `placed`, `moved`, `times`, `sides` and `stress`."""
+    return importlib.import_module(f".laboratory_{loading.by}", __package__)
+
+
+def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None = None) -> Plan:
+    """Place a body in a box, or between walls.
+
+    Parameters
+    ----------
+    body : Grains or Start
+        A body in one piece, or a frame of an earlier run, with its contacts and box, from `sand.setup.from_frame`.
+    loading : Loading
+        How it is loaded.
+    forces : sequence of Force or None, optional
+        `[sand.Contact()]` by default.
+
+    Raises
+    ------
+    BadInput
+        If the body is not in one piece, or does not fit into the box, or its end has been reached.
+    """
+    given = body if isinstance(body, Start) else Start(body, None, Box.open(), "")
+    contact = next((one for one in forces or () if isinstance(one, Contact)), None) if forces else Contact()
+    if contact is None:
+        raise BadInput("forces: there is no sand.Contact(), by which grains touch; add it")
+    if given.contacts is not None and not len(given.contacts.pair):
+        raise BadInput(f"the frame has no contacts, and nothing to {loading.kind}; take an earlier or a later one")
+    pairs = pairs_in_contact(given.grains, given.box)[0] if given.contacts is None else given.contacts.pair
+    refuse_pieces(given.grains, np.asarray(pairs, np.int64), given.box, "the body")
+    way, grains = _way(loading), given.grains
+    start, sides = way.placed(loading, given, contact)
+    rolling = {"roll_factor": contact.roll_factor, "rolling_limit": contact.rolling_limit}
+    scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **rolling)
+    unit = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}[loading.rate.unit]
+    found = Plan(loading, start, {}, sides, loading.rate.value / unit, 0.0, 0.0, scales)
+    filling = found.filling(sides)
+    if loading.kind == "compress" and loading.to <= filling:
+        raise BadInput(f"to = {loading.to:g} is not above the filling factor at the start, {filling:.3g}")
+    until, row_every = way.times(loading, filling, found.rate)
+    return found._replace(moved=way.moved(found, contact), until=until, row_every=row_every)
+
+
+def slow_from(planned: Plan) -> str:
+    """The largest rate at the start of a plan that is slow enough; warns if no part of the plan is."""
+    first, last = (planned.rate_ratio(sides) for sides in (planned.sides, _way(planned.loading).last_sides(planned)))
+
+    def text(rate: float) -> str:
+        return f"{rate:.3g} 1/s, or {rate * planned.scales.time:.2g} /t_c"
+
+    good = f"{text(planned.rate / first)}, at the start"
+    if (times := min(first, last)) > 1.0:
+        warn(
+            f"the rate, {text(planned.rate)}, is {times:.2g} times too fast for a static stress; the largest good rate "
+            f"is {good}"
+        )
+    return good
+
+
+class Loaded(NamedTuple):
+    """A packing that was loaded."""
+
+    plan: Plan
+    table: list[dict[str, Any]]  # rows; columns are those of docs/laboratory.md
+    simulation: Simulation  # at its end
+
+    def to_dict(self) -> dict[str, Any]:
+        """Results for JSON."""
+        planned, last = self.plan, self.table[-1]
+        return {
+            "kind": planned.loading.kind,
+            "by": planned.loading.by,
+            "grains": len(planned.start.grains),
+            "radius": float(planned.start.grains.radius.mean()),
+            "filling_at_start": planned.filling(planned.sides),
+            "rate": planned.rate,
+            "contact_time": planned.scales.time,
+            "largest_rate_at_start": planned.rate / planned.rate_ratio(planned.sides),
+            "surface_energy": planned.start.grains.materials[0].surface_energy,
+            "roll_energy": planned.scales.roll_energy,
+            "pressure_scale": planned.scales.pressure,
+            **{name: last[name] for name in ("time", "step", "filling", "strain", "stress", "coordination")},
+            "largest_stress": max((row["stress"] for row in self.table[1:]), default=math.nan),
+            "drift": self.simulation.ledger.drift,
+            "table": {name: [row[name] for row in self.table] for name in last},
+        }
+
+
+def simulation_of(planned: Plan, forces: Sequence[Force] | None = None, **options: Any) -> Simulation:
+    """Set up the simulation of a plan; options are those of `Simulation`.  Raises BadInput."""
+    start, given = planned.start, [Contact()] if forces is None else forces
+    simulation = Simulation(
+        start.grains,
+        given,
+        box=start.box,
+        contacts=start.contacts,
+        frame_every=planned.row_every,
+        stress=True,
+        **planned.moved,
+        **options,
+    )
+    simulation.origin = start.note
+    return simulation
+
+
+def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
+    """Run the simulation of a plan, which may have been resumed, to its end.
+
+    Raises
+    ------
+    BadInput
+        If it stopped for physical reasons.
+    Interrupted
+        By Ctrl-C.
+    """
+    seen = Percolation()
+    simulation.observers = [*simulation.observers, seen]
+    if simulation.writer is not None:
+        simulation.writer.draws = False  # the figure of the table is drawn by the job
+    result = simulation.run(max(planned.until, simulation.time))
+    if result.outcome.is_physics:
+        raise BadInput(f"the {planned.loading.kind} test cannot be computed to its end: {result}")
+    rows = simulation.ledger.rows
+    if simulation.writer is not None:
+        seen.see_frames(simulation.writer.folder / TRAJECTORY, rows)
+    return Loaded(planned, table_of(planned, rows, seen), simulation)
+
+
+@checked
+def load(
+    body: Any,
+    loading: Loading,
+    *,
+    forces: Sequence[Force] | None = None,
+    stepping: Integrator | None = None,
+    seed: int | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    observers: Sequence[Any] = (),
+) -> Loaded:
+    """Compress, stretch or shear a packing, and measure its stress.
+
+    Parameters
+    ----------
+    body : Grains or Start
+        A body in one piece, or a frame of an earlier run from `sand.setup.from_frame`.
+    loading : Loading
+        How it is loaded.
+    forces : sequence of Force or None, optional
+        `[sand.Contact()]` by default.
+    stepping, seed, out, overwrite, observers : optional
+        As for `sand.Simulation`.
+
+    Returns
+    -------
+    Loaded
+        Table and simulation.
+
+    Raises
+    ------
+    BadInput
+        As `plan` and `sand.Simulation`, or if it stopped for physical reasons.
+    """
+    planned = plan(body, loading, forces)
+    slow_from(planned)
+    options = {"stepping": stepping, "seed": seed, "out": out, "overwrite": overwrite, "observers": observers}
+    return run_to_end(planned, simulation_of(planned, forces, **options))

@@ -1,0 +1,101 @@
+"""Packings in a periodic box that moves; see `laboratory`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..basics.box import Box
+from ..basics.errors import BadInput
+from ..basics.units import format_quantity
+from ..config.case import COMPONENTS
+from ..contact.model import Contact
+from ..setup.from_frame import Start
+
+if TYPE_CHECKING:
+    from .laboratory import Loading, Plan
+
+LOST = "lost_box"
+"""Column of the ledger: energy [J] that the moving box took from grains and contacts."""
+GAP = 0.1
+"""Gap between a body and its image in the box that just holds it, in radii."""
+
+
+def in_box(loading: Loading, body: Start, axes: str) -> Start:
+    """A packing in a box that is periodic along these axes: that of its frame, or a body in a box that holds it.
+
+    Raises
+    ------
+    BadInput
+        If the frame has another box, or the body does not fit into that of `loading`.
+    """
+    if not body.box.is_open:
+        if loading.box is not None:
+            raise BadInput(f"box: the frame has its own, {body.box.describe()}; leave box out")
+        if open_axes := [axis for axis in axes if body.box.lengths["xyz".index(axis)] is None]:
+            raise BadInput(
+                f"the box of the frame is open along {open_axes[0]}; it must be periodic along {', '.join(axes)}"
+            )
+        return body
+    grains = body.grains.copy()
+    low, high = (
+        (grains.position - grains.radius[:, None]).min(axis=0),
+        (grains.position + grains.radius[:, None]).max(axis=0),
+    )
+    cube = float((high - low).max()) + GAP * float(grains.radius.mean())
+    lengths = [cube, cube, cube] if loading.box is None else list(loading.box.lengths)
+    for k, axis in enumerate("xyz"):
+        if axis not in axes:
+            lengths[k] = None
+        elif lengths[k] is None:
+            raise BadInput(f"box: its {axis} axis is open; give a length")
+        elif lengths[k] < high[k] - low[k]:
+            given, needed = (format_quantity(float(v), "m") for v in (lengths[k], high[k] - low[k]))
+            raise BadInput(
+                f"box: {given} along {axis} is less than the body, {needed}; give a larger box, or leave it out"
+            )
+    grains.arrays.position[...] -= (0.5 * (low + high))[:, None]
+    return Start(grains, body.contacts, Box(tuple(lengths)), body.note)  # type: ignore[arg-type]
+
+
+def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.ndarray]:
+    """The packing in its box, and the lengths of the box."""
+    start = in_box(loading, body, "xyz")
+    return start, np.array(start.box.lengths, float)
+
+
+def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
+    """The motion of the box, as an argument of `Simulation`."""
+    sign = -1.0 if plan.loading.kind == "compress" else 1.0
+    return {
+        "deformation": COMPONENTS["deformation"](
+            [sign * plan.rate if axis in plan.loading.axes else 0.0 for axis in "xyz"]
+        )
+    }
+
+
+def times(loading: Loading, filling: float, rate: float) -> tuple[float, float]:
+    """Times of the end and between two rows [s]; sides that change do so as e^(∓rate t)."""
+    number = len(loading.axes)
+    if loading.kind == "compress":
+        return math.log(loading.to / filling) / (number * rate), loading.every / (number * rate)
+    return math.log1p(loading.to) / rate, loading.every / rate
+
+
+def last_sides(plan: Plan) -> np.ndarray:
+    """Lengths (3,) at the end [m]."""
+    factor = math.exp((-1.0 if plan.loading.kind == "compress" else 1.0) * plan.rate * plan.until)
+    return plan.sides * np.array([factor if axis in plan.loading.axes else 1.0 for axis in "xyz"])
+
+
+def sides(plan: Plan, row: dict[str, float]) -> np.ndarray:
+    """Lengths (3,) [m] at a row of the ledger."""
+    return np.array([row[f"box_{axis}"] for axis in "xyz"])
+
+
+def stress(plan: Plan, before: dict[str, float], row: dict[str, float]) -> float:
+    """Mean stress [Pa] between two rows of the ledger, the work of the box over its change of volume."""
+    first, last = (float(np.prod(sides(plan, one))) for one in (before, row))
+    return float((before[LOST] - row[LOST]) / abs(last - first))

@@ -1,0 +1,179 @@
+"""Case files of `sand compress`, `sand stretch` and `sand shear`."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from ..basics.errors import BadInput, ErrorCollector
+from ..basics.grains import Grains
+from ..basics.material import PRESETS, Material
+from ..basics.settings import For, Number, Whole
+from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
+from ..config.commands import command_for
+from ..config.key_errors import validate
+from ..config.sections import PathName, Section, Seeds, Stepping, with_integrator, with_keys
+from ..integrate.verlet import Verlet
+from ..io.frame import Frame
+from ..io.run_folder import TRAJECTORY
+from ..io.trajectory import Frames
+from ..setup.from_file import from_trajectory, is_own_trajectory
+from ..setup.from_frame import Start
+from .collision_case import BodySection
+from .laboratory import Loading, Plan, plan
+
+
+class PackingSection(BodySection):
+    """Section [aggregate]: an aggregate (another one for each seed if it is random), a file, or a frame of a run."""
+
+    frame: Annotated[int | None, Whole(-(2**31), 2**31 - 1), For("kind", "file")] = None
+    """Index of the frame, if `file` is a run of SAND; −1, the last, by default. Of a folder with seed-1, seed-2, … each
+    seed takes its own run."""
+    filling: Annotated[Any, Number(above=0.0, below=1.0), For("kind", "file")] = None
+    """Filling factor of the frame to take, instead of its index: the frame that is nearest to it."""
+
+    def contradictions(self) -> Iterator[str]:
+        """As those of a body, and two ways to choose a frame."""
+        yield from super().contradictions()
+        if self.frame is not None and self.filling is not None:
+            yield "frame and filling both choose a frame; leave one of them out"
+
+    def packing(self, materials: dict[str, Material], seed: int) -> Grains | Start:
+        """The body, or the frame with its contacts and box.  Raises BadInput."""
+        if self.kind == "file":
+            path = Path(str(self.file))
+            path = own if (own := path / f"seed-{seed}").is_dir() else path
+            if is_own_trajectory(path):
+                number = -1 if self.frame is None else self.frame
+                if self.filling is not None:
+                    number = frame_with(path, self.filling)
+                return from_trajectory(path, number, materials)
+        if chosen := [name for name in ("frame", "filling") if getattr(self, name) is not None]:
+            raise BadInput(f"{chosen[0]} is for a run of SAND; {self.file} is another file: leave {chosen[0]} out")
+        return self.build(materials, seed)
+
+
+def frame_with(path: Path, filling: float) -> int:
+    """Index of the frame of a run whose filling factor is nearest.  Raises BadInput if it is beyond all of them."""
+    with contextlib.closing(Frames(path / TRAJECTORY if path.is_dir() else path)) as frames:
+        found = np.array([_filling(frame) for frame in frames])
+    if not found.size or not found.min() * (1.0 - 0.02) <= filling <= found.max() * (1.0 + 0.02):
+        ends = f"from {found.min():.3g} to {found.max():.3g}" if found.size else "none"
+        raise BadInput(f"filling = {filling:g}: the filling factors of the frames in {path} are {ends}")
+    return int(np.abs(found - filling).argmin())
+
+
+def _filling(frame: Frame) -> float:
+    """Filling factor of a frame, along open axes within the extent of the grains."""
+    position, radius = frame.position, frame.radius[:, None]
+    extent = (position + radius).max(axis=0) - (position - radius).min(axis=0)
+    lengths = [extent[k] if length is None else length for k, length in enumerate(frame.box.lengths)]
+    return 4.0 / 3.0 * math.pi * float((frame.radius**3).sum()) / float(np.prod(lengths))
+
+
+@with_keys(Loading, "kind")
+class LoadingSection(Section):
+    """How the aggregate is loaded."""
+
+    kind: ClassVar[str]
+    seeds: Seeds = Field(default_factory=lambda: [1])
+    """One run for each seed."""
+    out: PathName | None = None
+    """Folder of the results."""
+
+    def contradictions(self) -> Iterator[str]:
+        """Those of the settings."""
+        errors = ErrorCollector()
+        errors.take(self.loading)
+        yield from errors.problems
+
+    def loading(self) -> Loading:
+        """The settings.  Raises BadInput."""
+        return Loading(self.kind, **self.model_dump(exclude={"seeds", "out"}))
+
+
+class CompressionSection(LoadingSection):
+    """Section [compression]: how the aggregate is compressed, by its periodic box or between two walls."""
+
+    kind = "compress"
+
+
+class StretchSection(LoadingSection):
+    """Section [stretch]: how the aggregate is stretched, by its periodic box or between two walls."""
+
+    kind = "stretch"
+
+
+class ShearSection(LoadingSection):
+    """Section [shear]: how the aggregate is sheared, by its periodic box or between two walls."""
+
+    kind = "shear"
+
+
+class LaboratoryCase(Section):
+    """Case file of `sand compress`, `sand stretch` or `sand shear`, without the table of the command."""
+
+    aggregate: PackingSection
+    materials: dict[str, MaterialSection] = Field(default_factory=dict)
+    forces: ForcesSection = ForcesSection()
+    stepping: Stepping = Verlet()
+
+    @property
+    def section(self) -> Any:
+        """The table of the command."""
+        return next(table for table in vars(self).values() if isinstance(table, LoadingSection))
+
+    def physics(self) -> list[Any] | None:
+        """Forces, as `laboratory.plan` takes them."""
+        return self.forces.build() or None
+
+    def plan(self, seed: int) -> Plan:
+        """The packing of a seed, and how it is loaded.  Raises BadInput."""
+        materials = {**PRESETS, **{name: table.build(name) for name, table in self.materials.items()}}
+        return plan(self.aggregate.packing(materials, seed), self.section.loading(), self.physics())
+
+
+class CompressionCase(LaboratoryCase):
+    """Case file of `sand compress`."""
+
+    compression: CompressionSection
+
+
+class StretchCase(LaboratoryCase):
+    """Case file of `sand stretch`."""
+
+    stretch: StretchSection
+
+
+class ShearCase(LaboratoryCase):
+    """Case file of `sand shear`."""
+
+    shear: ShearSection
+
+
+OF_COMMAND = {"compress": "compression", "stretch": "stretch", "shear": "shear"}
+"""Table of the loading, by command."""
+CASES: dict[str, type[LaboratoryCase]] = {"compress": CompressionCase, "stretch": StretchCase, "shear": ShearCase}
+"""Models of the case files, by command."""
+
+
+def model_of(content: dict[str, Any], command: str | None = None) -> Any:
+    """The model of a case file of a command, by default of that which its tables show."""
+    return with_integrator(CASES[command or command_for(content) or ""], content)
+
+
+def check_laboratory(content: dict[str, Any], name: str, command: str | None = None) -> LaboratoryCase:
+    """Validate the content of a case file; `name` begins each message.  Raises BadInput."""
+    problems = material_errors(content, ("aggregate",), "silica")
+    return validate(model_of(content, command), content, name, problems)
+
+
+def read_laboratory(path: str | Path, command: str) -> LaboratoryCase:
+    """Read and check a case file of a command.  Raises BadInput, all errors of the file, one line each."""
+    return check_laboratory(read_content(path, command), str(path), command)

@@ -1,0 +1,289 @@
+"""Packings that are compressed, stretched and sheared: start, rates, table, figure and jobs."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.experiments import laboratory
+from sand.experiments.laboratory import Loading, load, plan
+from sand.experiments.laboratory_figure import laboratory_figure
+from sand.experiments.laboratory_job import rows_of
+from sand.experiments.laboratory_table import Percolation, percolating, table_of
+from sand.theory.compression import packing_scales
+
+ICE = sand.ICE
+PACKING = sand.setup.lattice(3, radius="0.1 um", material="ice")
+SOLID = 27 * 4 / 3 * math.pi * 1e-21
+CASE = """
+[aggregate]
+kind = "rbd"
+grains = 12
+radius = "0.1 um"
+material = "ice"
+[compression]
+rate = "1 m/s"
+to = 0.3
+by = "walls"
+seeds = [1, 2]
+[forces.contact]
+damping = "critical"
+"""
+
+
+def walls(kind="compress", **changes):
+    """How the lattice is loaded between walls."""
+    return Loading(kind, **({"rate": "1 m/s", "to": 0.4, "by": "walls", "box": "1 um"} | changes))
+
+
+# --- rates and starts ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "value", "unit"),
+    [
+        ("1e-5 /t_c", 1e-5, "/t_c"),
+        ("1e-5 1/t_c", 1e-5, "/t_c"),
+        ("11/tc", 11.0, "/t_c"),
+        ("2e4 1/s", 2e4, "1/s"),
+        ("10 cm/s", 0.1, "m/s"),
+    ],
+)
+def test_rates(given, value, unit):
+    """A rate per time of a contact, per second, or a speed; what is read is written so that it is read again."""
+    found = Loading("compress", given, 0.4, by="walls").rate
+    assert found == (pytest.approx(value, rel=1e-12, abs=0.0), unit)
+    assert laboratory.read_rate(str(found), "rate") == found
+
+
+def test_walls_touch_the_outermost_grains():
+    """Floor and lid are at rest on the lattice: the gap is its height less δ0 of a grain and a wall on each side.
+
+    δ0 of a grain and a wall of its material is that of two grains of twice the radius: a0²/(3R) with R = r.
+    """
+    found = plan(PACKING, walls())
+    floor, lid = found.moved["walls"]
+    height = np.ptp(PACKING.position[:, 2])
+    rest = sand.theory.contact(ICE, "0.2 um").rest_overlap
+    gap = lid.point[2] - floor.point[2]
+    assert gap == pytest.approx(height + 2 * (1e-7 - rest), rel=1e-9, abs=0.0)
+    assert found.sides == pytest.approx([1e-6, 1e-6, gap], rel=1e-12, abs=0.0)
+    assert found.start.box.lengths == (1e-6, 1e-6, None)
+    assert found.filling(found.sides) == pytest.approx(SOLID / (1e-12 * gap), rel=1e-12, abs=0.0)
+    assert lid.velocity == (0.0, 0.0, -1.0) and floor.velocity == (0.0, 0.0, 0.0)
+    # the lid is where φ = 0.4 at the end, and φ grows by 2 % in the last row
+    end = gap - found.until
+    assert SOLID / (1e-12 * end) == pytest.approx(0.4, rel=1e-12, abs=0.0)
+    assert found.row_every == pytest.approx(0.02 * end, rel=1e-12, abs=0.0)
+    simulation = laboratory.simulation_of(found)
+    assert simulation.frame_every == found.row_every
+
+
+def test_the_lid_moves_as_it_is_told():
+    """Stretched it moves up, sheared along x."""
+    stretched, sheared = (plan(PACKING, walls(kind, to=0.5)) for kind in ("stretch", "shear"))
+    assert stretched.moved["walls"][1].velocity == (0.0, 0.0, 1.0)
+    assert sheared.moved["walls"][1].velocity == (1.0, 0.0, 0.0)
+    for found in (stretched, sheared):
+        assert found.until == pytest.approx(0.5 * found.sides[2], rel=1e-12, abs=0.0)
+
+
+def test_ratio_to_the_largest_rate():
+    """Rate × L / (0.3 √(3E_roll/(r³ρ)) φ) at the start; between walls the speed stays, so that it falls as 1/φ."""
+    found, scales = plan(PACKING, walls()), packing_scales(ICE, 1e-7)
+    phi = found.filling(found.sides)
+    assert found.rate_ratio(found.sides) == pytest.approx(1.0 / (0.3 * scales.wave_speed * phi), rel=1e-12, abs=0.0)
+    half = found.sides * [1, 1, 0.5]
+    assert found.rate_ratio(half) == pytest.approx(0.5 * found.rate_ratio(found.sides), rel=1e-12, abs=0.0)
+    with pytest.warns(UserWarning, match="times too fast for a static stress; the largest good rate is"):
+        laboratory.slow_from(plan(PACKING, walls(rate="20 m/s")))
+
+
+# --- the table -------------------------------------------------------------------------------------------------------
+
+
+def test_rows_of_a_constant_pressure():
+    """Work P A Δz of the lid between two rows is the stress P; rows are kept where ln φ has grown by 0.02."""
+    found = plan(PACKING, walls(rate="0.1 m/s"))
+    area, gap, pressure = 1e-12, float(found.sides[2]), 700.0
+    floor = found.moved["walls"][0].point[2]
+    ledger = []
+    for k in range(40):
+        height = gap * (1 - 0.01 * k)
+        row = {"time": 0.01 * k * gap / 0.1, "step": k, "contacts": 54 + k, "lost_rolling": 0.0, "lost_walls": 0.0}
+        row |= {"lost_walls": -pressure * area * (gap - height), "floor_position": floor}
+        ledger.append(row | {"lid_position": -(floor + height)})
+    table = table_of(found, ledger, Percolation())
+    assert math.isnan(table[0]["stress"]) and len(table) > 10
+    assert [row["stress"] for row in table[1:]] == pytest.approx([pressure] * (len(table) - 1), rel=1e-9, abs=0.0)
+    assert (np.diff(np.log([row["filling"] for row in table]))[:-1] >= 0.02 * (1 - 1e-3)).all()
+    assert table[-1]["step"] == 39
+    assert table[3]["coordination"] == pytest.approx(2 * (54 + table[3]["step"]) / 27, rel=1e-12, abs=0.0)
+    assert table[-1]["strain"] == pytest.approx(-0.39, rel=1e-9, abs=0.0)
+
+
+def test_the_cluster_that_percolates():
+    """Of a rod along x and a longer one along y, the longer one is named; without them no cluster is."""
+    rod = np.arange(-4.0, 5.0, 2.0)
+    x = np.concatenate([np.column_stack([rod, 0 * rod, 0 * rod + 3]), np.column_stack([0 * rod, rod, 0 * rod - 3])])
+    x = np.concatenate([x, [[0.0, 0.0, -1.0]]])
+    ring = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]])
+    box = sand.Box.periodic(10.0)
+    found = percolating(x, np.concatenate([ring, ring + 5, [[7, 10]]]), box)
+    assert found == {
+        "percolating": 2,
+        "percolating_grain": 5,
+        "percolating_size": 6,
+        "percolates_x": 0,
+        "percolates_y": 1,
+        "percolates_z": 0,
+    }
+    assert percolating(x, ring[:4], box)["percolating_grain"] == -1
+
+
+# --- runs ------------------------------------------------------------------------------------------------------------
+
+
+class Impulses(sand.Observer):
+    """Impulse that the lid has received, by time."""
+
+    def __init__(self):
+        self.found = {}
+
+    def see(self, simulation, row):
+        self.found[row["time"]] = simulation.walls[1].impulse
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:the rate,")
+@pytest.mark.parametrize(
+    ("kind", "to", "axis", "sign"), [("compress", 0.3, 2, 1), ("stretch", 0.4, 2, -1), ("shear", 0.4, 0, -1)]
+)
+def test_stress_between_walls_is_the_impulse_of_the_lid(kind, to, axis, sign):
+    """Work over way is, at constant speed, the mean force: the impulse of the grains on the lid over the time.
+
+    Both are sums over the same steps, by another road: rounding alone is left.
+    """
+    seen = Impulses()
+    body = sand.setup.rbd(12, radius="0.1 um", material="ice", seed=1)
+    found = load(body, Loading(kind, "1 m/s", to, by="walls"), observers=[seen], seed=1)
+    times = [row["time"] for row in found.table]
+    impulse = np.array([seen.found[time] for time in times])[:, axis]
+    mean = sign * np.diff(impulse) / np.diff(times) / (found.plan.sides[0] * found.plan.sides[1])
+    stress = np.array([row["stress"] for row in found.table[1:]])
+    assert len(stress) > 5
+    assert stress == pytest.approx(mean, rel=1e-9, abs=1e-9 * np.abs(mean).max())
+    last = found.table[-1]
+    assert last["filling" if kind == "compress" else "strain"] == pytest.approx(to, rel=1e-9, abs=0.0)
+    assert last["coordination"] == 2 * last["contacts"] / 12
+    assert {"percolates_x", "percolates_y", "rate_ratio", "lost_rolling", "lost_walls"} <= last.keys()
+    content = found.to_dict()
+    assert content["stress"] == last["stress"] and len(content["table"]["filling"]) == len(found.table)
+    assert abs(content["drift"]) < 1e-3
+
+
+@pytest.mark.compiled("deformation")
+@pytest.mark.filterwarnings("ignore:the rate,")
+@pytest.mark.parametrize("kind", ["compress", "stretch"])
+def test_stress_in_a_box_is_the_mean_of_its_axes(kind):
+    """Work over the change of volume, beside the work along each axis that the ledger has in columns of its own.
+
+    Both divide by the same ∫V dL/L, that of the ledger with the logarithmic mean of V: rounding is left. A step strains
+    a side by 1 + x in place of e^x, x = rate × dt = 2e-5: the end is off by x/2 of ln(L/L₀).
+    """
+    body = sand.setup.rbd(12, radius="0.1 um", material="ice", seed=1)
+    found = load(body, Loading(kind, "1e6 1/s", 0.2, every=0.05), seed=1)
+    table, compressed = found.table[1:], kind == "compress"
+    mean = np.array([np.mean([row[f"mean_pressure_{axis}"] for axis in found.plan.loading.axes]) for row in table])
+    stress = np.array([row["stress"] for row in table])
+    assert len(stress) > 3 and stress.any()
+    assert (stress if compressed else -stress) == pytest.approx(mean, rel=1e-6, abs=1e-6 * np.abs(mean).max())
+    last, sides = table[-1], found.plan.sides
+    assert last["filling" if compressed else "strain"] == pytest.approx(0.2, rel=1e-4, abs=0.0)
+    factors = [last[f"side_{axis}"] / side for axis, side in zip("xyz", sides, strict=True)]
+    assert factors[1:] == pytest.approx([factors[0]] * 2 if compressed else [1.0] * 2, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:the rate,")
+def test_a_job(tmp_path, monkeypatch, capsys):
+    """`sand compress` writes table, results and runs; resumed its rows are the same; info describes all."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cake.toml").write_text(CASE)
+    assert main(["info", "cake.toml"]) == 0
+    assert "E_roll" in (text := capsys.readouterr().out) and "sand compress cake.toml" in text
+    assert main(["compress", "cake.toml", "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert [run["seed"] for run in content["runs"]] == [1, 2]
+    assert content["runs"][0]["table"] != content["runs"][1]["table"]
+    with open("cake/results.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == sum(len(run["table"]["filling"]) for run in content["runs"])
+    assert sand.open("cake/seed-2").frames[0].time == 0.0
+    before = (tmp_path / "cake/results.csv").read_bytes()
+    # as if killed while the second run wrote its last rows
+    (tmp_path / "cake/laboratory.json").unlink()
+    (tmp_path / "cake/results.csv").unlink()
+    assert main(["resume", "cake", "--quiet"]) == 0
+    assert (tmp_path / "cake/results.csv").read_bytes() == before
+    capsys.readouterr()
+    assert main(["info", "cake"]) == 0 and "seed 2" in capsys.readouterr().out
+    assert main(["compress", "cake.toml"]) == 2 and "not empty" in capsys.readouterr().err
+    # a frame of this run is stretched
+    (tmp_path / "pull.toml").write_text(
+        '[aggregate]\nkind = "file"\nfile = "cake"\nfilling = 0.25\n[stretch]\nrate = "1 m/s"\nto = 0.1\nby = "walls"\n'
+        '[forces.contact]\ndamping = "critical"\n'
+    )
+    assert main(["stretch", "pull.toml", "--json"]) == 0
+    pulled = json.loads(capsys.readouterr().out)["runs"][0]
+    assert pulled["filling_at_start"] == pytest.approx(0.25, rel=0.05, abs=0.0)
+    assert pulled["strain"] == pytest.approx(0.1, rel=1e-6, abs=0.0)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:the rate,")
+def test_a_sweep_over_the_end(tmp_path, monkeypatch, capsys):
+    """`sand sweep` varies a key of [compression]; a run has the results of the job, its columns as lists."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cake.toml").write_text(CASE)
+    how = ["--vary", "compression.to=0.28,0.3", "--seeds", "2-2", "--files", "none", "--out", "swept", "--quiet"]
+    assert main(["sweep", "cake.toml", *how]) == 0
+    table = sand.open("swept").table
+    assert table["compression.to"].tolist() == [0.28, 0.3]
+    assert table["filling"] == pytest.approx([0.28, 0.3], rel=1e-9, abs=0.0)
+    assert len(table["table_stress"][1].split()) > len(table["table_stress"][0].split())
+
+
+def outcome(seed, kind="compress", noise=0.0):
+    """An outcome whose pressure is 5e5 φ³, and whose losses are of rolling alone."""
+    phi = np.geomspace(0.02, 0.3, 40)
+    table = {"mean_filling": phi, "strain": 3 * phi, "stress": 5e5 * phi**3 * (1 + noise), "coordination": 2 + phi}
+    table |= {"lost_rolling": phi, "lost_sliding": 0 * phi, "lost_twisting": 0 * phi, "lost_walls": -9 * phi}
+    scales = {"kind": kind, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
+    scales |= {"filling_at_start": 0.1, "surface_energy": 0.1, "radius": 1e-7}
+    return {"seed": seed, "table": {name: column.tolist() for name, column in table.items()}} | scales
+
+
+@pytest.mark.parametrize("kind", ["compress", "stretch"])
+def test_figure(kind):
+    """Lines are where the outcomes are: P, the share 1 of rolling, Z."""
+    figure = laboratory_figure([outcome(1, kind), outcome(2, kind, noise=0.1)])
+    stress, shares, z = figure.axes[:3]
+    line = stress.get_lines()[0 if kind == "compress" else 1]
+    x, y = line.get_data()
+    phi = x if kind == "compress" else x / 3
+    assert y == pytest.approx(1.05 * 5e5 * phi**3, rel=2e-2, abs=0.0)
+    assert next(one for one in shares.get_lines() if one.get_label() == "rolling").get_ydata() == pytest.approx(
+        np.ones(len(x)), rel=1e-12, abs=0.0
+    )
+    assert z.get_lines()[0].get_ydata() == pytest.approx(2 + phi, rel=1e-3, abs=0.0)
+
+
+def test_rows_have_their_seed():
+    """Rows of the table of all runs begin with the seed."""
+    rows = rows_of(outcome(7))
+    assert len(rows) == 40 and rows[3]["seed"] == 7 and list(rows[0])[:2] == ["seed", "mean_filling"]
