@@ -230,8 +230,8 @@ def test_a_pressure_is_reached_and_kept():
 def test_dipoles_of_all_images_follow_the_box(record_bound):
     """Free dipoles in a cube that shrinks: the Ewald sum has α L and r_c/L of its start, and the trace of W is 3U.
 
-    The energy is that of a new Ewald sum in the present box, to its accuracy, and the ledger closes: the work of the
-    box on the dipoles is −A 3U dt, with errors of the steps.
+    Energy and pressure tensor are those of a new Ewald sum in the present box, to its accuracy, and the ledger closes:
+    the work of the box on the dipoles is −A 3U dt, with errors of the steps.
     """
     rng = np.random.default_rng(2)
     grid = np.stack(np.meshgrid(*[np.arange(3.0) - 1.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 1.2e-7
@@ -243,8 +243,11 @@ def test_dipoles_of_all_images_follow_the_box(record_bound):
     first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
     assert last["box_x"] == pytest.approx(0.4e-6 * math.exp(-0.24), rel=1e-3, abs=0.0)
     now = sand.Grains(sim.grains.position, "10 nm", "iron", moment=sim.grains.moment)
-    fresh = sand.Simulation(now, forces, box=sim.box).loads()["energy"]["magnetic"]
+    other = sand.Simulation(now, forces, box=sim.box)
+    fresh = other.loads()["energy"]["magnetic"]
     assert last["magnetic"] == pytest.approx(fresh, abs=1e-5 * np.abs(last["magnetic"]))
+    tensor = other.stress().parts["magnetic"]
+    assert sim.stress().parts["magnetic"] == pytest.approx(tensor, abs=1e-5 * np.abs(tensor).max())
     change = last["magnetic"] - first["magnetic"]
     assert abs(change) > 0.3 * abs(first["magnetic"]) and abs(last["lost_box"]) > 0.1 * abs(change)
     record_bound(

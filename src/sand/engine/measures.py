@@ -114,7 +114,7 @@ def pair_virials(engine: CompiledState) -> dict[str, np.ndarray]:
         virial = out.reshape(3, 3)
         if isinstance(force, EwaldForce) and sums.reciprocal_virial is not None:
             run_rounds(sums, engine.content.wide, table, numbers)
-            virial = virial + sums.reciprocal_virial(arrays, state.box.span, numbers)
+            virial = virial + sums.reciprocal_virial(arrays, table["span"], numbers)
             _add_energies(engine, state, k, shares)
             trace = (2 * force.sources.order + 1) * math.fsum(shares.tolist())
             virial = virial + (trace - virial.trace()) / 3.0 * np.eye(3)

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...basics.alignment import SIMD_WIDTH
 from ...compiler.recipes import factory
+from ...numerics.flow import shrinkage
 
 NEGLIGIBLE = 1e-15
 """Waves of a mesh with an influence below this fraction of the largest one are left out: their φ̂ is noise."""
@@ -71,7 +72,10 @@ def direct_virial(dipoles: bool) -> Callable:
     """`LongRangeSums.reciprocal_virial` of a sum over wave vectors, of dipoles or of charges."""
 
     def virial(grains: Any, span: Any, parameters: Any) -> np.ndarray:
+        shrink = shrinkage(parameters.length, span)  # 1, but for dipoles in a box that is deformed
+        parameters = parameters._replace(alpha=shrink * parameters.alpha, mean_field=shrink**3 * parameters.mean_field)
         vectors, weights = _vectors(parameters.waves, span)
+        weights = shrink * weights
         found = _of_mean(grains, parameters, dipoles=dipoles)
         parts = max(1, len(vectors) * grains.mass.size // AT_ONCE)
         for q, weight in zip(np.array_split(vectors, parts), np.array_split(weights, parts), strict=True):
