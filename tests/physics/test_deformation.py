@@ -169,6 +169,19 @@ def test_interruptions_and_output_change_no_bit(tmp_path):
     assert frames[0].box == sand.Box.periodic(one.ledger.rows[0]["box_x"]) and frames[-1].box == resumed.box
 
 
+@pytest.mark.parametrize("rate", [["2e7 1/s", "2e7 1/s", "2e7 1/s"], ["2e7 1/s", "-2e7 1/s", 0]])
+def test_lists_are_rebuilt_at_the_same_steps_with_frequent_output(rate):
+    """Also where the box grows, and with it displacements: skins are bounds, and are set anew at each output."""
+    one, often = packing(rate, number=20), packing(rate, number=20, frame_every="0.1 ns")
+    built = []
+    for _ in range(12):
+        for sim in (one, often):
+            sim.run(steps=100)
+        built.append(one.state.pair_list.built.tolist())
+        assert arrays_of(one) == arrays_of(often)
+    assert len({tuple(lengths) for lengths in built}) > 2
+
+
 @pytest.mark.filterwarnings("ignore:.*contacts broke while aggregates grew", "ignore:grains overlap too deeply")
 @pytest.mark.parametrize("search", ["cells", "all pairs"])
 def test_lists_are_complete_while_the_box_shrinks(search):

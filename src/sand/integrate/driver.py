@@ -72,6 +72,13 @@ from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 from .taylor import sum_rates
 
+APPROACH = 1.5
+"""Bound of the strain that uses up skins, as a displacement in units of the reach.
+
+It is ½ where the box shrinks.  Where it grows since a list was built, by at most twice since no limit exceeds half the
+reach, the strain of a step is up to twice as large, and displacements of up to half the reach grow with it.
+"""
+
 
 @loop
 def largest_speeds(queue, blocks):
@@ -133,7 +140,7 @@ def drift_with_work(s, dt):
         gained += sum_external(s, end, WRAPPING)
         wrap_all(s.grains, s.span)
     s.lost[OUTSIDE] -= gained
-    strained = 0.5 * s.search.reach * rate_of_strain(s.span)
+    strained = APPROACH * s.search.reach * rate_of_strain(s.span)
     return dt * (math.sqrt(largest_speeds(s.queue, blocks)[0]) + strained)
 
 
