@@ -130,6 +130,8 @@ class CellArrays(NamedTuple):
     virial: Annotated[np.ndarray, Array((3,), "J")]
     strain: Annotated[np.ndarray, Array((3,))]
     elapsed: Annotated[np.ndarray, Array((1,), "s")]
+    # time from which a row of the ledger may begin a mean: that of the last change of rates or, just after it, of a box
+    changed: Annotated[np.ndarray, Array((1,), "s", required=False)]
     # work of the boundaries on the grains, by the deformation along each axis, up to then
     work: Annotated[np.ndarray, Array((3,), "J", summed=True)]
 

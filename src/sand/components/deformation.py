@@ -11,10 +11,11 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.arrays import CellArrays
+from ..basics.box import Box
 from ..basics.errors import BadInput, shown
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
-from ..basics.state import CELL, CONTACTS, State
+from ..basics.state import CELL, CONTACTS, TIME, State
 from ..basics.units import si
 from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
@@ -107,6 +108,7 @@ class DeformedBox(Component):
     groups: ClassVar[Mapping[str, type]] = {CELL: CellArrays}
 
     _lengths: np.ndarray
+    _work: np.ndarray
 
     @property
     def given(self) -> Deformation:
@@ -186,9 +188,19 @@ class DeformedBox(Component):
         """The same deformation."""
         return DeformedBox(self.items)
 
+    def saved_for_change(self, state: State, box: Box) -> dict[str, np.ndarray]:
+        """As `Component.saved_for_change`; the work up to the change is kept for `changed`."""
+        self._work = present_work(state)
+        return {}
+
     def changed(self, arrays: dict[str, np.ndarray], *, regroups: bool) -> None:
-        """Take over the lengths of a box that the user has changed."""
+        """Take over the lengths of a box that the user has changed; the work up to then was that of the box before."""
+        time = arrays["clock"][TIME]
+        arrays["cell/work"], arrays["cell/strain"] = self._work, np.zeros(3)
+        if (arrays["cell/rate"] != force_at(self.given, time).rate).any():
+            arrays["cell/changed"] = np.array([time])
         if (arrays["cell/span"][:3] != self._lengths).any():
+            arrays["cell/changed"] = np.nextafter([time], math.inf)
             arrays["cell/start"] = self._lengths.copy()
             arrays["cell/span"] = np.concatenate([self._lengths, 1.0 / self._lengths, arrays["cell/span"][RATE:]])
 
@@ -209,28 +221,29 @@ class DeformedBox(Component):
         """Values of the columns; the pressure is that of the present moment."""
         cell, grains = _cell_of(state), state.grains.arrays
         lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
-        virial = present_virial(state)
-        work = cell.work - 0.5 * cell.strain * (cell.virial + virial)  # with that since the virial was last summed
-        pressure = (virial + (grains.mass * grains.velocity**2).sum(axis=1)) / volume
+        work = present_work(state)
+        pressure = (present_virial(state) + (grains.mass * grains.velocity**2).sum(axis=1)) / volume
         filling = 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume
         values = [*lengths, filling, *work, *pressure, -math.fsum(work)]
         return dict(zip([*self.columns(), *self.losses()], map(float, values), strict=True))
 
-    def means(self, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
+    def means(self, state: State, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
         """The pressure P_aa = −ΔW_a / ∫ V dL_a / L_a since the row before, from the work W_a on the grains.
 
         For rates in constant ratios, the integral is Δ ln L_a times the logarithmic mean of the volumes.  With a strain
-        below LEAST_STRAIN the quotient would be rounding.
+        below LEAST_STRAIN the quotient would be rounding.  There is no mean over a change by the user, nor along an
+        axis that turns from shrinking to growing or back, whose strains cancel.
         """
         found: dict[str, float] = {}
-        if before is None:
+        if before is None or before["time"] < _cell_of(state).changed[0]:
             return found
+        first, last = (force_at(self.given, row["time"]).rate for row in (before, now))
         volumes = [math.prod(row[f"box_{axis}"] for axis in AXES) for row in (before, now)]
         ratio = math.log(volumes[1] / volumes[0])
         mean = (volumes[1] - volumes[0]) / ratio if abs(ratio) > 1e-6 else 0.5 * (volumes[0] + volumes[1])
-        for axis in AXES:
+        for a, axis in enumerate(AXES):
             strain = math.log(now[f"box_{axis}"] / before[f"box_{axis}"])
-            if abs(strain) > LEAST_STRAIN:
+            if abs(strain) > LEAST_STRAIN and first[a] * last[a] >= 0.0:
                 found[f"mean_pressure_{axis}"] = (before[f"work_{axis}"] - now[f"work_{axis}"]) / (mean * strain)
         return found
 
@@ -246,6 +259,13 @@ def present_virial(state: State) -> np.ndarray:
     branch = state.box.nearest((first - second).T)
     of_contacts: np.ndarray = (branch.T * contacts.force[:, :used]).sum(axis=1)
     return of_contacts - 0.5 * float((grains.moment * grains.field).sum())
+
+
+def present_work(state: State) -> np.ndarray:
+    """Work (3,) [J] of the boundaries, with that since the virial was last summed."""
+    cell = _cell_of(state)
+    work: np.ndarray = cell.work - 0.5 * cell.strain * (cell.virial + present_virial(state))
+    return work
 
 
 def _cell_of(state: State) -> CellArrays:

@@ -194,7 +194,7 @@ class Component:
         """Values of all its columns."""
         return {}
 
-    def means(self, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
+    def means(self, state: State, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
         """Those of its columns that are means since the row before, which the first row does not have."""
         return {}
 

@@ -72,13 +72,6 @@ from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 from .taylor import sum_rates
 
-APPROACH = 1.5
-"""Bound of the strain that uses up skins, as a displacement in units of the reach.
-
-It is ½ where the box shrinks.  Where it grows since a list was built, by at most twice since no limit exceeds half the
-reach, the strain of a step is up to twice as large, and displacements of up to half the reach grow with it.
-"""
-
 
 @loop
 def largest_speeds(queue, blocks):
@@ -140,7 +133,10 @@ def drift_with_work(s, dt):
         gained += sum_external(s, end, WRAPPING)
         wrap_all(s.grains, s.span)
     s.lost[OUTSIDE] -= gained
-    strained = APPROACH * s.search.reach * rate_of_strain(s.span)
+    # In a box that shrinks, a strain uses up half of it times the reach (`list_is_stale`).  Where the box grows, it is
+    # up to twice as large in lengths when the list was built, as limits are below half the reach, and displacements,
+    # below half the reach, grow with it.
+    strained = 1.5 * s.search.reach * rate_of_strain(s.span)
     return dt * (math.sqrt(largest_speeds(s.queue, blocks)[0]) + strained)
 
 
@@ -256,22 +252,10 @@ def first_half(s):
 def update_lists(s):
     """Rebuild stale lists; returns the value of a `Stop`, and whether the pair list was stale."""
     stale = s.settings.on and list_is_stale(
-        s.grains,
-        (s.pair_list.anchor, s.pair_list.built),
-        s.span,
-        0.25 * s.criteria.pair_gap,
-        s.search.reach,
-        s.pair_list.skin,
-        PAIR_LIST_SKIN,
+        s.grains, s.pair_list, s.span, 0.25 * s.criteria.pair_gap, s.search.reach, s.pair_list.skin, PAIR_LIST_SKIN
     )
     if s.search.listed and list_is_stale(
-        s.grains,
-        (s.long_range.anchor, s.long_range.built),
-        s.span,
-        0.5 * s.search.margin,
-        s.search.reach,
-        s.pair_list.skin,
-        LONG_RANGE_SKIN,
+        s.grains, s.long_range, s.span, 0.5 * s.search.margin, s.search.reach, s.pair_list.skin, LONG_RANGE_SKIN
     ):
         stop = call_stage(s, StageNumber.VERLET_LIST)
         if stop != Stop.NONE.value:

@@ -104,18 +104,15 @@ def list_is_stale(grains, listed, span, limit, reach, skin, skin_index):
 
     Parameters
     ----------
-    listed : tuple of ndarray
-        Anchors (3, N) [m], and the lengths of the box (3,) [m], when the list was built.
+    listed : PairList or LongRangeArrays
+        Its anchors (3, N) [m], and the lengths `built` (3,) of the box [m], are those when the list was built.
     skin : ndarray
         Remaining skins; that of this list, with the index `skin_index`, is updated.
     """
     if skin[skin_index] > 0.0:
         return False
-    anchor, built = listed
-    displacement, limit = (
-        largest_displacement(grains, anchor, built, span),
-        limit - 0.5 * reach * strain_since(built, span),
-    )
+    displacement = largest_displacement(grains, listed.anchor, listed.built, span)
+    limit -= 0.5 * reach * strain_since(listed.built, span)
     skin[skin_index] = SKIN_SAFETY * limit - displacement
     # true also for NaN, from anchors at infinity (no list yet)
     return not displacement <= limit

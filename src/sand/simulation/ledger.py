@@ -138,7 +138,7 @@ class Ledger(LedgerColumns):
         row |= dict(zip(TEMPERATURES, temperatures_of(bodies.translation, bodies.rotation), strict=True))
         row |= (stress_of(engine).row() if self.stress else {}) | own
         before = self.rows[-1] if self.rows else None
-        return row | {name: mean for each in self._extra for name, mean in each.means(before, row).items()}
+        return row | {name: mean for each in self._extra for name, mean in each.means(state, before, row).items()}
 
     def counts_of(self, engine: Engine) -> dict[str, float]:
         """The part of the row of the present state that needs no energies: step, time [s], contacts and clusters."""

@@ -179,25 +179,13 @@ def update_lists(s):
     """Rebuild stale lists; returns the value of a `Stop`."""
     invalidate_skins(s.pair_list)
     if s.search.listed and list_is_stale(
-        s.grains,
-        (s.long_range.anchor, s.long_range.built),
-        s.span,
-        0.5 * s.search.margin,
-        s.search.reach,
-        s.pair_list.skin,
-        LONG_RANGE_SKIN,
+        s.grains, s.long_range, s.span, 0.5 * s.search.margin, s.search.reach, s.pair_list.skin, LONG_RANGE_SKIN
     ):
         stop = call_stage(s, StageNumber.VERLET_LIST)
         if stop != Stop.NONE.value:
             return stop
     if list_is_stale(
-        s.grains,
-        (s.pair_list.anchor, s.pair_list.built),
-        s.span,
-        0.25 * s.criteria.pair_gap,
-        s.search.reach,
-        s.pair_list.skin,
-        PAIR_LIST_SKIN,
+        s.grains, s.pair_list, s.span, 0.25 * s.criteria.pair_gap, s.search.reach, s.pair_list.skin, PAIR_LIST_SKIN
     ):
         return call_stage(s, StageNumber.PAIR_LIST)
     return Stop.NONE.value
