@@ -404,6 +404,15 @@ def test_a_long_compression_closes_the_ledger(record_bound):
     record_bound("error of the ledger over the work, φ 0.01 to 0.5", error, most=1e-4)
 
 
+def test_a_fixed_step_that_strains_the_box_too_much_is_refused():
+    """Grains that the flow brings together would pass each other: 2e-11 s times 1e8 1/s is 2e-3, above 1e-3."""
+    with pytest.raises(
+        sand.BadInput, match=r"a step of 2e-11 s strains the box by more than 0\.001; use step = 'auto'"
+    ):
+        packing("-1e8 1/s", number=4, stepping=sand.Verlet(step=2e-11))
+    packing("-1e7 1/s", number=4, stepping=sand.Verlet(step=2e-11))
+
+
 def test_copies_have_boxes_of_their_own():
     """A deep copy and the original, each run further, are independent and equal to the last bit."""
     sim = packing("-1e6 1/s", number=12, side=2.4e-6)

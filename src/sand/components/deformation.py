@@ -24,7 +24,16 @@ from ..engine.engine import Engine
 from ..forces.pair.dipoles import Dipoles
 from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
-from .deformation_stage import EXPONENTIAL, LAWS, LINEAR, PRESSURE, RATE, DeformationNumbers, deformation_stages
+from .deformation_stage import (
+    EXPONENTIAL,
+    LARGEST_STRAIN,
+    LAWS,
+    LINEAR,
+    PRESSURE,
+    RATE,
+    DeformationNumbers,
+    deformation_stages,
+)
 
 AXES = "xyz"
 LEAST_STRAIN = 1e-9
@@ -108,7 +117,6 @@ class DeformedBox(Component):
     groups: ClassVar[Mapping[str, type]] = {CELL: CellArrays}
 
     _lengths: np.ndarray
-    _work: np.ndarray
 
     @property
     def given(self) -> Deformation:
@@ -135,6 +143,9 @@ class DeformedBox(Component):
             if setup.stepping.name != "verlet":
                 others.append(f"stepping = '{setup.stepping.name}'")
             found += [f"{other} {where}" for other in others]
+            step, rates = getattr(setup.stepping, "step", "auto"), [each.rate for each in forces_at_points(self.given)]
+            if step != "auto" and step * np.abs(rates).max() > LARGEST_STRAIN:
+                found.append(f"a step of {step:g} s strains the box by more than {LARGEST_STRAIN:g}; use step = 'auto'")
             found += self._problems_of_dipoles(setup)
         return [f"deformation: {line}" for line in found]
 
@@ -264,8 +275,7 @@ def present_virial(state: State) -> np.ndarray:
 def present_work(state: State) -> np.ndarray:
     """Work (3,) [J] of the boundaries, with that since the virial was last summed."""
     cell = _cell_of(state)
-    work: np.ndarray = cell.work - 0.5 * cell.strain * (cell.virial + present_virial(state))
-    return work
+    return np.asarray(cell.work - 0.5 * cell.strain * (cell.virial + present_virial(state)))
 
 
 def _cell_of(state: State) -> CellArrays:

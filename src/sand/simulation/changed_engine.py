@@ -43,9 +43,9 @@ from .stress import check_stress_rows
 
 def changed(simulation: Any) -> Iterator[Change]:
     """The change that the user makes, see `Simulation.change`, and its effect on the simulation after that."""
-    present = tuple(as_chosen(force, simulation.start, simulation.box) for force in simulation.forces)
-    pair = simulation.state.contacts.pair[:, : simulation.state.count[CONTACTS]].T.copy()
     system = simulation._system
+    present = tuple(as_chosen(force, simulation.start, system.box) for force in simulation.forces)
+    pair = simulation.state.contacts.pair[:, : simulation.state.count[CONTACTS]].T.copy()
     change = Change(simulation.grains, present, simulation.box, pair, system.next_id, simulation.deformation)
     yield change
     given = system.given

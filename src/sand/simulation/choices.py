@@ -12,9 +12,9 @@ def choices_of(simulation: Any) -> dict[str, str]:
     if simulation._origin.choices:
         return simulation._origin.choices | present
     choices = {"start": simulation.origin} if simulation.origin else {}
-    choices["boundary"] = simulation.box.describe()
+    choices["boundary"] = simulation._system.box.describe()
     for force in simulation.forces:
         if choose := getattr(force, "choose", None):
-            choices[f"{force.name} cut-off"] = str(choose(simulation.start, simulation.box))
+            choices[f"{force.name} cut-off"] = str(choose(simulation.start, simulation._system.box))
     choices |= {name: text for each in engine.components for name, text in each.choices().items()}
     return choices | {"neighbours": engine.search} | present

@@ -75,10 +75,9 @@ def direct_virial(dipoles: bool) -> Callable:
         shrink = shrinkage(parameters.length, span)  # 1, but for dipoles in a box that is deformed
         parameters = parameters._replace(alpha=shrink * parameters.alpha, mean_field=shrink**3 * parameters.mean_field)
         vectors, weights = _vectors(parameters.waves, span)
-        weights = shrink * weights
         found = _of_mean(grains, parameters, dipoles=dipoles)
         parts = max(1, len(vectors) * grains.mass.size // AT_ONCE)
-        for q, weight in zip(np.array_split(vectors, parts), np.array_split(weights, parts), strict=True):
+        for q, weight in zip(np.array_split(vectors, parts), np.array_split(shrink * weights, parts), strict=True):
             wave = np.exp(1j * (q @ grains.position))
             if dipoles:
                 moments = wave @ grains.moment.T
