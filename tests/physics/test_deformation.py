@@ -409,8 +409,8 @@ def test_a_fixed_step_that_strains_the_box_too_much_is_refused():
     with pytest.raises(
         sand.BadInput, match=r"a step of 2e-11 s strains the box by more than 0\.001; use step = 'auto'"
     ):
-        packing("-1e8 1/s", number=4, stepping=sand.Verlet(step=2e-11))
-    packing("-1e7 1/s", number=4, stepping=sand.Verlet(step=2e-11))
+        packing("-1e8 1/s", number=12, stepping=sand.Verlet(step=2e-11))
+    packing("-1e7 1/s", number=12, stepping=sand.Verlet(step=2e-11))
 
 
 def test_copies_have_boxes_of_their_own():
