@@ -29,7 +29,9 @@ def strained(sim, factors, velocities=False):
     state.grains.arrays.position[...] *= factors[:, None]
     if velocities:
         state.grains.arrays.velocity[...] /= factors[:, None]
-    state.fixed_box = Box(tuple(None if l is None else float(l * f) for l, f in zip(sim.box.lengths, factors, strict=True)))
+    state.fixed_box = Box(
+        tuple(None if l is None else float(l * f) for l, f in zip(sim.box.lengths, factors, strict=True))
+    )
     engine.set_parameters(span=state.box.span)
     return engine
 
