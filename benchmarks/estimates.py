@@ -21,6 +21,8 @@ from typing import Any
 import tomli_w
 
 from sand.compiler.jit import cache_folder
+from sand.config.commands import command_for
+from sand.experiments.templates import TEMPLATES
 
 from .start_up import SAND
 
@@ -52,6 +54,7 @@ SHORT = 0.1
 FEW = {
     "figure3": ("measure", "per_cell", 4),
     "collision": ("impact", "seeds", [1]),
+    "compression": ("compression", "to", 0.1),
     "growth-coasting": ("run", "seed", 1),
     "growth-in-gas": ("run", "seed", 1),
     "template-grow": ("grow", "seeds", [1]),
@@ -65,7 +68,7 @@ COLUMNS = (
 
 def cases(folder: Path) -> list[Path]:
     """Shortened case files of all examples, and the templates."""
-    templates = [folder / f"template-{command}.toml" for command in ("collide", "grow", "run", "scatter")]
+    templates = [folder / f"template-{command}.toml" for command in sorted(TEMPLATES.keys() - {"sweep"})]
     for path in templates:
         _call("new", str(path), "--for", path.stem.removeprefix("template-"))
     found = []
@@ -94,8 +97,7 @@ def _written(path: Path, content: dict[str, Any]) -> Path:
 def measure(path: Path) -> dict[str, Any]:
     """Expected and measured steps and CPU time of one case."""
     content, folder = tomllib.loads(path.read_text("utf-8")), path.with_suffix("")
-    tables = {"impact": "collide", "flight": "scatter", "grow": "grow"}
-    verb = next((command for table, command in tables.items() if table in content), "run")
+    verb = command_for(content) or "run"
     short = _written(path.with_name(f"{path.stem}-short.toml"), _shortened(content, SHORT))
     speeds = path.parent / "cache" / "step-speeds.json"
 

@@ -30,7 +30,7 @@ RESERVED = frozenset(
         *("written_by_sand", "head", "has_array"),
         # quantities and figures of `sand plot`, and other variables of `Run.to_xarray`
         *("cluster", "size", "coordination", "speed", "kinetic_energy", "alignment", "field_alignment"),
-        *("pressure", "virial", "stored_virial"),
+        *("pressure", "virial", "stored_virial", "deformation"),
         *("load", "mode", "energies", "losses", "contacts", "balance", "temperatures", "still", "frame"),
         *("grain", "axis", "along"),
         # columns of exported files

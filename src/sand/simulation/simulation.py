@@ -348,7 +348,8 @@ class Simulation(ReadOnlySettings):
         first grain of a pair:
 
             contacts        W_ab = Σ l_a f_b, dashpots included
-            kinetic         W_ab = Σ m v_a v_b
+            kinetic         W_ab = Σ m v_a v_b, relative to the box; in boxes without walls, along open axes, to the
+                            centre of mass
             walls           W_ab = Σ h n_a F_b, with h n from the wall to the centre of the grain
             pair forces     W_ab = Σ r_a F_b, cut-offs included
             Ewald sums      of all images: real part as pairs, and the reciprocal part, W_ab = −∂U/∂ε_ba

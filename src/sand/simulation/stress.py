@@ -53,7 +53,8 @@ class Stress:
     def asymmetry(self) -> np.ndarray:
         """(3,) P_yz − P_zy, P_zx − P_xz, P_xy − P_yx [Pa]: minus the torques of contacts and pair forces, over V.
 
-        In equilibrium they vanish: each grain has as much torque by its contacts as opposite torque by other forces.
+        Of contacts with walls it is the torque of the force alone, without the couple. At rest it vanishes, unless
+        fields, couples of walls or the drive of grains balance it.
         """
         p = self.total
         return np.array([p[1, 2] - p[2, 1], p[2, 0] - p[0, 2], p[0, 1] - p[1, 0]])
@@ -131,11 +132,12 @@ def stress_of(engine: Engine, volume: float | None = None) -> Stress:
     """The stress of the state of an engine, see `Simulation.stress`.  Raises BadInput."""
     size, state = volume_of(engine, volume), engine.state
     contacts, couple = contact_virials(engine)
-    arrays = state.grains.arrays
-    parts = {"contacts": contacts, "kinetic": (arrays.mass * arrays.velocity) @ arrays.velocity.T}
-    for each in engine.components:
-        if (virials := each.virials(state)) is not None:
-            parts[each.name] = virials.sum(axis=0)
-    parts |= pair_virials(engine)
+    others = ((each.name, each.virials(state)) for each in engine.components)
+    bounds = {name: virials.sum(axis=0) for name, virials in others if virials is not None}
+    mass, velocity = state.grains.arrays.mass, state.grains.arrays.velocity
+    if not bounds:  # nothing else is at rest along open axes
+        is_open = np.array([length is None for length in state.box.lengths])
+        velocity = velocity - (is_open * (velocity @ mass) / mass.sum())[:, None]
+    parts = {"contacts": contacts, "kinetic": (mass * velocity) @ velocity.T, **bounds, **pair_virials(engine)}
     parts = {name: virial / size for name, virial in parts.items()}
     return Stress(np.sum(list(parts.values()), axis=0), parts, size, couple / size)

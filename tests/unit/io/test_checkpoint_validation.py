@@ -38,7 +38,18 @@ BODIES = saved("bodies", body_arrays(4))
 BODIES["bodies/first"][:] = np.arange(4)
 CROSSINGS = {"grains/image": np.zeros((3, 4), np.int32)}
 KEPT = {"contacts/kept": np.zeros((7, ARRAYS["contacts/pair"].shape[1]))}
-WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32), **ONE_WALL, **BODIES, **CROSSINGS, **KEPT}
+CELL = saved("cell", new_group(GROUPS["cell"], SIZES))
+BUILT = {f"{name}/built": np.full(3, 1e-6) for name in ("pair_list", "long_range")}
+WITH_ORDER = {
+    **ARRAYS,
+    **CELL,
+    **BUILT,
+    "order": np.arange(4, dtype=np.uint32),
+    **ONE_WALL,
+    **BODIES,
+    **CROSSINGS,
+    **KEPT,
+}
 FAR = 2**31 - 1
 """An index out of range."""
 
@@ -108,7 +119,11 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
         changed["shape"] = np.concatenate([good, good], axis=-1) if good.size else np.zeros((3, 1))
     if good.size and good.dtype.kind == "f":
         changed["not a number"] = np.full_like(good, np.nan)
-    if good.size and name.split("/")[-1] in ("pair", "side", "start", "order", "id", "first"):
+    if (
+        good.size
+        and good.dtype.kind != "f"
+        and name.split("/")[-1] in ("pair", "side", "start", "order", "id", "first")
+    ):
         changed["beyond"] = good.copy()
         changed["beyond"].flat[-1] = FAR
     if name in ("grains/radius", "grains/mass", "grains/inertia"):
