@@ -31,6 +31,8 @@ CAPABILITIES = {
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
     "grains in frames, pictures and page": 491,
+    "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
+    "energy, folders of several runs named by view": 27,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8

@@ -205,6 +205,11 @@ def box_of(lengths: np.ndarray) -> Box:
     return Box(tuple(length or None for length in lengths[:3].tolist()))  # type: ignore[arg-type]
 
 
+def least_side(radius: np.ndarray) -> float:
+    """Least side of a periodic box [m] in which no two grains of these radii touch through two images."""
+    return 2.0 * (2.0 * float(radius.max()) + float(radius.min()))
+
+
 def as_box(value: Any) -> Box:
     """Box from a Box, a length, three lengths, or None for an open box.
 

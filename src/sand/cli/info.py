@@ -315,24 +315,23 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
     case = read_laboratory(path, command_for(content) or "")
     seeds = case.section.seeds
     with report.naming(path):
-        planned = case.plan(seeds[0])
+        planned = case.first_plan()
         good = slow_from(planned)
         simulation = simulation_of(planned, case.physics(), stepping=case.stepping)
     limits = _limits(simulation)
     cost, costs = _cost(simulation, planned.until, math.inf, None, len(seeds), len(seeds))
-    rate = f"{planned.rate:.3g} 1/s, or {planned.rate * planned.scales.time:.2g} /t_c"
+    scales = planned.scales
+    rate = f"{planned.rate:.3g} 1/s, or {planned.rate * scales.time:.2g} /t_c"
+    sides = " x ".join(format_quantity(float(f"{side:.3g}"), "m") for side in planned.sides)
     rows = [
         ("aggregate", f"{len(simulation.grains)} grains, filling factor {planned.filling(planned.sides):.3g}"),
-        ("between", " x ".join(format_quantity(float(f"{side:.3g}"), "m") for side in planned.sides)),
+        ("between walls" if planned.loading.by == "walls" else "box", sides),
         ("rate of strain", f"{rate}; the largest that is slow enough: {good}"),
         (
             "E_roll",
-            f"12 pi^2 gamma R xi_c = {planned.scales.roll_energy:.3g} J; E_roll/r^3 = {planned.scales.pressure:.3g} Pa",
+            f"12 pi^2 gamma R xi_c roll_factor = {scales.roll_energy:.3g} J; E_roll/r^3 = {scales.pressure:.3g} Pa",
         ),
-        (
-            "dashpots",
-            f"1 % of the critical one is damping_constant = {0.01 * planned.scales.critical_damping:.2g} kg/s",
-        ),
+        ("dashpots", f"1 % of the critical one is damping_constant = {0.01 * scales.critical_damping:.2g} kg/s"),
         ("seeds", str(len(seeds))),
         *_of_each(costs, len(seeds), "run"),
         ("end", f"at {format_quantity(planned.until, 's')}"),

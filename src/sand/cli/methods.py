@@ -212,7 +212,10 @@ def _of_loading(folder: Path, path: Path) -> Sentences:
     case = check_laboratory(files.read_toml(path), str(path))
     runs = _content(folder / files.LABORATORY).get("runs", [])
     seeds = case.section.seeds
-    yield f"Packings that differ by the seed alone were loaded, seeds {_seeds(seeds)}; {len(runs)} are finished."
+    yield (
+        f"Packings that differ by the seed alone were loaded, seeds {_seeds(seeds)}; {len(runs)} of {len(seeds)} runs "
+        "are finished."
+    )
     yield from _loading(case)
 
 

@@ -78,9 +78,10 @@ def command(
     sand sweep collision.toml --vary projectile.grains=500,4000
         --vary impact.speed="log(10 m/s, 200 m/s, 10)" --seeds 3 --workers 8
 
-    The case is one of `sand run`, `collide`, `scatter` or `grow`; its table [sweep] has the same settings as the
-    options. Writes sweep.csv, one row for each run with its values, results and cost. What is in DIR is not computed
-    again: call the command again after an interruption, with more values, or in several processes at once.
+    The case is one of `sand run`, `collide`, `scatter`, `grow`, `compress`, `stretch` or `shear`; its table [sweep] has
+    the same settings as the options. Writes sweep.csv, one row for each run with its values, results and cost. What is
+    in DIR is not computed again: call the command again after an interruption, with more values, or in several
+    processes at once.
     """
     set_threads(threads)
     from ..experiments.sweep_job import SweepJob

@@ -13,7 +13,8 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
-from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
+from ..config.folders import without_run
+from ..io.run_folder import CASE, SUMMARY, TRAJECTORY, holds_sweep
 from . import options, parsing, report
 
 WAIT = 60.0
@@ -81,7 +82,7 @@ def command(
 
 
 def _open_dataset(path: Path, given: Mapping[str, Any], verbose: bool) -> Any:
-    """Open a run as soon as it has a frame, or a file.  Raises BadInput if a run does not get one within WAIT."""
+    """Open a run as soon as it has a frame, or a file.  Raises BadInput if there is none within WAIT."""
     from ..io.file_frames import FileFrames
     from ..setup.from_file import is_own_trajectory
     from ..viewer.dataset import frames_dataset, run_dataset
@@ -94,6 +95,8 @@ def _open_dataset(path: Path, given: Mapping[str, Any], verbose: bool) -> Any:
     begun, noted = time.monotonic(), not verbose
     while True:
         waited = time.monotonic() - begun
+        if not (path / TRAJECTORY).exists() and (holds_sweep(path) or any(path.glob("seed-*"))):
+            raise BadInput(without_run(path))
         try:
             folder = find_run_folder(path)
             return run_dataset(path, None if folder is None else read_field(folder))

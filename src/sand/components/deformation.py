@@ -11,7 +11,7 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.arrays import CellArrays
-from ..basics.box import Box
+from ..basics.box import Box, least_side
 from ..basics.errors import BadInput, shown
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
@@ -167,7 +167,7 @@ class DeformedBox(Component):
         self._lengths = np.array(setup.box.lengths, np.float64)
         if not self.moves_box:
             return {}
-        shortest = 2.0 * (2.0 * float(setup.grains.radius.max()) + float(setup.grains.radius.min()))
+        shortest = least_side(setup.grains.radius)
         number, time = LAWS.index(self.given.law), self.given.time or 0.0
         return deformation_stages(DeformationNumbers(number, time, shortest, bool(setup.forces.long_range)))
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..basics.box import Box
+from ..basics.box import Box, least_side
 from ..basics.errors import ErrorCollector
 from ..basics.grains import Grains
 from ..basics.initial_pairs import at_same_place
@@ -65,7 +65,7 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
         )
     for force in forces:
         warnings += errors.take(force.check, grains, box, instead=[])
-    least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
+    least = least_side(grains.radius)
     if box.shortest < least:
         errors.problems.append(
             f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "

@@ -13,11 +13,11 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.box import Box, as_box
+from ..basics.box import Box, as_box, least_side
 from ..basics.errors import BadInput, shown, warn
 from ..basics.grains import Grains
 from ..basics.settings import Number, Reading, Settings, Word
-from ..basics.units import si
+from ..basics.units import format_quantity, si
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
@@ -191,11 +191,8 @@ class Plan(NamedTuple):
             "coordination": 2.0 * row["contacts"] / grains,
             "rate_ratio": self.rate_ratio(sides),
         }
-        more = {
-            name: row[name]
-            for name in row
-            if name in OF_STATE or name.startswith(("pressure", "mean_pressure", "lost_"))
-        }
+        parts = ("pressure", "mean_pressure", "lost_")
+        more = {name: row[name] for name in row if name in OF_STATE or name.startswith(parts)}
         return known | more
 
 
@@ -231,15 +228,23 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
     refuse_pieces(given.grains, np.asarray(pairs, np.int64), given.box, "the body")
     way, grains = _way(loading), given.grains
     start, sides = way.placed(loading, given, contact)
-    rolling = {"roll_factor": contact.roll_factor, "rolling_limit": contact.rolling_limit}
-    scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **rolling)
+    settings = {name: getattr(contact, name) for name in ("roll_factor", "rolling_limit", "surface_energy_factor")}
+    scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **settings)
     unit = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}[loading.rate.unit]
     found = Plan(loading, start, {}, sides, loading.rate.value / unit, 0.0, 0.0, scales)
     filling = found.filling(sides)
     if loading.kind == "compress" and loading.to <= filling:
         raise BadInput(f"to = {loading.to:g} is not above the filling factor at the start, {filling:.3g}")
     until, row_every = way.times(loading, filling, found.rate)
-    return found._replace(moved=way.moved(found, contact), until=until, row_every=row_every)
+    found = found._replace(moved=way.moved(found, contact), until=until, row_every=row_every)
+    smallest, needed = float(way.last_sides(found).min()), least_side(grains.radius)
+    if loading.by == "box" and smallest < needed <= sides.min():
+        first, least = (format_quantity(float(f"{side:.3g}"), "m") for side in (smallest, needed))
+        raise BadInput(
+            f"to = {loading.to:g}: a side of the box is {first} then; with less than {least} two grains could touch "
+            "through two images: give a smaller one, or more grains"
+        )
+    return found
 
 
 def slow_from(planned: Plan) -> str:
@@ -277,7 +282,7 @@ class Loaded(NamedTuple):
             "rate": planned.rate,
             "contact_time": planned.scales.time,
             "largest_rate_at_start": planned.rate / planned.rate_ratio(planned.sides),
-            "surface_energy": planned.start.grains.materials[0].surface_energy,
+            "surface_energy": planned.scales.surface_energy,
             "roll_energy": planned.scales.roll_energy,
             "pressure_scale": planned.scales.pressure,
             **{name: last[name] for name in ("time", "step", "filling", "strain", "stress", "coordination")},

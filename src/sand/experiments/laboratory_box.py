@@ -40,10 +40,8 @@ def in_box(loading: Loading, body: Start, axes: str) -> Start:
             )
         return body
     grains = body.grains.copy()
-    low, high = (
-        (grains.position - grains.radius[:, None]).min(axis=0),
-        (grains.position + grains.radius[:, None]).max(axis=0),
-    )
+    reach = grains.radius[:, None]
+    low, high = (grains.position - reach).min(axis=0), (grains.position + reach).max(axis=0)
     cube = float((high - low).max()) + GAP * float(grains.radius.mean())
     lengths = [cube, cube, cube] if loading.box is None else list(loading.box.lengths)
     for k, axis in enumerate("xyz"):
@@ -69,11 +67,8 @@ def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.n
 def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
     """The motion of the box, as an argument of `Simulation`."""
     sign = -1.0 if plan.loading.kind == "compress" else 1.0
-    return {
-        "deformation": COMPONENTS["deformation"](
-            [sign * plan.rate if axis in plan.loading.axes else 0.0 for axis in "xyz"]
-        )
-    }
+    rates = [sign * plan.rate if axis in plan.loading.axes else 0.0 for axis in "xyz"]
+    return {"deformation": COMPONENTS["deformation"](rates)}
 
 
 def times(loading: Loading, filling: float, rate: float) -> tuple[float, float]:

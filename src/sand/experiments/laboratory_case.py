@@ -17,6 +17,7 @@ from ..basics.material import PRESETS, Material
 from ..basics.settings import For, Number, Whole
 from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
 from ..config.commands import command_for
+from ..config.folders import without_run
 from ..config.key_errors import validate
 from ..config.sections import PathName, Section, Seeds, Stepping, with_integrator, with_keys
 from ..integrate.verlet import Verlet
@@ -49,13 +50,16 @@ class PackingSection(BodySection):
         if self.kind == "file":
             path = Path(str(self.file))
             path = own if (own := path / f"seed-{seed}").is_dir() else path
+            if path.is_dir() and not (path / TRAJECTORY).exists():
+                raise BadInput(f"file, for seed {seed}: {without_run(path)}")
             if is_own_trajectory(path):
                 number = -1 if self.frame is None else self.frame
                 if self.filling is not None:
                     number = frame_with(path, self.filling)
                 return from_trajectory(path, number, materials)
-        if chosen := [name for name in ("frame", "filling") if getattr(self, name) is not None]:
-            raise BadInput(f"{chosen[0]} is for a run of SAND; {self.file} is another file: leave {chosen[0]} out")
+        named = [name for name in ("frame", "filling") if getattr(self, name) is not None]
+        if named and Path(str(self.file)).exists():
+            raise BadInput(f"{named[0]} is for a run of SAND; {self.file} is another file: leave {named[0]} out")
         return self.build(materials, seed)
 
 
@@ -132,6 +136,13 @@ class LaboratoryCase(Section):
     def physics(self) -> list[Any] | None:
         """Forces, as `laboratory.plan` takes them."""
         return self.forces.build() or None
+
+    def first_plan(self) -> Plan:
+        """The plan of the first seed; files of all others are read, too, to find errors.  Raises BadInput."""
+        first = self.plan(self.section.seeds[0])
+        for seed in self.section.seeds[1:] if self.aggregate.kind == "file" else ():
+            self.plan(seed)
+        return first
 
     def plan(self, seed: int) -> Plan:
         """The packing of a seed, and how it is loaded.  Raises BadInput."""

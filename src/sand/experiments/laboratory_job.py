@@ -75,7 +75,7 @@ class LaboratoryJob(Job):
     ) -> dict[str, Any]:
         """As `Job.run`; the first packing is set up before, to find errors, and tells of its rate."""
         try:
-            planned = self.case.plan(self.tasks()[0])
+            planned = self.case.first_plan()
             simulation_of(planned, self.case.physics(), stepping=self.case.stepping)
         except BadInput as error:
             raise error.at(str(self.path)) from None

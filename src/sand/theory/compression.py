@@ -7,6 +7,7 @@ The numbers of the papers are from memory, not compared with the papers.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any, NamedTuple
 
@@ -34,6 +35,7 @@ class PackingScales(NamedTuple):
     time: float  # t_c = √(m̄ δ_c/F_c) [s] with the reduced mass m̄ = m/2: the unit of rates of strain, C_v = rate × t_c
     critical_damping: float  # 2√(k_n m̄) [kg/s], of the normal motion of a contact
     wave_speed: float  # √(3 E_roll/(r³ρ)) [m/s]: times φ, the speed of a wave of plastic compression
+    surface_energy: float  # γ [J/m²], with its factor
 
     def largest_rate(self, filling: Any, side: Any) -> float:
         """Largest rate of strain [1/s] with which the pressure is that of slower compressions.
@@ -54,7 +56,12 @@ class PackingScales(NamedTuple):
 
 @checked
 def packing_scales(
-    material: Material | str, radius: Any, *, roll_factor: Any = 1.0, rolling_limit: Any = None
+    material: Material | str,
+    radius: Any,
+    *,
+    roll_factor: Any = 1.0,
+    rolling_limit: Any = None,
+    surface_energy_factor: Any = 1.0,
 ) -> PackingScales:
     """Scales of the compression of a packing of equal grains.
 
@@ -68,6 +75,8 @@ def packing_scales(
         Factor > 0 of the rolling stiffness (`sand.Contact`), which multiplies E_roll.
     rolling_limit : float or str, optional
         ξ_c [m] > 0 in place of the value of the material.
+    surface_energy_factor : float, optional
+        Factor > 0 of γ (`sand.Contact`).
 
     Raises
     ------
@@ -75,6 +84,9 @@ def packing_scales(
         If an argument is out of range, or the material has no surface energy.
     """
     one, r = as_material(material), si(radius, "m", "radius", above=0.0)
+    factor = si(surface_energy_factor, "1", "surface_energy_factor", above=0.0)
+    if one.surface_energy is not None:
+        one = dataclasses.replace(one, surface_energy=factor * one.surface_energy)
     numbers, mass = contact(one, r, rolling_limit=rolling_limit), 4.0 / 3.0 * math.pi * r**3 * one.density
     energy = si(roll_factor, "1", "roll_factor", above=0.0) * numbers.roll_energy_clamped
     return PackingScales(
@@ -83,6 +95,7 @@ def packing_scales(
         math.sqrt(0.5 * mass * numbers.pull_off_overlap / numbers.pull_off_force),
         math.sqrt(2.0 * mass * numbers.normal_stiffness),
         math.sqrt(3.0 * energy / (r**3 * one.density)),
+        float(one.surface_energy),
     )
 
 

@@ -86,7 +86,7 @@ EXPECTED = {
     ],
     "grow": ["seeds 1, 2", "8 grains, a gas", "2 boxes have run", "was 1.5e-05 of"],
     "stretch": [
-        "seeds 1 to 3; 2 are finished",
+        "seeds 1 to 3; 2 of 3 runs are finished",
         "The packing was: kind = rbd, grains = 30, radius = 100 nm, material = iron",
         "to = 0.5, by = walls, along = auto",
         "density = 7874 kg/m^3",

@@ -208,6 +208,39 @@ def test_stress_in_a_box_is_the_mean_of_its_axes(kind):
     assert factors[1:] == pytest.approx([factors[0]] * 2 if compressed else [1.0] * 2, rel=1e-9, abs=0.0)
 
 
+def test_scales_are_those_of_the_contacts():
+    """E_roll = 12π²γRξ_c f_roll with γ times the factor of the contact model; t_c follows from the same γ."""
+    found = plan(PACKING, walls(), [sand.Contact(surface_energy_factor=0.5, roll_factor=8.0)]).scales
+    energy = 12.0 * math.pi**2 * 0.5 * ICE.surface_energy * 0.5e-7 * ICE.rolling_limit * 8.0
+    assert found.roll_energy == pytest.approx(energy, rel=1e-12, abs=0.0)
+    half = sand.Material.like("ice", surface_energy=0.5 * ICE.surface_energy)
+    assert found.time == pytest.approx(packing_scales(half, 1e-7).time, rel=1e-12, abs=0.0)
+    assert found.surface_energy == pytest.approx(0.5 * ICE.surface_energy, rel=1e-12, abs=0.0)
+
+
+def test_an_end_where_grains_would_touch_through_two_images():
+    """27 grains at φ = 0.7 fill a cube of 0.545 µm, less than 2 (2r + r) = 0.6 µm; at φ = 0.5 it has 0.609 µm."""
+    plan(PACKING, Loading("compress", "1e-4 /t_c", 0.5, box="1 um"))
+    with pytest.raises(sand.BadInput, match=r"to = 0\.7: a side of the box is 545 nm then; with less than 600 nm"):
+        plan(PACKING, Loading("compress", "1e-4 /t_c", 0.7, box="1 um"))
+
+
+def test_folders_without_a_frame(tmp_path, monkeypatch, capsys):
+    """A file that is missing, and a folder of other runs, are refused with what they are; `view` does not wait."""
+    monkeypatch.chdir(tmp_path)
+    body = '[aggregate]\nkind = "file"\nfilling = 0.1\nfile = "old"\n'
+    (tmp_path / "pull.toml").write_text(body + '[stretch]\nrate = "1e-4 /t_c"\nto = 0.1\nseeds = [2]\n')
+    assert main(["stretch", "pull.toml"]) == 2
+    assert f"there is no file {tmp_path / 'old'}" in capsys.readouterr().err
+    (tmp_path / "old/seed-1").mkdir(parents=True)
+    assert main(["stretch", "pull.toml"]) == 2
+    assert f"file, for seed 2: {tmp_path / 'old'} holds runs of several seeds" in capsys.readouterr().err
+    (tmp_path / "old/case.toml").write_text(CASE)
+    monkeypatch.setattr("sand.cli.view.WAIT", 0.0)
+    assert main(["view", "old", "--html", "page.html"]) == 2
+    assert "old holds runs of several seeds" in capsys.readouterr().err
+
+
 @pytest.mark.compiled("contacts")
 @pytest.mark.filterwarnings("ignore:the rate,")
 def test_a_job(tmp_path, monkeypatch, capsys):
@@ -242,6 +275,12 @@ def test_a_job(tmp_path, monkeypatch, capsys):
     pulled = json.loads(capsys.readouterr().out)["runs"][0]
     assert pulled["filling_at_start"] == pytest.approx(0.25, rel=0.05, abs=0.0)
     assert pulled["strain"] == pytest.approx(0.1, rel=1e-6, abs=0.0)
+    # the frames of all seeds are read before the first run
+    text = (tmp_path / "pull.toml").read_text()
+    (tmp_path / "pull.toml").write_text(text.replace("to = 0.1\n", "to = 0.1\nseeds = [1, 3]\n"))
+    for command in (["info", "pull.toml"], ["stretch", "pull.toml", "--out", "none"]):
+        assert main(command) == 2 and "file, for seed 3: " in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.compiled("contacts")
