@@ -190,8 +190,8 @@ def whole(request, tmp_path_factory):
     return command, case, results(command, parent / "job"), time.monotonic() - began
 
 
-def stop(job, way):
-    """Stop a job as a terminal, a batch system, or the kernel does."""
+def stop(job, way, worker):
+    """Stop a job as a terminal, a batch system, or the kernel does, which kills one of its workers."""
     if way == "Ctrl-C":
         os.killpg(job.pid, signal.SIGINT)
     elif way == "SIGTERM":
@@ -199,13 +199,14 @@ def stop(job, way):
     elif way == "parent killed":
         job.send_signal(KILL)
     else:
-        os.kill(workers(job)[0], KILL)
+        with contextlib.suppress(ProcessLookupError):  # it may just have ended
+            os.kill(worker, KILL)
 
 
 def stop_and_check(job, folder, way):
     """Stop a job: all processes end, with the code and the line of this way, and what they have saved is complete."""
-    if job.poll() is None and workers(job):
-        stop(job, way)
+    if job.poll() is None and (found := workers(job)):
+        stop(job, way, found[0])
         said = job.communicate(timeout=120)[0]
         wait_until(lambda: not group(job.pid))
         code = {"parent killed": -KILL, "worker killed": BAD_INPUT}.get(way, INTERRUPTED)

@@ -32,7 +32,7 @@ CAPABILITIES = {
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
     "grains in frames, pictures and page": 491,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
-    "energy, folders of several runs named by view": 27,
+    "energy, folders of several runs named by view": 18,
 }
 """Code lines of capabilities that the source has gained since its count was 35,400."""
 MOST_PARAMETERS = 8
