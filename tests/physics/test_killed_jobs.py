@@ -19,6 +19,7 @@ from sand.io.checkpoint import newest_checkpoint
 from sand.io.sweep_files import COST
 from sand.io.trajectory import read_frames
 
+from ..cases import COMPRESSION
 from ..systems import KILL
 
 pytestmark = [
@@ -74,20 +75,7 @@ relative_error = 0.01
 seed = 3
 """,
 }
-CASES["compress"] = """
-[aggregate]
-kind = "rbd"
-grains = 12
-radius = "0.1 um"
-material = "ice"
-[compression]
-rate = "0.2 m/s"
-to = 0.3
-by = "walls"
-seeds = [1, 2, 3, 4, 5, 6]
-[forces.contact]
-damping = "critical"
-"""
+CASES["compress"] = COMPRESSION.replace("1 m/s", "0.2 m/s").replace("[1, 2]", "[1, 2, 3, 4, 5, 6]")
 CASES["sweep"] = f"{CASES['collide']}[sweep]\nseeds = 2\n[sweep.vary]\nimpact.speed = [2, 3, 4]\n"
 RESULTS = {"grow": "growth.json", "collide": "collision.json", "scatter": "results.csv", "sweep": "sweep.csv"}
 RESULTS["compress"] = "laboratory.json"

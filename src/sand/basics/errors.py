@@ -8,7 +8,8 @@ import re
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 LONGEST = 80
@@ -47,6 +48,15 @@ class BadInput(SandError, ValueError):
     def at(self, where: str) -> BadInput:
         """The same errors, each with a location in front, for example `iron-gas.toml: grains.radius`."""
         return BadInput(f"{where}: {problem}" for problem in self.problems)
+
+
+@contextmanager
+def naming(where: object) -> Iterator[None]:
+    """Put a location, such as the path of a case file, in front of each error in the block, see `BadInput.at`."""
+    try:
+        yield
+    except BadInput as error:
+        raise error.at(str(where)) from None
 
 
 def _shortened(line: str) -> str:

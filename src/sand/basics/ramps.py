@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence, Set
 from typing import Annotated, Any, ClassVar, TypeVar
 
 from .arguments import checked
-from .errors import BadInput, ErrorCollector, did_you_mean
+from .errors import BadInput, ErrorCollector, did_you_mean, naming
 from .settings import List, Number, Setting, Settings, Whole, declared
 
 STEPS = 1000
@@ -164,10 +164,8 @@ def _as_ramp(value: Any, where: str) -> Ramp:
     ]
     if problems:
         raise BadInput(problems)
-    try:
+    with naming(where):
         return Ramp(**value)
-    except BadInput as error:
-        raise error.at(where) from None
 
 
 def _not_rampable(label: str, key: str, names: Sequence[str]) -> str:

@@ -6,8 +6,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import click
-
 from ..basics.threads import set_threads
 from . import options, parsing, report
 
@@ -16,14 +14,11 @@ SHOWN = 12
 
 
 @parsing.command("collide", short_help="Collide two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
-@click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
-@options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
+@options.job_of_seeds
 @options.workers
 @options.wall_time
 @options.imports
 @options.threads
-@click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.output
 def command(
     case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
@@ -54,11 +49,9 @@ def collide(job: Any, *, as_json: bool, quiet: bool, **execution: Any) -> None:
 
 def collision_rows(results: list[dict[str, Any]]) -> report.Rows:
     """The first SHOWN collisions, and how often each outcome occurred."""
-    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", _collision(r)) for r in results[:SHOWN]]
-    if len(results) > SHOWN:
-        rows.append(("…", f"and {len(results) - SHOWN} more"))
+    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", _collision(r)) for r in results]
     counts = Counter(r["outcome"] for r in results)
-    return [*rows, ("outcomes", ", ".join(f"{n} × {name}" for name, n in counts.most_common()))]
+    return [*report.first_of(rows, SHOWN), ("outcomes", ", ".join(f"{n} × {name}" for name, n in counts.most_common()))]
 
 
 def _collision(r: dict[str, Any]) -> str:

@@ -18,11 +18,7 @@ from . import options, parsing, report
 @click.option(
     "--out", metavar="DIR", type=options.FOLDER, help="Folder for the folders of the boxes (default: the case's name)."
 )
-@options.workers
-@options.scheduler
-@options.wall_time
-@options.imports
-@options.threads
+@options.execution
 @options.output
 def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.

@@ -18,15 +18,8 @@ def command_of(name: str, short: str, what: str) -> click.Command:
     """The command of a kind of loading."""
 
     @parsing.command(name, short_help=short)
-    @click.argument("case", metavar="CASE.toml", type=options.CASE_FILE)
-    @click.option("--out", metavar="DIR", type=options.FOLDER, help="Folder for the files (default: the case's name).")
-    @options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
-    @options.workers
-    @options.scheduler
-    @options.wall_time
-    @options.imports
-    @options.threads
-    @click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
+    @options.job_of_seeds
+    @options.execution
     @options.output
     def command(
         case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
@@ -67,5 +60,4 @@ def run_rows(runs: list[dict[str, Any]]) -> report.Rows:
         stress = f"stress {last} at the end, {most} at most; {run['coordination']:.2f} contacts per grain"
         return f"{ends}; {stress}; {run['step']} steps, drift {run['drift']:.1e}"
 
-    rows = [(f"seed {run['seed']}", text(run)) for run in runs[:SHOWN]]
-    return [*rows, ("…", f"and {len(runs) - SHOWN} more")] if len(runs) > SHOWN else rows
+    return report.first_of([(f"seed {run['seed']}", text(run)) for run in runs], SHOWN)

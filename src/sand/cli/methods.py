@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
+from ..config.commands import LOADINGS
 from ..config.folders import job_in
 from ..io import run_folder as files
 from . import options, parsing, report
@@ -295,7 +296,7 @@ KINDS: dict[str | None, Callable[[Path, Path], Sentences]] = {
     "collide": _of_collisions,
     "grow": _of_growth,
     "scatter": _of_scattering,
-    **dict.fromkeys(("compress", "stretch", "shear"), _of_loading),
+    **dict.fromkeys(LOADINGS, _of_loading),
     "sweep": _of_sweep,
 }
 """What describes the folder of each command; the arguments are the folder and its case file."""

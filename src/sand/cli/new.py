@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from ..basics.errors import BadInput
+from ..config.commands import LOADINGS
 from . import options, parsing, report
 
-COMMANDS = ("run", "collide", "scatter", "grow", "compress", "stretch", "shear", "sweep")
+COMMANDS = ("run", "collide", "scatter", "grow", *LOADINGS, "sweep")
 """Commands that read a case file; as `experiments.templates.TEMPLATES`, which takes long to import."""
 
 

@@ -166,6 +166,21 @@ def read_seeds(_context: click.Context, _option: click.Parameter, text: str | No
     return each_once(found, "--seeds")
 
 
+overwrite = click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
+
+
+def job_of_seeds(command: Callable[..., Any]) -> Callable[..., Any]:
+    """CASE.toml, --out, --seeds and --overwrite of a command that begins a job with one part for each seed."""
+    case = click.argument("case", metavar="CASE.toml", type=CASE_FILE)
+    out = click.option("--out", metavar="DIR", type=FOLDER, help="Folder for the files (default: the case's name).")
+    return case(out(seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")(overwrite(command))))
+
+
+def execution(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of how a job is computed: --workers, --scheduler, --wall-time, --import and --threads."""
+    return workers(scheduler(wall_time(imports(threads(command)))))
+
+
 def _frames(_context: click.Context, _option: click.Parameter, text: str) -> slice:
     """Read '-1', '3', '10:' or '::5' as a slice.  Raises BadInput."""
     parts = text.split(":")

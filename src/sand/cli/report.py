@@ -104,13 +104,9 @@ def notes() -> Iterator[None]:
         yield
 
 
-@contextmanager
-def naming(case: str | Path) -> Iterator[None]:
-    """Put the name of the case file in front of the error messages of the block."""
-    try:
-        yield
-    except BadInput as error:
-        raise error.at(str(case)) from None
+def first_of(rows: Rows, most: int) -> Rows:
+    """The first `most` rows, and how many more there are."""
+    return [*rows[:most], ("…", f"and {len(rows) - most} more")] if len(rows) > most else rows
 
 
 def resume_line(folder: Path) -> str:

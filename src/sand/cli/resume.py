@@ -12,6 +12,7 @@ import click
 
 from ..basics.errors import BadInput
 from ..basics.threads import set_threads
+from ..config.commands import LOADINGS
 from ..config.folders import content_of, job_in
 from ..io.run_folder import CASE, COLLISION, GROWTH, LABORATORY, SCATTERING, SUMMARY, SWEEP, SWEEP_CSV, read_json
 from . import options, parsing, report
@@ -26,7 +27,7 @@ JOBS = {
     "collide": (COLLISION, "collision_job", "CollisionJob", collide),
     "scatter": (SCATTERING, "scattering.job", "ScatterJob", scatter),
     "grow": (GROWTH, "growth_boxes", "GrowthJob", grow),
-    **dict.fromkeys(("compress", "stretch", "shear"), (LABORATORY, "laboratory_job", "LaboratoryJob", laboratory)),
+    **dict.fromkeys(LOADINGS, (LABORATORY, "laboratory_job", "LaboratoryJob", laboratory)),
     "sweep": (SWEEP, "sweep_job", "SweepJob", sweep),
 }
 """Results file, module and class of each job, and what runs it and prints its results."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, naming
 from ..basics.threads import set_threads
 from ..io.run_folder import CASE, TRAJECTORY
 from . import options, parsing, report
@@ -96,7 +96,7 @@ def command(
     refuse_folder(folder, Path(name), overwrite=overwrite)
 
     def build() -> Any:
-        with report.naming(name):
+        with naming(name):
             return simulation_of(described, folder, overwrite=overwrite)
 
     heading = f"run {name}" + (f" from {source}" if source else "")

@@ -28,7 +28,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @options.scheduler
 @options.wall_time
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
-@click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
+@options.overwrite
 @options.output
 def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: Any) -> None:
     """Compute the encounters of two bodies that CASE.toml describes.

@@ -63,11 +63,7 @@ def _seeds(context: click.Context, option: click.Parameter, text: str | None) ->
 @click.option("--retry", is_flag=True, help="Compute runs that failed again.")
 @click.option("--dry-run", is_flag=True, help="List the runs and their expected cost, and compute nothing.")
 @click.option("--parquet", is_flag=True, help="Write the table as sweep.parquet, too; needs pyarrow.")
-@options.workers
-@options.scheduler
-@options.wall_time
-@options.imports
-@options.threads
+@options.execution
 @options.output
 def command(
     case: str, out: str | None, retry: bool, dry_run: bool, parquet: bool, threads: int | None, **how: Any
@@ -130,8 +126,7 @@ def sweep(
     if dry_run:
         names = {row.name for row in left}
         runs = [{"run": r.name, "left": r.name in names, **r.values, "seed": r.seed} for r in job.rows]
-        rows = [(one["run"], _listed(one)) for one in runs[:SHOWN]]
-        rows += [("…", f"and {len(runs) - SHOWN} more")] if len(runs) > SHOWN else []
+        rows = report.first_of([(one["run"], _listed(one)) for one in runs], SHOWN)
         content = {"runs": runs, "left": len(left), "expected": expected._asdict()}
         report.answer(
             content, f"sweep {job.path}, nothing is computed", [*rows, *opening], as_json=as_json, quiet=quiet
@@ -182,7 +177,5 @@ def _listed(one: dict[str, Any]) -> str:
 def _rows(content: dict[str, Any]) -> report.Rows:
     """Numbers of runs, failed ones with their messages, and the table."""
     counts = f"{content['done']} of {content['runs']} done, {content['failed']} failed, {content['left']} left"
-    failures = list(content["failures"].items())
-    rows = [("runs", counts), *((f"failed {name}", text) for name, text in failures[:SHOWN])]
-    rows += [("…", f"and {len(failures) - SHOWN} more")] if len(failures) > SHOWN else []
-    return [*rows, ("table", f"{content['folder']}/sweep.csv")]
+    failures = [(f"failed {name}", text) for name, text in content["failures"].items()]
+    return [("runs", counts), *report.first_of(failures, SHOWN), ("table", f"{content['folder']}/sweep.csv")]

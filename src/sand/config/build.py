@@ -11,7 +11,7 @@ from typing import Any
 from .. import components
 from ..basics.arguments import checked
 from ..basics.box import Box
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, naming
 from ..basics.grains import Grains
 from ..basics.paths import user_path
 from ..basics.state import grains_from_arrays
@@ -115,14 +115,12 @@ def _of_gas(case: Case) -> Start:
 
 def _of_file(case: Case) -> Start:
     section, path = case.grains, Path(case.grains.file or "")
-    try:
+    with naming("grains"):
         if not is_own_trajectory(path):
             return _of_other(case, path)
         if extra := [name for name in ("radius", "length") if getattr(section, name) is not None]:
             raise BadInput(f"{extra[0]}: the trajectory {path} has it; leave {extra[0]} out")
         start = from_trajectory(path, section.frame, case.materials_by_name())
-    except BadInput as error:
-        raise error.at("grains") from None
     given = section.material if isinstance(section.material, list) else [section.material]
     there = [m.name for m in start.grains.materials]
     if "material" in section.model_fields_set and set(given) != set(there):

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, creat
 
 from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
-from ..basics.errors import BadInput, ErrorCollector, did_you_mean
+from ..basics.errors import BadInput, ErrorCollector, did_you_mean, naming
 from ..basics.material import NEAREST, PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
 from ..components.deformation import Deformation, DeformedBox
@@ -107,10 +107,8 @@ class MaterialSection(Section):
         """Build the material.  Raises BadInput for missing or impossible numbers."""
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
-            try:
+            with naming(f"{name}.like"):
                 preset = like_preset(self.like, name)
-            except BadInput as error:
-                raise error.at(f"{name}.like") from None
             return preset.but(name=name, **given)
         missing = [key for key in ("density", "young_modulus", "poisson_ratio") if key not in given]
         if missing:
@@ -207,10 +205,8 @@ class _Forces(Section):
         """
         given = {key: getattr(self, key) for key in type(self).model_fields}
         for key, table in self._own.items():
-            try:
+            with naming(f"forces.{key}"):
                 given[key] = own_force(table)
-            except BadInput as error:
-                raise error.at(f"forces.{key}") from None
         order = [*(key for key in self._order if key in given), *given]
         return [given[key] for key in dict.fromkeys(order) if given[key] is not None]
 

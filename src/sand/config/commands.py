@@ -20,6 +20,8 @@ OWN_TABLES = {
 }
 """Tables found only in case files of one command; a case of `sand grow` also has those of `sand run`, and one of `sand
 sweep` those of any other command."""
+LOADINGS = ("compress", "stretch", "shear")
+"""Commands that load a packing."""
 BODIES = {"target", "projectile"}
 """Tables of the bodies of `sand collide` and `sand scatter`."""
 OF_FILES = ("grains", "aggregate", *BODIES)

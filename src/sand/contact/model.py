@@ -11,7 +11,7 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.box import Box
-from ..basics.errors import BadInput, shown
+from ..basics.errors import BadInput, naming, shown
 from ..basics.grains import Grains
 from ..basics.material import Material, contact_settings
 from ..basics.ramps import rampable
@@ -149,10 +149,8 @@ class Contact(Settings):
         preset = given.pop("like")
         if not isinstance(preset, str):
             raise BadInput(f"like = {shown(preset)} must be the name of a preset, as in docs: Materials")
-        try:
+        with naming("like"):
             return contact_settings(preset) | given
-        except BadInput as error:
-            raise error.at("like") from None
 
     @property
     def contact_law(self) -> ContactLaw:

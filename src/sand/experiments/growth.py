@@ -13,7 +13,7 @@ from ..analysis.fits import PowerLawFit, mean_interval, power_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..analysis.growth_law import LocalDegree, RateLaw, local_degrees, rate_law
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, naming
 from ..basics.paths import user_path
 from ..io import run_folder as files
 from ..results import Run
@@ -92,10 +92,8 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
     first = frames[0]
     frames.close()
-    try:
+    with naming(folder):
         shared = shared_settings(run.case)
-    except BadInput as error:
-        raise error.at(str(folder)) from None
     moments = np.linalg.norm(first.moment, axis=1)
     return BoxResult(
         user_path(folder),

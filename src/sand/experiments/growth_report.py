@@ -12,7 +12,7 @@ import numpy as np
 
 from ..analysis.body_motion import body_temperatures
 from ..analysis.fits import separation
-from ..basics.errors import BadInput
+from ..basics.errors import naming
 from ..basics.paths import user_path
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
@@ -48,10 +48,8 @@ def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None)
         If there is no run, or the settings of the runs differ.
     """
     boxes = [read_box(one) for one in boxes_in(folder)]
-    try:
+    with naming(folder):
         return Ensemble(user_path(folder).absolute().name, growth_of(boxes, window), boxes)
-    except BadInput as error:
-        raise error.at(str(folder)) from None
 
 
 def ensemble_summary(one: Ensemble) -> dict[str, Any]:

@@ -142,3 +142,44 @@ class Job:
             kept.add(task, outcome)
             show(self.line(outcome))
         return self.results([kept.found[task] for task in tasks])
+
+
+class JobOfSeeds(Job):
+    """Base class of jobs with one part for each seed of the case.
+
+    Parameters
+    ----------
+    path : str or Path
+        Case file.
+    folder : str or Path or None, optional
+        Output folder; by default that of the case, or the name of the case file.
+    seeds : list of int or None, optional
+        Replaces the seeds of the case.
+    **how
+        As for `Job`.
+
+    Raises
+    ------
+    BadInput
+        All errors of the case.
+
+    Attributes
+    ----------
+    case : Section
+        The case, checked.
+    """
+
+    def __init__(self, path: str | Path, folder: str | Path | None = None, seeds: list[int] | None = None, **how: bool):
+        self.case, table = self.read(path)
+        section = getattr(self.case, table)
+        super().__init__(path, folder or section.out, **how)
+        self.seeds: list[int] = seeds or list(section.seeds)
+        self.content[table]["seeds"] = section.seeds = self.seeds
+
+    def read(self, path: str | Path) -> tuple[Any, str]:
+        """The case, and the name of its table with `seeds` and `out`.  Raises BadInput."""
+        raise NotImplementedError
+
+    def tasks(self) -> list[int]:
+        """The seeds."""
+        return self.seeds

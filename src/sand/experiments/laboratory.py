@@ -18,6 +18,7 @@ from ..basics.errors import BadInput, shown, warn
 from ..basics.grains import Grains
 from ..basics.settings import Number, Reading, Settings, Word
 from ..basics.units import format_quantity, si
+from ..config.commands import LOADINGS
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..integrate.integrator import Integrator
@@ -28,10 +29,8 @@ from ..simulation.simulation import Simulation
 from ..theory.compression import CLOSEST, PackingScales, packing_scales
 from .laboratory_table import Percolation, table_of
 
-KINDS = ("compress", "stretch", "shear")
-"""What is done to a packing."""
 WAYS = ("box", "walls")
-"""What moves: the periodic box, or one of two walls. The functions of each are in the module laboratory_WAY."""
+"""By what a packing is loaded: its periodic box, or one of two walls. The functions of each are in laboratory_WAY."""
 OF_STATE = (
     *("contacts", "made", "moved", "broken", "clusters", "translation", "rotation"),
     *("normal", "sliding", "rolling", "twisting", "total"),
@@ -109,7 +108,7 @@ class Loading(Settings):
         If a setting is unknown, out of range, or contradicts another one; one line for each.
     """
 
-    kind: Annotated[str, Word(*KINDS)]
+    kind: Annotated[str, Word(*LOADINGS)]
     rate: Annotated[Any, Reading(read_rate, write=str)]
     to: Annotated[Any, Number(above=0.0)]
     by: Annotated[str, Word(*WAYS)] = "box"
@@ -156,7 +155,7 @@ class Plan(NamedTuple):
 
     loading: Loading
     start: Start
-    moved: dict[str, Any]  # arguments of `Simulation`: what moves
+    moved: dict[str, Any]  # argument of `Simulation`: the motion of the box, or the walls
     sides: np.ndarray  # lengths of the box (3,) [m]; along z the distance of the walls
     rate: float  # of strain, at the start [1/s]
     until: float  # [s]
@@ -172,6 +171,10 @@ class Plan(NamedTuple):
         moved = ["xyz".index(axis) for axis in self.loading.axes]
         speeds = self.rate * (self.sides if self.loading.by == "walls" else sides)[moved]  # that of a wall is constant
         return float(speeds.max()) / self.scales.largest_rate(self.filling(sides), 1.0)
+
+    def rate_text(self, rate: float) -> str:
+        """A rate of strain [1/s], for people, also in units of t_c."""
+        return f"{rate:.3g} 1/s, or {rate * self.scales.time:.2g} /t_c"
 
     def row(self, before: dict[str, float] | None, row: dict[str, float]) -> dict[str, Any]:
         """Row of the table, of two rows of the ledger; the first one has no mean values."""
@@ -197,7 +200,7 @@ class Plan(NamedTuple):
 
 
 def _way(loading: Loading) -> Any:
-    """The module of what moves, with the functions `placed`, `moved`, `times`, `sides` and `stress`."""
+    """The module of the box or of the walls, with the functions `placed`, `moved`, `times`, `sides` and `stress`."""
     return importlib.import_module(f".laboratory_{loading.by}", __package__)
 
 
@@ -251,14 +254,11 @@ def slow_from(planned: Plan) -> str:
     """The largest rate at the start of a plan that is slow enough; warns if no part of the plan is."""
     first, last = (planned.rate_ratio(sides) for sides in (planned.sides, _way(planned.loading).last_sides(planned)))
 
-    def text(rate: float) -> str:
-        return f"{rate:.3g} 1/s, or {rate * planned.scales.time:.2g} /t_c"
-
-    good = f"{text(planned.rate / first)}, at the start"
+    good = f"{planned.rate_text(planned.rate / first)}, at the start"
     if (times := min(first, last)) > 1.0:
         warn(
-            f"the rate, {text(planned.rate)}, is {times:.2g} times too fast for a static stress; the largest good rate "
-            f"is {good}"
+            f"the rate, {planned.rate_text(planned.rate)}, is {times:.2g} times too fast for a static stress; the "
+            f"largest good rate is {good}"
         )
     return good
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..basics.errors import BadInput
+from ..basics.errors import BadInput, naming
 from ..basics.units import format_quantity
 from ..compiler.progress import announce
 from ..config.build import resume
@@ -19,34 +19,24 @@ from ..io.run_folder import FIGURE, LABORATORY, LOADED, RESULTS_CSV, read_toml
 from ..io.table import write_table
 from ..simulation.observers import Observer
 from ..simulation.serialise import changed_tables
-from .job import Job, Progress, ignored
+from .job import JobOfSeeds, Progress, ignored
 from .laboratory import Plan, run_to_end, simulation_of, slow_from
 from .laboratory_case import OF_COMMAND, LaboratoryCase, model_of, read_laboratory
 
 
-class LaboratoryJob(Job):
+class LaboratoryJob(JobOfSeeds):
     """Packings that are loaded, one for each seed, each in its own folder seed-N with all files of a run.
 
     Parameters
     ----------
-    path : str or Path
-        Case file.
-    folder : str or Path or None, optional
-        Output folder; by default that of the case, or the name of the case file.
-    seeds : list of int or None, optional
-        Replaces the seeds of the case.
     command : str or None, optional
         "compress", "stretch" or "shear"; by default that of the case.
-    **how
-        As for `Job`.
-
-    Raises
-    ------
-    BadInput
-        All errors of the case.
+    path, folder, seeds, **how
+        As for `JobOfSeeds`.
     """
 
     RESULTS, KEPT, PARTS = LABORATORY, LOADED, "runs"
+    case: LaboratoryCase
 
     def __init__(
         self,
@@ -57,14 +47,11 @@ class LaboratoryJob(Job):
         **how: bool,
     ):
         self.COMMAND = command or command_for(read_toml(path)) or ""  # type: ignore[misc]
-        self.case = read_laboratory(path, self.COMMAND)
-        section = self.case.section
-        super().__init__(path, folder or section.out, **how)
-        self.content[OF_COMMAND[self.COMMAND]]["seeds"] = section.seeds = seeds or list(section.seeds)
+        super().__init__(path, folder, seeds, **how)
 
-    def tasks(self) -> list[int]:
-        """The seeds."""
-        return list(self.case.section.seeds)
+    def read(self, path: str | Path) -> tuple[LaboratoryCase, str]:
+        """The case, and the name of its table with the seeds."""
+        return read_laboratory(path, self.COMMAND), OF_COMMAND[self.COMMAND]
 
     def work(self) -> Callable[..., dict[str, Any]]:
         """Run the packing of a seed."""
@@ -74,13 +61,11 @@ class LaboratoryJob(Job):
         self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
     ) -> dict[str, Any]:
         """As `Job.run`; the first packing is set up before, to find errors, and tells of its rate."""
-        try:
+        with naming(self.path):
             planned = self.case.first_plan()
             simulation_of(planned, self.case.physics(), stepping=self.case.stepping)
-        except BadInput as error:
-            raise error.at(str(self.path)) from None
         slow_from(planned)
-        return super().run(executor, [*observers, Shown(self.tasks(), progress)], progress)
+        return super().run(executor, [*observers, Shown(self.seeds, progress)], progress)
 
     def line(self, outcome: dict[str, Any]) -> str:
         """Seed, filling factor, strain and stress at the end."""

@@ -81,6 +81,6 @@ def sides(plan: Plan, row: dict[str, float]) -> np.ndarray:
 
 
 def stress(plan: Plan, before: dict[str, float], row: dict[str, float]) -> float:
-    """Mean stress [Pa] between two rows of the ledger: the work of the lid over its area and its way."""
-    way = plan.rate * float(plan.sides[2]) * (row["time"] - before["time"])
-    return float((before[LOST] - row[LOST]) / (plan.sides[0] * plan.sides[1] * way))
+    """Mean stress [Pa] between two rows of the ledger: the work of the lid over its area and the distance moved."""
+    distance = plan.rate * float(plan.sides[2]) * (row["time"] - before["time"])
+    return float((before[LOST] - row[LOST]) / (plan.sides[0] * plan.sides[1] * distance))

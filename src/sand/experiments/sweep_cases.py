@@ -112,7 +112,7 @@ class SweptRun(SweptCase):
         *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices"),
         *("ns_per_grain_step", "versions", "source_digest", "sand"),
     )
-    """Entries of the summary that are no results; nor are those that begin with "wall_"."""
+    """Entries of the summary that are not results of the simulation; nor are those whose names begin with "wall_"."""
 
     def __init__(self, content: dict[str, Any], name: str):
         own = {key: table for key, table in content.items() if key != "grow"}

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..basics.errors import BadInput, ErrorCollector, each_once, shown
+from ..basics.errors import BadInput, ErrorCollector, each_once, naming, shown
 from ..basics.settings import For, Reading, Whole, Word
 from ..basics.unit_factors import factor
 from ..config.key_errors import keys_at, setting_at
@@ -195,15 +195,13 @@ class Design:
 
     def _values(self, key: str, given: Any, whole: bool) -> list[Any] | Range:
         """The values of one key.  Raises BadInput."""
-        try:
+        with naming(key):
             if self.section.design != EVERY and (one := range_of(given, whole)) and one.number is None:
                 return one
             found: list[Any] = []
             for entry in given if isinstance(given, list) else [given]:
                 spread = range_of(entry, whole)
                 found += [entry] if spread is None else spread.values()
-        except BadInput as error:
-            raise error.at(key) from None
         if not found:
             raise BadInput(f"{key}: there is no value; give a list such as [500, 4000]")
         return found

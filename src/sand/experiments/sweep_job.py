@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.errors import BadInput, ErrorCollector, import_optional, shown, warn
+from ..basics.errors import BadInput, ErrorCollector, import_optional, naming, shown, warn
 from ..basics.paths import user_path
 from ..config.case import with_absolute_files
 from ..config.commands import command_for
@@ -129,10 +129,8 @@ class SweepJob(Job):
             elif problem := key_error(model, self.content, key):
                 errors.problems.append(f"{name}: {problem}")
         errors.done()
-        try:
+        with naming(f"{name}: sweep"):
             design = Design(self.section, partial(takes_whole_numbers, model))
-        except BadInput as error:
-            raise error.at(f"{name}: sweep") from None
         self.seeds = self.section.seeds or errors.take(self._seeds, next(design.combinations()), instead=[0])
         self.content = without_keys(self.content, list(given))
         self.command = command_for(self.content) or ""  # of boxes of sand grow: run, as that of case.toml

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.box import Box
-from ..basics.errors import BadInput, FilesFailed, did_you_mean
+from ..basics.errors import BadInput, FilesFailed, did_you_mean, naming
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
 from ..basics.paths import user_path
@@ -119,10 +119,8 @@ def _in_si(path: str | Path, data: GrainData, radius: Any, length: str | None, c
     if data.sizes_assumed and radius is None:
         data.notes.append(f"{path}: all diameters are 1 unit of length, the default of GSD; give a radius for others")
     grains = _grains_of(path, data, unit, radius, choice)
-    try:
+    with naming(f"{path}: box"):
         box, centre = _box_of(data, unit)
-    except BadInput as error:
-        raise error.at(f"{path}: box") from None
     return ReadGrains(grains, box, centre, None, tuple(data.notes), data.time, data.step)
 
 
@@ -137,7 +135,7 @@ def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choi
     kinds = _materials(path, data, material or (otherwise if data.names is None else None), materials)
     given = dict(data.given)
     density = given.pop("density", None)
-    try:
+    with naming(path):
         grains = Grains(data.position * unit, size, kinds, own=data.own, **(given | {"mass": None}))
         if density is not None and "mass" not in given:
             given["mass"] = density * (4.0 / 3.0 * np.pi) * grains.radius**3
@@ -155,8 +153,6 @@ def _grains_of(path: str | Path, data: GrainData, unit: float, radius: Any, choi
                 f"{grains.mass[k]:.3g} kg; give masses in kg, or leave them out"
             )
         return Grains(data.position * unit, size, kinds, own=data.own, **(given | {"mass": mass}))
-    except BadInput as error:
-        raise error.at(str(path)) from None
 
 
 def kept_masses(mass: np.ndarray, nominal: np.ndarray) -> np.ndarray:

@@ -24,8 +24,8 @@ LOG_FROM = 15.0
 """Ratio of the largest to the smallest value from which on the axis may be logarithmic."""
 MANY = 30
 """Number of values from which on keys with more values do not come before others."""
-SIDE = 0.65
-"""Part of the distance between two places of a map that the marks of one place may take."""
+WIDTH_OF_MARKS = 0.65
+"""Width of all marks at one point of a map, which is a pair of values of two keys, over the distance of two points."""
 _NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)")
 
 Table = Mapping[str, np.ndarray]
@@ -112,15 +112,15 @@ def _classes(table: Table, keys: Sequence[str], groups: np.ndarray, what: str) -
 def _draw_map(
     axes: Axes, over: Sequence[_Values], chosen: np.ndarray, words: np.ndarray, looks: Mapping[str, tuple[str, str]]
 ) -> None:
-    """A mark for each run at its values of two keys; those of one place are in rows side by side."""
-    places, index = np.unique([one.numbers[chosen] for one in over], axis=1, return_inverse=True)
+    """A mark for each run at its values of two keys; marks of runs with the same values form a square."""
+    pairs, index = np.unique([one.numbers[chosen] for one in over], axis=1, return_inverse=True)
     order = np.argsort(index.ravel(), kind="stable")
     rank = np.empty(len(order), int)
     rank[order] = np.arange(len(order)) - np.searchsorted(index.ravel()[order], index.ravel()[order])
     side = math.ceil(math.sqrt(rank.max(initial=0) + 1))
-    points = np.array(axes.get_window_extent().size) * 72.0 / axes.figure.dpi
-    room = min(length / len(set(one)) for length, one in zip(points, places.tolist(), strict=True))
-    step = min(SIDE * room / side, 6.0)
+    size = np.array(axes.get_window_extent().size) * 72.0 / axes.figure.dpi
+    spacing = min(length / len(set(one)) for length, one in zip(size, pairs.tolist(), strict=True))
+    step = min(WIDTH_OF_MARKS * spacing / side, 6.0)
     for one, axis in zip(over, "xy", strict=True):
         one.describe(axes, axis)
     axes.margins(0.08)
@@ -146,18 +146,18 @@ def _draw_shares(
 ) -> None:
     """Shares of the words at each value of a key, one above the other, each with its mark."""
     (x,) = over
-    places, index = np.unique(x.numbers, return_inverse=True)
-    number = np.maximum(np.bincount(index[chosen], minlength=len(places)), 1)
-    bottom = np.zeros(len(places))
+    values, index = np.unique(x.numbers, return_inverse=True)
+    number = np.maximum(np.bincount(index[chosen], minlength=len(values)), 1)
+    bottom = np.zeros(len(values))
     for word, (colour, marker) in looks.items():
-        share = np.bincount(index[chosen & (words == word)], minlength=len(places)) / number
-        axes.bar(np.arange(len(places)), share, 0.8, bottom, color=colour, alpha=0.75, linewidth=0.0)
+        share = np.bincount(index[chosen & (words == word)], minlength=len(values)) / number
+        axes.bar(np.arange(len(values)), share, 0.8, bottom, color=colour, alpha=0.75, linewidth=0.0)
         of = share > 0.0
         axes.plot(np.flatnonzero(of), (bottom + 0.5 * share)[of], **no_line(marker, TEXT_COLOUR), markersize=3.5)
         bottom += share
-    every = math.ceil(len(places) / 8)
-    texts = [x.words[int(v)] if x.words else f"{v:.3g}" for v in places]
-    axes.set_xticks(range(0, len(places), every), texts[::every])
+    every = math.ceil(len(values) / 8)
+    texts = [x.words[int(v)] if x.words else f"{v:.3g}" for v in values]
+    axes.set_xticks(range(0, len(values), every), texts[::every])
     axes.set(xlabel=x.label, ylabel="share of the runs", ylim=(0.0, 1.0))
 
 
@@ -169,10 +169,10 @@ def _say_what_is_left(figure: Figure, number: int, drawn: int) -> None:
 
 def _means(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Distinct x, the mean of y at each, and the standard error of this mean (0 for a single value)."""
-    places, index, number = np.unique(x, return_inverse=True, return_counts=True)
+    values, index, number = np.unique(x, return_inverse=True, return_counts=True)
     mean = np.bincount(index, y) / number
     spread = np.bincount(index, (y - mean[index]) ** 2)
-    return places, mean, np.sqrt(spread / np.maximum(number - 1, 1) / number)
+    return values, mean, np.sqrt(spread / np.maximum(number - 1, 1) / number)
 
 
 class _Values:

@@ -379,8 +379,8 @@ class Simulation(ReadOnlySettings):
         -----
         Contacts: Love 1927; Weber 1966, Bull. Liaison P. et Ch. 20, 3; Christoffersen, Mehrabadi &
         Nemat-Nasser 1981, J. Appl. Mech. 48, 339. Ewald sums: Nosé & Klein 1983, Mol. Phys. 50, 1055; Aguado & Madden
-        2003, J. Chem. Phys. 119, 7471. In clusters at rest, with `sand.RigidClusters`, W of the contacts is that of
-        the forces by which they keep their rigid motion.
+        2003, J. Chem. Phys. 119, 7471. In clusters at rest, with `sand.RigidClusters`, the forces of
+        contacts are those with which all grains move as one rigid body.
         """
         size = volume_of(self._engine, volume)
         refuse_forces_without_virial(self._engine)
@@ -415,7 +415,7 @@ class Simulation(ReadOnlySettings):
             Absolute simulation time [s]; the state at the end of the run is that at exactly this time. Or a function,
             as for `stop`. A resumed run ends at its planned end by default.
         steps : int, optional
-            Number of further steps, at least 1; a started r-RESPA cycle (`Verlet.far`) is completed.
+            Number of further steps, at least 1; the last r-RESPA cycle (`Verlet.far`) is completed.
         stop : str or callable, optional
             A condition that ends the run: columns of the ledger, compared with numbers with units, joined by `and`,
             `or` and parentheses, such as "mean_cluster_size >= 20 and time > 1 us"; or a function of the simulation

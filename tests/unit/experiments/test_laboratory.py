@@ -16,23 +16,11 @@ from sand.experiments.laboratory_job import rows_of
 from sand.experiments.laboratory_table import Percolation, percolating, table_of
 from sand.theory.compression import packing_scales
 
+from ...cases import COMPRESSION
+
 ICE = sand.ICE
 PACKING = sand.setup.lattice(3, radius="0.1 um", material="ice")
 SOLID = 27 * 4 / 3 * math.pi * 1e-21
-CASE = """
-[aggregate]
-kind = "rbd"
-grains = 12
-radius = "0.1 um"
-material = "ice"
-[compression]
-rate = "1 m/s"
-to = 0.3
-by = "walls"
-seeds = [1, 2]
-[forces.contact]
-damping = "critical"
-"""
 
 
 def walls(kind="compress", **changes):
@@ -235,7 +223,7 @@ def test_folders_without_a_frame(tmp_path, monkeypatch, capsys):
     (tmp_path / "old/seed-1").mkdir(parents=True)
     assert main(["stretch", "pull.toml"]) == 2
     assert f"file, for seed 2: {tmp_path / 'old'} holds runs of several seeds" in capsys.readouterr().err
-    (tmp_path / "old/case.toml").write_text(CASE)
+    (tmp_path / "old/case.toml").write_text(COMPRESSION)
     monkeypatch.setattr("sand.cli.view.WAIT", 0.0)
     assert main(["view", "old", "--html", "page.html"]) == 2
     assert "old holds runs of several seeds" in capsys.readouterr().err
@@ -246,7 +234,7 @@ def test_folders_without_a_frame(tmp_path, monkeypatch, capsys):
 def test_a_job(tmp_path, monkeypatch, capsys):
     """`sand compress` writes table, results and runs; resumed its rows are the same; info describes all."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "cake.toml").write_text(CASE)
+    (tmp_path / "cake.toml").write_text(COMPRESSION)
     assert main(["info", "cake.toml"]) == 0
     assert "E_roll" in (text := capsys.readouterr().out) and "sand compress cake.toml" in text
     assert main(["compress", "cake.toml", "--json"]) == 0
@@ -288,7 +276,7 @@ def test_a_job(tmp_path, monkeypatch, capsys):
 def test_a_sweep_over_the_end(tmp_path, monkeypatch, capsys):
     """`sand sweep` varies a key of [compression]; a run has the results of the job, its columns as lists."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "cake.toml").write_text(CASE)
+    (tmp_path / "cake.toml").write_text(COMPRESSION)
     how = ["--vary", "compression.to=0.28,0.3", "--seeds", "2-2", "--files", "none", "--out", "swept", "--quiet"]
     assert main(["sweep", "cake.toml", *how]) == 0
     table = sand.open("swept").table

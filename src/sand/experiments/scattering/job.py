@@ -32,12 +32,8 @@ class ScatterJob(Job):
 
     Parameters
     ----------
-    path : str or Path
-        Case file.
-    folder : str or Path or None, optional
-        Output folder; by default that of the case, or the name of the case file.
-    **how
-        As for `Job`.
+    path, folder, **how
+        As for `Job`; the folder is by default that of the case.
 
     Raises
     ------

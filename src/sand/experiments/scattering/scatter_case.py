@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from ...basics.errors import BadInput, ErrorCollector
+from ...basics.errors import BadInput, ErrorCollector, naming
 from ...basics.material import PRESETS
 from ...basics.settings import For, Number, Whole
 from ...config.case import MaterialSection, material_errors, read_content
@@ -126,7 +126,5 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     content = read_content(path, "scatter")
     problems = material_errors(content, ("target", "projectile"), "silica")
     case = validate(ScatterCase, content, str(path), problems)
-    try:
+    with naming(path):
         return case, case.flights()
-    except BadInput as error:
-        raise error.at(str(path)) from None
