@@ -16,7 +16,7 @@ from . import options, parsing, report
 def command(path: str, **output: bool) -> None:
     """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
 
-    Also describes cases, folders and results of `sand scatter`, `sand collide`, `sand grow` and `sand sweep`.
+    Also describes cases, folders and results of jobs, such as those of `sand collide`, `sand compress` or `sand sweep`.
 
     A case file is checked as by `sand run`, but not run.
     """

@@ -27,7 +27,7 @@ JOBS = {
 
 
 def describe_results(path: Path, content: dict[str, Any]) -> Description | None:
-    """Describe scattering.json or collision.json; None for any other file.  Raises BadInput if it is incomplete."""
+    """Describe the results file of a job; None for any other file.  Raises BadInput if it is incomplete."""
     try:
         if "job" in content:
             (name, kind), rows = JOBS["scatter"], [("job", content["job"]), *result_rows(content)]

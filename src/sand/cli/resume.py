@@ -65,7 +65,7 @@ def command(
         if until is not None:
             raise BadInput(f"--until applies to runs; {folder} holds {content_of(place)}")
         if scheduler is not None and kind == "collide":
-            raise BadInput("--scheduler applies to jobs of `sand scatter`, `sand grow` and `sand sweep`; use --workers")
+            raise BadInput("--scheduler does not apply to jobs of `sand collide`; use --workers")
         how = {"workers": workers, "scheduler": scheduler, "threads": threads, "wall_time": wall_time}
         return _job(kind, place, case, {**how, **output})
     if workers > 1 or scheduler is not None:

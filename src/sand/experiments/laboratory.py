@@ -150,6 +150,11 @@ class Loading(Settings):
         return "xyz" if axis == "all" else axis
 
 
+def filling_factor(radius: np.ndarray, sides: Any) -> float:
+    """Filling factor φ of grains of radii (N,) in a box of lengths (3,) [m]."""
+    return 4.0 / 3.0 * math.pi * float((radius**3).sum()) / float(np.prod(sides))
+
+
 class Plan(NamedTuple):
     """A packing at its start, and how it is loaded; made by `plan`."""
 
@@ -164,7 +169,7 @@ class Plan(NamedTuple):
 
     def filling(self, sides: np.ndarray) -> float:
         """Filling factor φ in a box of these lengths (3,) [m]."""
-        return 4.0 / 3.0 * math.pi * float((self.start.grains.radius**3).sum()) / float(np.prod(sides))
+        return filling_factor(self.start.grains.radius, sides)
 
     def rate_ratio(self, sides: np.ndarray) -> float:
         """The rate over the largest one that is slow enough at these lengths, see `PackingScales.largest_rate`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -27,7 +26,7 @@ from ..io.trajectory import Frames
 from ..setup.from_file import from_trajectory, is_own_trajectory
 from ..setup.from_frame import Start
 from .collision_case import BodySection
-from .laboratory import Loading, Plan, plan
+from .laboratory import Loading, Plan, filling_factor, plan
 
 
 class PackingSection(BodySection):
@@ -78,7 +77,7 @@ def _filling(frame: Frame) -> float:
     position, radius = frame.position, frame.radius[:, None]
     extent = (position + radius).max(axis=0) - (position - radius).min(axis=0)
     lengths = [extent[k] if length is None else length for k, length in enumerate(frame.box.lengths)]
-    return 4.0 / 3.0 * math.pi * float((frame.radius**3).sum()) / float(np.prod(lengths))
+    return filling_factor(frame.radius, lengths)
 
 
 @with_keys(Loading, "kind")
