@@ -283,7 +283,7 @@ def test_a_job(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "none").exists()
     # what a run has is not given again
     (tmp_path / "pull.toml").write_text(text.replace('"file"\n', '"file"\nradius = "1 um"\n'))
-    assert main(["stretch", "pull.toml"]) == 2 and "has it; leave radius out" in capsys.readouterr().err
+    assert main(["info", "pull.toml"]) == 2 and "has it; leave radius out" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("contacts")
