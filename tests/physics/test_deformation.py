@@ -356,11 +356,11 @@ def test_a_gas_moves_with_the_box():
     gas, ends = sand.Gas("300 K", pressure="1 kPa", brownian=False), []
     rng = np.random.default_rng(5)
     grains = sand.Grains(rng.uniform(-1e-6, 1e-6, (30, 3)), RADIUS, ICE, velocity=0.01 * rng.normal(size=(30, 3)))
-    step = gas.shortest_time(grains) / 100
+    step = gas.shortest_time(grains) / 200
     for rate in (0.0, -3e3):
         law = sand.Deformation(rate)
         sim = sand.Simulation(grains, [gas], box="4 um", deformation=law, stepping=sand.Verlet(step=step))
-        sim.run(steps=100)
+        sim.run(steps=200)
         ends.append(sim.ledger.rows[-1])
         assert sim.ledger["total"][-1] == pytest.approx(sim.ledger["total"][0], rel=1e-9, abs=0.0)
     still, moved = ends

@@ -34,7 +34,7 @@ CAPABILITIES = {
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
     "energy, folders of several runs named by view": 18,
 }
-"""Code lines of capabilities that the source has gained since its count was 35,400."""
+"""Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
 """Positional parameters that a function may have."""
 WALL = re.compile(r"(^|_)walls?(_|$)|Wall(?!Clock|Time)")
@@ -149,7 +149,7 @@ COUNTS = (
     Count("files that name rigid clusters outside their own", lambda: len(files_that_name(RIGID, "rigid")), 3, 3),
     Count("files that name walls outside their own", lambda: len(files_that_name(WALL, "components")), 3, 3),
     Count("files that name driven grains outside their own", lambda: len(files_that_name(DRIVEN, "components")), 3, 3),
-    Count("code lines", code_lines, 35400 + sum(CAPABILITIES.values()), 32850),
+    Count("code lines", code_lines, 35381 + sum(CAPABILITIES.values()), 32850),
     Count("private accesses of unit tests", private_accesses_of_tests, 27, 30),
 )
 

@@ -52,6 +52,8 @@ class PackingSection(BodySection):
             if path.is_dir() and not (path / TRAJECTORY).exists():
                 raise BadInput(f"file, for seed {seed}: {without_run(path)}")
             if is_own_trajectory(path):
+                if extra := sorted(self.model_fields_set - {"kind", "file", "frame", "filling"}):
+                    raise BadInput(f"{extra[0]}: the run {path} has it; leave {extra[0]} out")
                 number = -1 if self.frame is None else self.frame
                 if self.filling is not None:
                     number = frame_with(path, self.filling)

@@ -282,7 +282,7 @@ class Simulation(ReadOnlySettings):
     @property
     @exclusive
     def walls(self) -> tuple[WallState, ...]:
-        """The walls at `time`: position, velocity, force, impulse, work, number of contacts."""
+        """The walls at `time`: their motion, force, impulse, work, contacts, pressure, gap, and filling factor."""
         self._begin()
         return wall_states(self._system.given["walls"].items, self.state)
 

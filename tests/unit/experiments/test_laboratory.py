@@ -269,6 +269,9 @@ def test_a_job(tmp_path, monkeypatch, capsys):
     for command in (["info", "pull.toml"], ["stretch", "pull.toml", "--out", "none"]):
         assert main(command) == 2 and "file, for seed 3: " in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+    # what a run has is not given again
+    (tmp_path / "pull.toml").write_text(text.replace('"file"\n', '"file"\nradius = "1 um"\n'))
+    assert main(["info", "pull.toml"]) == 2 and "has it; leave radius out" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("contacts")
