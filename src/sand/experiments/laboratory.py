@@ -292,9 +292,9 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
         raise BadInput(f"the frame has no contacts, and nothing to {loading.kind}; take an earlier or a later one")
     pairs = pairs_in_contact(given.grains, given.box)[0] if given.contacts is None else given.contacts.pair
     way, grains = _way(loading), given.grains
+    start, sides = way.placed(loading, given, contact)
     joined = [np.asarray(one, np.int64) for one in (pairs, way.joined(given, contact))]
     refuse_pieces(grains, np.concatenate(joined), given.box, "the body")
-    start, sides = way.placed(loading, given, contact)
     settings = {name: getattr(contact, name) for name in ("roll_factor", "rolling_limit", "surface_energy_factor")}
     scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **settings)
     units = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}
