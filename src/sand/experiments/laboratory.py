@@ -168,19 +168,22 @@ class Loading(Settings):
                 "pressure is for by = 'walls'; a periodic box follows a pressure in a case of `sand run`, with "
                 "law = 'pressure' in [deformation]"
             )
-        elif self.pressure is not None and self.kind == "stretch":
+            return
+        if self.pressure is not None and self.kind == "stretch":
             yield "pressure presses the lid against the packing, which is for compress and shear; leave it out"
-        elif self.pressure is not None and self.kind == "shear" and len(self.pressure) > 1:
+        if self.pressure is not None and self.kind == "shear" and len(self.pressure) > 1:
             yield "pressure has several values, which are for compress; shear takes one"
-        needed, unused = (("until",), ("rate", "to")) if self.load_is_given else (("rate", "to"), ("until",))
         examples = {"rate": "'1e-5 /t_c'", "to": "0.4", "until": "'100 us'"}
+        needed, unused, by = ("rate", "to"), ("until",), "a rate"
+        if self.load_is_given:
+            needed, unused, by = unused, needed, "a pressure"
         for name in needed:
             if getattr(self, name) is None:
                 yield f"{name} is missing; add it, for example {name} = {examples[name]}"
         for name in unused:
             if getattr(self, name) is not None:
-                with_load = "compress with a pressure" if self.load_is_given else f"{self.kind} with a rate"
-                yield f"{name} is not used by {with_load}, which ends by {' and '.join(needed)}; leave it out"
+                ends = " and ".join(needed)
+                yield f"{name} is not used by {self.kind} with {by}, which has {ends}; leave it out"
 
     @property
     def load_is_given(self) -> bool:

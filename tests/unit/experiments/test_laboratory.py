@@ -277,7 +277,7 @@ def test_shear_under_a_pressure():
         ({"kind": "stretch", "rate": "1 m/s", "to": 0.1}, "pressure presses the lid"),
         ({"kind": "shear", "pressure": ["1 kPa", "2 kPa"], "until": None, "rate": "1 m/s", "to": 1}, "shear takes one"),
         ({"until": None}, "until is missing; add it, for example until = '100 us'"),
-        ({"to": 0.4}, "to is not used by compress with a pressure, which ends by until; leave it out"),
+        ({"to": 0.4}, "to is not used by compress with a pressure, which has until; leave it out"),
         ({"pressure": 1e3, "rate": "1 m/s"}, "rate is not used by compress with a pressure"),
         ({"pressure": None, "rate": "1 m/s"}, "to is missing; add it, for example to = 0.4"),
         ({"pressure": "5 N"}, "pressure = '5 N'"),
