@@ -350,6 +350,7 @@ class Loaded(NamedTuple):
         return {
             "kind": planned.loading.kind,
             "by": planned.loading.by,
+            "load": planned.loading.pressure,
             "grains": len(planned.start.grains),
             "radius": float(planned.start.grains.radius.mean()),
             "filling_at_start": planned.filling(planned.sides),

@@ -36,7 +36,8 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
     first = runs[0]
     compressed = first["kind"] == "compress"
     name, label = ("mean_filling", r"filling factor $\phi$") if compressed else ("strain", "strain")
-    tables = [_columns(run["table"]) for run in runs]
+    whole = [_columns(run["table"]) for run in runs]
+    tables = [_rising(table, name) for table in whole] if compressed else whole
     low, high = max(table[name].min() for table in tables), min(table[name].max() for table in tables)
     number = min(POINTS, *(len(table[name]) for table in tables))
     x = np.geomspace(low, high, number) if compressed else np.linspace(low, high, number)
@@ -66,8 +67,18 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
         Panel(label, "share of what is dissipated", parts, (), log),
         Panel(label, "coordination number $Z$", [curve("coordination", seeds)], numbers, log),
     ]
+    if compressed and first["load"]:  # may be constant
+        over_time = [Curve("each seed" * (k == 0), one["time"], one["filling"]) for k, one in enumerate(whole)]
+        panels.insert(0, Panel("time [s]", label, over_time))
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
     return panels_figure(panels, f"{first['kind']}: {first['grains']} grains, {seeds}; {energy}")
+
+
+def _rising(table: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    """Rows in which a column is larger than in all before; under a given load a packing may also expand."""
+    column = table[name]
+    larger = column > np.maximum.accumulate(np.concatenate([[-np.inf], column[:-1]]))
+    return {key: values[larger] for key, values in table.items()}
 
 
 def _columns(table: dict[str, list[float]]) -> dict[str, np.ndarray]:

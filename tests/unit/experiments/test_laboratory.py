@@ -410,7 +410,7 @@ def outcome(seed, kind="compress", noise=0.0):
     phi = np.geomspace(0.02, 0.3, 40)
     table = {"mean_filling": phi, "strain": 3 * phi, "stress": 5e5 * phi**3 * (1 + noise), "coordination": 2 + phi}
     table |= {"lost_rolling": phi, "lost_sliding": 0 * phi, "lost_twisting": 0 * phi, "lost_walls": -9 * phi}
-    scales = {"kind": kind, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
+    scales = {"kind": kind, "load": None, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
     scales |= {"filling_at_start": 0.1, "surface_energy": 0.1, "radius": 1e-7}
     return {"seed": seed, "table": {name: column.tolist() for name, column in table.items()}} | scales
 
@@ -428,6 +428,20 @@ def test_figure(kind):
         np.ones(len(x)), rel=1e-12, abs=0.0
     )
     assert z.get_lines()[0].get_ydata() == pytest.approx(2 + phi, rel=1e-3, abs=0.0)
+
+
+def test_figure_of_a_load():
+    """Under a load φ is also drawn over time; P(φ) of the rows in which φ is larger than in all before."""
+    run = outcome(1)
+    table = {name: np.array(column) for name, column in run["table"].items()}
+    phi, number = table["mean_filling"].copy(), np.arange(40.0)
+    order = np.concatenate([number, number[20:30]]).astype(int)  # expands again from row 40 on
+    table = {name: column[order] for name, column in table.items()} | {"time": np.arange(50.0), "filling": phi[order]}
+    run |= {"load": (1e3, 1e4), "table": {name: column.tolist() for name, column in table.items()}}
+    over_time, stress = laboratory_figure([run]).axes[:2]
+    assert over_time.get_lines()[0].get_ydata() == pytest.approx(phi[order][1:], rel=1e-12, abs=0.0)
+    x, y = stress.get_lines()[0].get_data()
+    assert y == pytest.approx(5e5 * x**3, rel=2e-2, abs=0.0) and x[-1] == pytest.approx(phi[-1], rel=1e-9, abs=0.0)
 
 
 def test_rows_have_their_seed():
