@@ -69,7 +69,7 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
     ]
     if compressed and first["load"]:  # may be constant
         over_time = [Curve("each seed" * (k == 0), one["time"], one["filling"]) for k, one in enumerate(whole)]
-        panels.insert(0, Panel("time [s]", label, over_time))
+        panels.insert(0, Panel("time [s]", label, over_time, log=""))
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
     return panels_figure(panels, f"{first['kind']}: {first['grains']} grains, {seeds}; {energy}")
 
