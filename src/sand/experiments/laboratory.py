@@ -25,6 +25,7 @@ from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..setup.checks import pairs_in_contact, refuse_pieces
 from ..setup.from_frame import Start
+from ..simulation.condition import EVERY
 from ..simulation.simulation import Simulation
 from ..theory.compression import CLOSEST, PackingScales, packing_scales
 from .laboratory_table import Percolation, table_of
@@ -400,9 +401,10 @@ def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
         simulation.writer.draws = False  # the figure of the table is drawn by the job
     steady = planned.loading.load_is_given and len(planned.loading.pressure) == 1
     stop = (lambda running: at_rest(planned, running.ledger.rows)) if steady else None
-    result = simulation.run(max(planned.until, simulation.time), stop=stop)
-    if result.outcome.is_physics:
-        raise BadInput(f"the {planned.loading.kind} test cannot be computed to its end: {result}")
+    if stop is None or simulation.steps % EVERY or not stop(simulation):  # else it had ended before it was resumed
+        result = simulation.run(max(planned.until, simulation.time), stop=stop)
+        if result.outcome.is_physics:
+            raise BadInput(f"the {planned.loading.kind} test cannot be computed to its end: {result}")
     rows = simulation.ledger.rows
     if simulation.writer is not None:
         seen.see_frames(simulation.writer.folder / TRAJECTORY, rows)

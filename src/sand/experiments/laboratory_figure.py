@@ -67,9 +67,10 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
         Panel(label, "share of what is dissipated", parts, (), log),
         Panel(label, "coordination number $Z$", [curve("coordination", seeds)], numbers, log),
     ]
-    if compressed and first["load"]:  # may be constant
-        over_time = [Curve("each seed" * (k == 0), one["time"], one["filling"]) for k, one in enumerate(whole)]
-        panels.insert(0, Panel("time [s]", label, over_time, log=""))
+    if first["load"]:  # one pressure does not show how the packing yields
+        over, unit = ("time", " [s]") if compressed else ("strain", "")
+        free = [Curve("each seed" * (k == 0), one[over], one["filling"]) for k, one in enumerate(whole)]
+        panels.insert(0, Panel(over + unit, r"filling factor $\phi$", free, log=""))
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
     return panels_figure(panels, f"{first['kind']}: {first['grains']} grains, {seeds}; {energy}")
 

@@ -226,6 +226,17 @@ def test_rest_under_a_constant_load():
 
 
 @pytest.mark.compiled("contacts")
+def test_a_constant_load_ends_at_rest():
+    """Before `until` the grains bear the load, to 1 %; a run that had ended takes no step if it is continued."""
+    found = load(cake(), pressed("10 kPa", "10 us"), forces=DAMPED, seed=1)
+    steps = found.simulation.steps
+    assert found.simulation.time < 1e-5 and laboratory.at_rest(found.plan, found.simulation.ledger.rows)
+    assert found.table[-2]["mean_pressure_floor"] == pytest.approx(1e4, rel=0.01, abs=0.0)
+    again = laboratory.run_to_end(found.plan, found.simulation)
+    assert again.simulation.steps == steps and len(again.table) == len(found.table)
+
+
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("pressure", ["10 kPa", ["5 kPa", "20 kPa"]])
 def test_work_and_momentum_of_a_lid_with_a_pressure(pressure):
     """A lid pressed by P A: its momentum gives the mean pressure of the grains on it, the way of the lid the work.
@@ -442,6 +453,8 @@ def test_figure_of_a_load():
     assert over_time.get_lines()[0].get_ydata() == pytest.approx(phi[order][1:], rel=1e-12, abs=0.0)
     x, y = stress.get_lines()[0].get_data()
     assert y == pytest.approx(5e5 * x**3, rel=2e-2, abs=0.0) and x[-1] == pytest.approx(phi[-1], rel=1e-9, abs=0.0)
+    x, y = laboratory_figure([run | {"kind": "shear"}]).axes[0].get_lines()[0].get_data()
+    assert x == pytest.approx(3 * y, rel=1e-12, abs=0.0)  # the strain of these rows is 3φ
 
 
 def test_rows_have_their_seed():
