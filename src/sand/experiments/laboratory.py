@@ -27,7 +27,7 @@ from ..setup.checks import pairs_in_contact, refuse_pieces
 from ..setup.from_frame import Start
 from ..simulation.simulation import Simulation
 from ..theory.compression import CLOSEST, PackingScales, packing_scales
-from .laboratory_table import Percolation, table_of
+from .laboratory_table import Percolation, shares, table_of
 
 WAYS = ("box", "walls")
 """By what a packing is loaded: its periodic box, or one of two walls. The functions of each are in laboratory_WAY."""
@@ -201,7 +201,7 @@ class Plan(NamedTuple):
         }
         parts = ("pressure", "mean_pressure", "lost_")
         more = {name: row[name] for name in row if name in OF_STATE or name.startswith(parts)}
-        return known | more
+        return known | shares(before, row) | more
 
 
 def _way(loading: Loading) -> Any:

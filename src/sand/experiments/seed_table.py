@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +34,13 @@ class Interval(NamedTuple):
         if not math.isfinite(self.value):
             return reason
         return f"{self.value - paper:+.2g}{f' ({self.value / paper - 1.0:+.0%})' if paper else ''}: {reason}"
+
+
+def mean_of(values: Sequence[float]) -> Interval:
+    """Mean of the values of independent seeds, with its 95 % interval of Student's distribution; NaN if one is NaN."""
+    one = np.array(values, float)
+    without = (one.sum() - one) / max(len(one) - 1, 1)
+    return Interval(float(one.mean()), *jackknife(float(one.mean()), without)[1:])
 
 
 class SeedTable(NamedTuple):
