@@ -278,6 +278,7 @@ class Loaded(NamedTuple):
     def to_dict(self) -> dict[str, Any]:
         """Results for JSON."""
         planned, last = self.plan, self.table[-1]
+        most = max(self.table[1:], key=lambda row: row["stress"], default=last)
         return {
             "kind": planned.loading.kind,
             "by": planned.loading.by,
@@ -291,7 +292,9 @@ class Loaded(NamedTuple):
             "roll_energy": planned.scales.roll_energy,
             "pressure_scale": planned.scales.pressure,
             **{name: last[name] for name in ("time", "step", "filling", "strain", "stress", "coordination")},
-            "largest_stress": max((row["stress"] for row in self.table[1:]), default=math.nan),
+            "largest_stress": most["stress"],
+            "strain_of_largest": most["strain"],
+            "largest_at_end": most is last,
             "drift": self.simulation.ledger.drift,
             "table": {name: [row[name] for row in self.table] for name in last},
         }

@@ -22,7 +22,7 @@ POINTS = 60
 """Largest number of points of a curve."""
 NOUNS = {"compress": "pressure", "stretch": "tension", "shear": "shear stress"}
 FILLING = r"filling factor $\phi$"
-TOO_FAST = "open: too fast for a static stress"
+TOO_FAST, RISING = "open: too fast for a static stress", "rises to the end: no strength"
 
 Columns = Mapping[str, np.ndarray]
 
@@ -39,17 +39,18 @@ def curve_of(tables: Sequence[Columns], x: str, y: str, label: str) -> Curve:
     values = np.array([np.interp(places, table[x], table[y]) for table in tables])
     if logarithmic and y == "stress":  # fast compressions begin with noise, which a logarithm cannot show
         values[values <= 0.0] = np.nan
-    ratios = np.array([np.interp(places, table[x], table["rate_ratio"]) for table in tables])
-    return Curve(label, places, values.mean(axis=0), values.min(axis=0), values.max(axis=0), (ratios > 1.0).any(axis=0))
+    fast = np.max([np.interp(places, table[x], table["rate_ratio"]) for table in tables], axis=0) > 1.0
+    return Curve(label, places, values.mean(axis=0), values.min(axis=0), values.max(axis=0), np.asarray(fast))
 
 
 def shares_of(tables: Sequence[Columns], x: str) -> list[Curve]:
     """Curves of the shares of what is dissipated, see `laboratory_table.shares`."""
-    whole = [{**one, "share_others": 1.0 - sum(one[f"share_{name}"] for name in CHANNELS)} for one in tables]
+    others = [1.0 - np.sum([one[f"share_{name}"] for name in CHANNELS], axis=0) for one in tables]
+    whole = [{**one, "share_others": rest} for one, rest in zip(tables, others, strict=True)]
     return [curve_of(whole, x, f"share_{name}", name)._replace(weak=None) for name in (*CHANNELS, "others")]
 
 
-def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
+def laboratory_figure(runs: Sequence[dict[str, Any]], column: str | None = None) -> Figure:
     """Figure of the outcomes of a job, with the range of its seeds, or of those of a sweep.
 
     Parameters
@@ -57,6 +58,8 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
     runs : Sequence[dict]
         Outcomes, as `experiments.laboratory.Loaded.to_dict`; of a sweep also with "group", the values of its keys. Each
         group has a curve; the shares of what is dissipated are those of the first one.
+    column : str or None, optional
+        A column of the table to draw alone.
     """
     groups: dict[str, list[Columns]] = {}
     for run in runs:
@@ -67,20 +70,25 @@ def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
     x, label = ("mean_filling", FILLING) if compressed else ("strain", "strain")
     first_name, tables = next(iter(groups.items()))
     seeds = f"{len(tables)} seed{'s' * (len(tables) > 1)}"
-    stress, number = (
-        [curve_of(some, x, name, group or seeds) for group, some in groups.items()]
-        for name in ("stress", "coordination")
-    )
+
+    def curves(name: str) -> list[Curve]:
+        return [curve_of(some, x, name, group or seeds) for group, some in groups.items()]
+
+    title = f"{first['kind']}: {first['grains']} grains, {seeds}"
+    if column is not None:
+        return panels_figure([Panel(label, column, curves(column), (), "x" * compressed)], title)
+    stress, number = curves("stress"), curves("coordination")
     laws, numbers = _laws(first, stress[0].x) if len({run["pressure_scale"] for run in runs}) == 1 else ([], [])
     log = "x" * compressed
-    fast = TOO_FAST if any(one.weak is not None and one.weak.any() for one in stress) else ""
+    notes = [TOO_FAST] if any(one.weak is not None and one.weak.any() for one in stress) else []
+    notes += [RISING] if not compressed and any(run["largest_at_end"] for run in runs) else []
     panels = [
-        Panel(label, f"{NOUNS[first['kind']]} [Pa]", stress, laws, "xy" * compressed, not compressed, fast),
+        Panel(label, f"{NOUNS[first['kind']]} [Pa]", stress, laws, "xy" * compressed, not compressed, "; ".join(notes)),
         Panel(label, "share of what is dissipated", shares_of(tables, x), (), log, legend=first_name),
         Panel(label, "coordination number $Z$", number, numbers, log),
     ]
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
-    return panels_figure(panels, f"{first['kind']}: {first['grains']} grains, {seeds}; {energy}")
+    return panels_figure(panels, f"{title}; {energy}")
 
 
 def _laws(run: dict[str, Any], x: np.ndarray) -> tuple[list[Guide], list[Guide]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -14,20 +15,22 @@ from ..theory.compression import CLOSEST, arakawa_coordination, kataoka_pressure
 from .laboratory_figure import FILLING, TOO_FAST, curve_of, shares_of
 from .laboratory_table import CHANNELS
 from .paper_figure import MEMORY, Compared, PaperFigure, Row, grouped
-from .seed_table import Interval, mean_of, seed_table
+from .seed_table import OUTSIDE, Interval, mean_of, seed_table
 
-NEAR = 0.15
-"""Relative range of φ on either side over which a value at φ is averaged."""
+NEAR, NEAR_DENSE = 0.15, 0.03
+"""Relative range of φ on either side over which a value at φ is averaged; in dense packings it fluctuates less."""
+FLUFFY, DENSE = (0.03, 0.05, 0.07, 0.1), (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+"""Filling factors at which pressures are compared with the laws of fluffy and of dense packings."""
 RUNNING = 5
 """Rows of a stretch over which the tension is averaged, before its largest value is taken: a strain of 0.1."""
 SHARES = tuple(f"share_{name}" for name in CHANNELS)
 
 
-def near(rows: Sequence[Row], value: Callable[[Row], float], filling: float) -> Interval:
+def near(rows: Sequence[Row], value: Callable[[Row], float], filling: float, width: float = NEAR) -> Interval:
     """Mean of a value over rows near a filling factor, and over seeds, with its interval; NaN unless all are there."""
     means = []
     for some in grouped(rows, "seed").values():
-        chosen = [value(row) for row in some if abs(math.log(row["mean_filling"] / filling)) <= math.log1p(NEAR)]
+        chosen = [value(row) for row in some if abs(math.log(row["mean_filling"] / filling)) <= math.log1p(width)]
         means.append(float(np.mean(chosen)) if max(row["mean_filling"] for row in some) > 0.97 * filling else math.nan)
     return mean_of(means)
 
@@ -55,7 +58,8 @@ def compression_panels(rows: Sequence[Row]) -> list[Panel]:
         ratio.append(curve_of(over, "mean_filling", "stress", name))
         number.append(curve_of(tables, "mean_filling", "coordination", name))
     whole = next(iter(rates_of(rows).values()))
-    x = np.geomspace(*(end(row["mean_filling"] for row in whole) for end in (min, max)), 60)
+    reached = [row["mean_filling"] for row in whole]
+    x = np.geomspace(min(reached), max(reached), 60)
     below = x[x < CLOSEST]
     kataoka, tatsuuma = r"$(E_\mathrm{roll}/r^3)\,\phi^3$", r"$(E_\mathrm{roll}/r^3)(1/\phi-1/\phi_\mathrm{max})^{-3}$"
     laws = [
@@ -81,25 +85,26 @@ def compare_pressures(rows: Sequence[Row]) -> list[Compared]:
     """Pressures of Kataoka et al. 2013 and Tatsuuma et al. 2023, what dissipates, and Z of Arakawa et al. 2019."""
     compared = []
     for rate, some in rates_of(rows).items():
-        for filling in (0.03, 0.05, 0.07, 0.1):
-            found = near(some, _over(kataoka_pressure), filling)
-            fast = near(some, lambda row: row["rate_ratio"], filling).value
+        for filling in FLUFFY:
+            found, fast = near(some, _over(kataoka_pressure), filling), near(some, _too_fast, filling).value
             reason = f"the box is {fast:.2g} times too fast" if fast > 1.0 else "no reason is known"
-            what = f"P/((E_roll/r³) φ³) at φ = {filling:g}, C_v = {rate:g}"
-            verdict = found.verdict(1.0, reason, within=0.2)
-            compared.append(Compared(what, f"1 ({MEMORY})", found.text(), verdict))
+            compared.append(_compared(f"P/((E_roll/r³) φ³) at φ = {filling:g}, C_v = {rate:g}", found, reason, 0.2))
     dense = next(iter(rates_of(rows).values()))
-    for filling in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6):
-        found = near(dense, _over(tatsuuma_pressure), filling)
-        verdict = found.verdict(1.0, "see the documentation", within=0.2)
-        what = f"P/((E_roll/r³)(1/φ − 1/φ_max)⁻³) at φ = {filling:g}"
-        compared.append(Compared(what, f"1, φ_max = {CLOSEST} ({MEMORY})", found.text(), verdict))
-    compared += [_share(dense, filling) for filling in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)]
-    for filling in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6):
-        found = near(dense, lambda row: row["coordination"] / arakawa_coordination(row["mean_filling"]), filling)
-        verdict = found.verdict(1.0, "no reason is known", within=0.05)
-        compared.append(Compared(f"Z/(2 + 9.38 φ^1.62) at φ = {filling:g}", f"1 ({MEMORY})", found.text(), verdict))
-    return compared
+    for filling in DENSE:
+        found = near(dense, _over(tatsuuma_pressure), filling, NEAR_DENSE)
+        what = f"P/((E_roll/r³)(1/φ − 1/{CLOSEST})⁻³) at φ = {filling:g}"
+        compared.append(_compared(what, found, "see the documentation", 0.2))
+    for filling in DENSE:
+        found = near(
+            dense, lambda row: row["coordination"] / arakawa_coordination(row["mean_filling"]), filling, NEAR_DENSE
+        )
+        compared.append(_compared(f"Z/(2 + 9.38 φ^1.62) at φ = {filling:g}", found, "no reason is known", 0.05))
+    for name in CHANNELS:
+        values = {f"{filling:g}": near(dense, itemgetter(f"share_{name}"), filling, NEAR_DENSE) for filling in DENSE}
+        known = {filling: one.value for filling, one in values.items() if math.isfinite(one.value)}
+        text = ", ".join(f"{value:.2f}" for value in known.values())
+        compared.append(Compared(f"share of {name} in what is dissipated at φ = {', '.join(known)}", "", text, ""))
+    return [one for one in compared if one.ours not in ("", OUTSIDE)]
 
 
 def _over(law: Callable[..., Any]) -> Callable[[Row], float]:
@@ -107,11 +112,13 @@ def _over(law: Callable[..., Any]) -> Callable[[Row], float]:
     return lambda row: float(row["stress"] / law(row["mean_filling"], row["pressure_scale"]))
 
 
-def _share(rows: Sequence[Row], filling: float) -> Compared:
-    """What dissipates most near a filling factor; in the papers rolling gives way to sliding and twisting."""
-    found = {name: near(rows, lambda row, name=name: row[f"share_{name}"], filling) for name in CHANNELS}
-    text = ", ".join(f"{name} {one.text()}" for name, one in found.items())
-    return Compared(f"shares of what is dissipated at φ = {filling:g}", "", text, "")
+def _too_fast(row: Row) -> float:
+    return float(row["rate_ratio"])
+
+
+def _compared(what: str, ratio: Interval, reason: str, within: float) -> Compared:
+    """A ratio to a law from memory."""
+    return Compared(what, f"1 ({MEMORY})", ratio.text(), ratio.verdict(1.0, reason, within))
 
 
 def strengths(rows: Sequence[Row]) -> list[Row]:
@@ -120,16 +127,14 @@ def strengths(rows: Sequence[Row]) -> list[Row]:
     for some in grouped(rows, "run").values():
         tension = np.convolve([row["stress"] for row in some], np.ones(RUNNING) / RUNNING, "valid")
         k = int(tension.argmax())
-        middle = some[k + RUNNING // 2]
-        found.append(middle | {"strength": float(tension[k]), "at_end": k == len(tension) - 1})
+        found.append(some[k + RUNNING // 2] | {"strength": float(tension[k]), "at_end": k == len(tension) - 1})
     return found
 
 
 def strength_panels(rows: Sequence[Row]) -> list[Panel]:
     """Panels: strength over φ at the start, with the law; tension over strain for each φ."""
     found, first = strengths(rows), rows[0]
-    values = {(row["seed"], _start(row)): row["strength"] for row in found}
-    table = seed_table(values)
+    table = seed_table({(row["seed"], row["aggregate.filling"]): row["strength"] for row in found})
     x = np.geomspace(0.9 * table.x[0], 1.1 * table.x[-1], 30)
     law = Guide(
         r"$6\times10^5\,\mathrm{Pa}\,\phi^{1.8}$", x, tatsuuma_strength(x, first["surface_energy"], first["radius"])
@@ -146,26 +151,19 @@ def strength_panels(rows: Sequence[Row]) -> list[Panel]:
     ]
 
 
-def _start(row: Row) -> float:
-    return float(row["aggregate.filling"])
-
-
 def compare_strengths(rows: Sequence[Row]) -> list[Compared]:
     """Tensile strengths beside 6e5 φ^1.8 Pa of Tatsuuma et al. 2019, and the exponent."""
     compared, found = [], strengths(rows)
     for filling, some in grouped(found, "aggregate.filling").items():
-        ratio = mean_of([
-            row["strength"] / tatsuuma_strength(row["filling_at_start"], row["surface_energy"], row["radius"])
-            for row in some
-        ])  # fmt: skip
-        fast = max(row["rate_ratio"] for row in some)
-        rises = sum(row["at_end"] for row in some)
-        reason = f"the tension still rises at the end of {rises} runs" if rises else "no reason is known"
-        verdict = ratio.verdict(1.0, f"the box is {fast:.2g} times too fast" if fast > 1.0 else reason, within=0.3)
+        law = tatsuuma_strength([row["filling_at_start"] for row in some], some[0]["surface_energy"], some[0]["radius"])
+        ratio = mean_of(np.array([row["strength"] for row in some]) / law)
+        fast, rising = max(row["rate_ratio"] for row in some), sum(row["at_end"] for row in some)
+        reason = f"the box is {fast:.2g} times too fast" if fast > 1.0 else "no reason is known"
+        reason = f"the tension still rises at the end of {rising} runs" if rising else reason
         what = f"tensile strength/(6e5 Pa φ^1.8) at φ = {filling:g}"
-        compared.append(Compared(what, f"1 ({MEMORY})", ratio.text(), verdict))
+        compared.append(_compared(what, ratio, reason, 0.3))
     values = np.array([(row["filling_at_start"], row["strength"], row["seed"]) for row in found]).T
-    if len(set(row["aggregate.filling"] for row in found)) > 2 and (values[1] > 0.0).all():
+    if len({row["aggregate.filling"] for row in found}) > 2 and (values[1] > 0.0).all():
         fit = power_law(*values)
         slope = Interval(fit.exponent, fit.low, fit.high)
         verdict = slope.verdict(1.8, "no reason is known", within=0.1)

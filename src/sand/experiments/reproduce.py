@@ -12,8 +12,8 @@ from typing import Any
 from ..analysis.collision_kinds import growth_efficiency
 from ..basics.errors import BadInput, did_you_mean
 from ..contact.model import Contact
-from ..io.run_folder import COMPARISON, FIGURE, LABORATORY, RESULTS, ROWS_CSV, SWEEP_CSV, read_toml, write_toml
-from ..io.sweep_files import DONE, FAILED, LAST, STATE, TABLE, read_lines, read_sweep, write_sweep
+from ..io.run_folder import COMPARISON, FIGURE, LABORATORY, RESULTS, SWEEP_CSV, read_toml, write_toml
+from ..io.sweep_files import DONE, FAILED, LAST, STATE, TABLE, read_runs, write_sweep
 from ..io.table import write_table
 from ..plotting.papers import panels_figure
 from ..plotting.run_figure import save
@@ -88,6 +88,8 @@ class Reproduction(SweepJob):
         Rows of the table that comes with SAND.
     """
 
+    AGAIN = "nothing is lost: to continue, call the same command again"
+
     def __init__(
         self,
         name: str,
@@ -133,11 +135,11 @@ class Reproduction(SweepJob):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of rates that are too fast for packings that are not compressed
             cases = (SweptLoading({**case, "aggregate": body}, str(self.path)) for case in (self.first, self.content))
-            before, each = (one.expected(self.seeds[0]) for one in cases)
-        number, disk = len(self.seeds), len(left) * ROW_BYTES
-        if None in (seconds := (before.seconds, each.seconds)):
-            return Expected(None, before.memory, None)
-        return Expected(number * before.seconds + len(left) * each.seconds, before.memory, number * before.disk + disk)
+            costs = [one.expected(self.seeds[0]) for one in cases]
+        numbers = len(self.seeds), len(left)
+        seconds = [n * one.seconds for n, one in zip(numbers, costs, strict=True) if one.seconds is not None]
+        disk = numbers[0] * (costs[0].disk or 0.0) + numbers[1] * ROW_BYTES
+        return Expected(math.fsum(seconds) if len(seconds) == 2 else None, costs[0].memory, disk)
 
     def run(
         self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
@@ -195,7 +197,7 @@ class Reproduction(SweepJob):
         return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results} | note
 
     def _rows_of(self, cells: dict[str, Any]) -> list[Row]:
-        """Rows as figures take them of one row of the table: one for each row of the table of its run, if it has one."""
+        """Rows as figures take them of one row of the table, one for each row of the table of its run if it has one."""
         columns, own = cells.get(TABLE, {}), {name: cell for name, cell in cells.items() if name != TABLE}
         table = [dict(zip(columns, line, strict=True)) for line in zip(*columns.values(), strict=True)]
         values = {key: cells[key] for key in self.keys}
@@ -225,33 +227,18 @@ class Reproduction(SweepJob):
         """Rows of the table of a sweep with the columns that are kept; sizes of fragments are summarised."""
         if not (folder / SWEEP_CSV).exists():
             return []
-        tables = _tables(folder, self.figure.columns) if (folder / ROWS_CSV).exists() else {}
         found = []
-        for cells in _lines(read_sweep(folder)):
-            if cells["run"] in tables:
-                found.append(cells | {TABLE: tables[cells["run"]]})
+        for cells in read_runs(folder):
+            if TABLE in cells:
+                table = {name: cells[TABLE][name] for name in self.figure.columns}
+                rounded = {name: [float(f"{v:.{DIGITS}g}") for v in column] for name, column in table.items()}
+                found.append(cells | {TABLE: rounded})
                 continue
             if "fragments" in cells and "largest" not in cells:  # numbers of grains, in decreasing order
                 sizes = [int(size) for size in str(cells["fragments"]).split()] + [0]
                 cells |= {"largest": sizes[0], "second": sizes[1], "fragments": len(sizes) - 1}
             found.append({name: cell for name, cell in cells.items() if name in KEPT or "." in name})
         return found
-
-
-def _lines(table: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows of a table as dictionaries."""
-    columns = [column.tolist() for column in table.values()]
-    return [dict(zip(table, line, strict=True)) for line in zip(*columns, strict=True)]
-
-
-def _tables(folder: Path, names: Sequence[str]) -> dict[str, dict[str, list[Any]]]:
-    """Columns of the tables of runs, rounded, by the name of the run."""
-    found: dict[str, dict[str, list[Any]]] = {}
-    for line in _lines(read_lines(folder)):
-        columns = found.setdefault(line["run"], {name: [] for name in names})
-        for name, column in columns.items():
-            column.append(float(f"{line[name]:.{DIGITS}g}"))
-    return found
 
 
 def _sizes(grains: float, radius: float, energy: float, contacts: float, gyration: float) -> Row:

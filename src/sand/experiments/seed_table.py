@@ -10,6 +10,9 @@ import numpy as np
 
 from ..analysis.fits import falls_below, jackknife
 
+OUTSIDE = "outside the range of the campaign"
+"""Text of an estimate that is NaN."""
+
 
 class Interval(NamedTuple):
     """An estimate and its 95 % interval, NaN where it has none."""
@@ -21,7 +24,7 @@ class Interval(NamedTuple):
     def text(self, unit: str = "") -> str:
         """The estimate and its interval, such as "48 (44 … 52) m/s"."""
         if not math.isfinite(self.value):
-            return "outside the range of the campaign"
+            return OUTSIDE
         limits = f"{self.low:.3g} … {self.high:.3g}" if math.isfinite(self.low) else "no interval"
         return f"{self.value:.3g} ({limits}) {unit}".rstrip()
 

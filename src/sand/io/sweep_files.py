@@ -130,6 +130,25 @@ def read_lines(folder: Path) -> dict[str, np.ndarray]:
     return _read(folder / ROWS_CSV, {"seed", "run"}, "the table of the rows of a sweep")
 
 
+def read_runs(folder: Path) -> list[dict[str, Any]]:
+    """Rows of the table of a sweep, with `TABLE` if runs have tables of their own.  Raises BadInput."""
+    table = read_sweep(folder)
+    columns = (column.tolist() for column in table.values())
+    runs = [dict(zip(table, line, strict=True)) for line in zip(*columns, strict=True)]
+    if not (folder / ROWS_CSV).exists():
+        return runs
+    lines = read_lines(folder)
+    number, own = lines.pop("run"), [name for name in lines if name not in list(table)[: list(table).index(STATE)]]
+    places = {number[rows[0]]: rows for rows in np.split(np.arange(len(number)), _changes(number)) if len(rows)}
+    tables = {run: {name: lines[name][rows].tolist() for name in own} for run, rows in places.items()}
+    return [one | ({TABLE: tables[one["run"]]} if one["run"] in tables else {}) for one in runs]
+
+
+def _changes(column: np.ndarray) -> np.ndarray:
+    """Places at which a column has another value than before."""
+    return np.flatnonzero(column[1:] != column[:-1]) + 1
+
+
 def _read(path: Path, needed: set[str], what: str) -> dict[str, np.ndarray]:
     lines = list(csv.reader(read_text(path).splitlines()))
     if not lines or not needed <= set(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
