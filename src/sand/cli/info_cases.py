@@ -16,7 +16,6 @@ from . import report
 from .info_cost import cost_of, limits_of, of_each
 from .info_jobs import JOBS, Description
 
-
 PLANNED = 8
 """Packings of different seeds that are set up for the estimate of the cost, at most."""
 
