@@ -10,7 +10,7 @@ import numpy as np
 from ..plotting.papers import Curve, Guide, Panel
 from ..theory.compression import guettler_filling
 from .paper_figure import MEMORY, Compared, PaperFigure, Row, grouped
-from .seed_table import Interval
+from .seed_table import Interval, mean_of
 
 PRESSURES = (1e3, 3e3, 1e4)
 """Pressures [Pa] at which filling factors are compared."""
@@ -33,12 +33,8 @@ def filling_at(rows: Sequence[Row], pressure: float) -> float:
 
 
 def at_pressure(rows: Sequence[Row], pressure: float) -> Interval:
-    """Mean filling factor of the seeds at a pressure [Pa], with twice its standard error."""
-    found = np.array([filling_at(some, pressure) for some in grouped(rows, "seed").values()])
-    if len(found) < 2:
-        return Interval(float(found[0]))
-    mean, error = float(found.mean()), 2.0 * float(found.std(ddof=1)) / math.sqrt(len(found))
-    return Interval(mean, mean - error, mean + error)
+    """Mean filling factor of the seeds at a pressure [Pa], with its interval."""
+    return mean_of([filling_at(some, pressure) for some in grouped(rows, "seed").values()])
 
 
 def compare_cakes(rows: Sequence[Row]) -> list[Compared]:
@@ -87,5 +83,6 @@ FIGURES = (
         compare_cakes,
         cake_panels,
         {"aggregate.grains": 60, "aggregate.width": "6 um", "compression.rate": "1 m/s"},
+        columns=("mean_filling", "stress", "coordination", "mean_pressure_floor", "mean_pressure_lid"),
     ),
 )
