@@ -175,9 +175,9 @@ class Loading(Settings):
         if self.pressure is not None and self.kind == "shear" and len(self.pressure) > 1:
             yield "pressure has several values, which are for compress; shear takes one"
         examples = {"rate": "'1e-5 /t_c'", "to": "0.4", "until": "'100 us'"}
-        needed, unused, by = ("rate", "to"), ("until",), "a rate"
-        if self.load_is_given:
-            needed, unused, by = unused, needed, "a pressure"
+        of_rate, of_load = ("rate", "to"), ("until",)
+        needed, unused = (of_load, of_rate) if self.load_is_given else (of_rate, of_load)
+        by = "a pressure" if self.load_is_given else "a rate"
         for name in needed:
             if getattr(self, name) is None:
                 yield f"{name} is missing; add it, for example {name} = {examples[name]}"

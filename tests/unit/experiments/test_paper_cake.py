@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sand.experiments.paper_cake import at_pressure, cake_panels, compare_cakes, filling_at
+from sand.io.sweep_files import read_runs, write_sweep
 from sand.plotting.papers import panels_figure
 from sand.theory.compression import guettler_filling
 
@@ -58,3 +59,9 @@ def test_comparison_and_figure():
     axes = panels_figure(cake_panels(both), "").axes
     x, y = axes[0].get_lines()[0].get_data()
     assert y == pytest.approx(guettler_filling(x) + 0.01, rel=1e-9, abs=0.0)
+
+
+def test_a_campaign_without_a_run(tmp_path):
+    """Interrupted before its first run is done, a campaign leaves a table without rows, which is read."""
+    write_sweep(tmp_path, [])
+    assert read_runs(tmp_path) == []
