@@ -188,6 +188,8 @@ def gas_with_contacts(
 
 def _region(box: Box, extent: Any) -> Box:
     """Region that a gas fills: the box, with `extent` along its open axes.  Raises BadInput."""
+    if box.tilt:
+        raise BadInput("box: a gas cannot be placed in a tilted box; leave tilt out, and shear the box")
     if isinstance(extent, (list, tuple)) or dimensions(extent) == 1:
         given = [None if is_word(own, "periodic") else own for own in extent]
     else:

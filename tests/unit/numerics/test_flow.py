@@ -21,7 +21,7 @@ def test_a_box_that_keeps_its_shape_has_no_flow():
 
 def test_a_drift_keeps_the_velocity_in_the_laboratory():
     """u′ + A′ x′ = u + A x, x′ = x + (u + A x) dt, L′ = (1 + A dt) L, and A′ of the same dL/dt; to rounding."""
-    then, position = flow.after_step(MOVING, DT), flow.drifted_with_flow(X, U, MOVING, DT)
+    then, position = flow.after_step(DT, MOVING), flow.drifted_with_flow(X, U, MOVING, DT)
     velocity = flow.slowed(U, MOVING, DT)
     before = np.array(flow.with_flow(U, X, MOVING))
     assert before == pytest.approx(np.array(U) + RATES * X, rel=1e-15, abs=0.0)
@@ -42,7 +42,7 @@ def test_the_flow_carries_anchors_and_bounds_approaches():
     for _ in range(50):
         position = flow.drifted_with_flow(position, (0.0, 0.0, 0.0), now, DT)
         moved = np.array([flow.drifted_with_flow(tuple(x), (0.0, 0.0, 0.0), now, DT) for x in moved])
-        now = flow.after_step(now, DT)
+        now = flow.after_step(DT, now)
     assert flow.carried(X, built, now) == pytest.approx(position, rel=1e-13, abs=0.0)
     strain = flow.strain_since(built, now)
     assert strain == pytest.approx(50 * DT * np.abs(RATES).sum(), rel=1e-12, abs=0.0)
