@@ -1,4 +1,4 @@
-"""Simple shear of a periodic box: Newton's law in the laboratory, work, lists, images, and runs that are interrupted."""
+"""Simple shear of a periodic box: Newton's law in the laboratory, work, lists, images, interrupted runs."""
 
 import itertools
 import math
@@ -27,8 +27,8 @@ def test_free_bodies_move_as_in_an_open_box(rates, shear, record_bound):
     """Two bodies collide across edges of a box that is sheared by 2, and stretched: the motion is that of an open box.
 
     The velocities u + A x of the laboratory obey Newton's law, and with dH/dt constant images move at constant
-    velocities.  The body passes all faces, and the tilt is wrapped twice.  Positions differ by errors of rounding, which
-    grow in 3000 steps, as contacts form, roll, twist and are damped in all modes.
+    velocities.  The body passes all faces, and the tilt is wrapped twice.  Positions differ by rounding, which grows in
+    3000 steps, as contacts form, roll, twist and are damped in all modes.
     """
     grains, box, until = colliding_bodies(), Box.periodic("3 um", "2.6 um", "2.8 um"), 4e-8
     lengths, rate = np.array(box.lengths), np.diag(np.asarray(rates, float))
@@ -61,7 +61,7 @@ def test_free_bodies_move_as_in_an_open_box(rates, shear, record_bound):
 
 
 def test_free_grains_at_high_shear():
-    """Without forces u_x = u_x0 − γ u_z: the energy that the grains gain is ½ Σ m (u_x² − u_x0²), and the work; exactly.
+    """Without forces u_x = u_x0 − γ u_z: the energy that the grains gain is ½ Σ m (u_x² − u_x0²), and the work.
 
     Momentum relative to the flow goes as F⁻¹: it stays 0.  The first row has −P_zx = −Σ m u_z u_x/V.
     """
@@ -174,7 +174,7 @@ def test_the_work_of_shear_closes_the_ledger(record_bound):
 
 
 def test_no_place_in_the_box_is_special():
-    """All positions shifted by a vector at the start: the same contacts and work, to rounding that grows in 1500 steps."""
+    """All positions shifted by a vector at the start: the same contacts and work, to rounding in 1500 steps."""
     ends = []
     for shift in ([0.0, 0.0, 0.0], [2.1e-7, -3.3e-7, 4.7e-7]):
         sim = packing(None)
@@ -245,9 +245,12 @@ def test_frames_and_restarts(tmp_path):
     tilts = np.array([frame.box.tilt for frame in frames])
     assert frames[-1].box == resumed.box and (np.diff(tilts) < 0.0).sum() >= 1
     unwrapped = np.array([frame.unwrapped for frame in frames])
-    flow = np.diff(unwrapped, axis=0) - np.diff([frame.time for frame in frames])[:, None, None] * np.array(
-        [unwrapped[:-1, :, 2], 0 * unwrapped[:-1, :, 2], 0 * unwrapped[:-1, :, 2]]
-    ).transpose(1, 2, 0) * 4e7
+    flow = (
+        np.diff(unwrapped, axis=0)
+        - np.diff([frame.time for frame in frames])[:, None, None]
+        * np.array([unwrapped[:-1, :, 2], 0 * unwrapped[:-1, :, 2], 0 * unwrapped[:-1, :, 2]]).transpose(1, 2, 0)
+        * 4e7
+    )
     assert np.abs(flow).max() < RADIUS
     start = sand.setup.from_frame(frames[-1], {ICE.name: ICE})
     assert start.box == resumed.box
@@ -261,22 +264,22 @@ def test_frames_and_restarts(tmp_path):
 def test_lists_are_complete_in_a_sheared_box(search):
     """After each of some calls, all pairs that overlap are contacts, found by brute force over 75 images; strain 2.
 
-    The rate is so high that the flow brings grains together: γ̇ L is 40 m/s.
+    The rate is so high that the flow brings grains together: γ̇ L is 33 m/s.
     """
-    grains = sand.setup.gas(60, "1.6 um", radius=RADIUS, material=ICE, seed=8)
+    grains = sand.setup.gas(60, "1.3 um", radius=RADIUS, material=ICE, seed=8)
     given = {"deformation": sand.Deformation(shear="2.5e7 1/s"), "neighbours": sand.Neighbours(search)}
-    sim = sand.Simulation(grains, [DAMPED], box="1.6 um", **given)
+    sim = sand.Simulation(grains, [DAMPED], box="1.3 um", **given)
     i, j = np.triu_indices(60, 1)
     images = np.stack(np.meshgrid(np.arange(-2, 3), [-1, 0, 1], np.arange(-2, 3), indexing="ij"), -1).reshape(-1, 1, 3)
     seen = set()
     while sim.state.cell.shear[0] < 2.0:
-        sim.run(steps=20)
+        sim.run(steps=40)
         x = sim.grains.position
         apart = np.linalg.norm(x[i] - x[j] + sim.box.shift(images), axis=2).min(axis=0)
         touching = {tuple(pair) for pair in np.stack([i, j], 1)[apart < 2.0 * RADIUS].tolist()}
         assert touching <= {tuple(sorted(pair)) for pair in sim.contacts["pair"].tolist()}
         seen |= touching
-    assert len(seen) > 25
+    assert len(seen) > 12
 
 
 def test_lists_are_rebuilt_at_the_same_steps_with_frequent_output():
@@ -293,7 +296,7 @@ def test_lists_are_rebuilt_at_the_same_steps_with_frequent_output():
 
 
 def test_changes_of_the_shear():
-    """Shear begins where it has columns, which a rate of 0 at the start gives; a box set by the user has its own tilt."""
+    """Shear begins where it has columns, which a rate of 0 at the start gives."""
     sim = packing(sand.Deformation(shear=0), number=12, filling=0.02)
     sim.run(steps=50)
     assert not sim.strain_rate.any() and sim.box.tilt == 0.0
@@ -320,7 +323,7 @@ def test_what_cannot_be_used_is_refused():
     for given in ({"box": "3 um", "deformation": RATE}, {"box": Box.periodic("3 um", tilt="1 um")}):
         with pytest.raises(sand.BadInput, match="'dipoles' cannot be used"):
             sand.Simulation(grains, forces, **given)
-        with pytest.raises(sand.BadInput, match="stepping = 'rigid.*' cannot be used"):
+        with pytest.raises(sand.BadInput, match=r"stepping = 'rigid-clusters' cannot be used"):
             sand.Simulation(grains, [sand.Contact()], stepping=sand.RigidClusters(), **given)
     with pytest.raises(sand.BadInput, match="axis y of the box is open"):
         sand.Simulation(grains, [sand.Contact()], box=["3 um", None, "3 um"], deformation=RATE)

@@ -114,7 +114,7 @@ class Box:
         ):
             raise BadInput(f"lengths = {shown(self.lengths)} must be lengths in m or None; see sand.Box.periodic")
         if self.tilt and (None in self.lengths or not math.isfinite(self.tilt)):
-            raise BadInput(f"tilt = {self.tilt:g} m must be finite, of a box that is periodic along all axes; leave it out")
+            raise BadInput(f"tilt = {self.tilt:g} m is for a box that is periodic along x, y and z; leave it out")
         if self.tilt:
             object.__setattr__(self, "tilt", self.tilt - self.span.x * float(np.rint(self.tilt * self.span.inverse_x)))
 
@@ -209,7 +209,7 @@ class Box:
             x = x - np.rint(x[..., 2:] * inverse[2]) * [self.tilt, 0.0, 0.0]
         return np.rint(x * inverse).astype(np.int32)
 
-    def shift(self, image: np.ndarray) -> np.ndarray:
+    def shift(self, image: Any) -> np.ndarray:
         """Vectors (…, 3) [m] from the box to its images (…, 3)."""
         image = np.asarray(image)
         return image * np.array(self.span[:3]) + image[..., 2:] * np.array([self.tilt, 0.0, 0.0])

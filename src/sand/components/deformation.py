@@ -87,8 +87,8 @@ class Deformation(Settings):
     time : float or str, optional
         Time [s] > 0 of the running mean P̄ of the pressure, with law = "pressure".
     shear : float or str, optional
-        Rate of simple shear [1/s]: the velocity along x grows along z, dv_x/dz, and images above slide over those below;
-        or a `Ramp`. With law = "linear" the velocity of the images is constant instead, that of this rate at the start.
+        Rate of simple shear dv_x/dz [1/s]: the velocity along x grows along z, and images above slide over those below;
+        or a `Ramp`. With law = "linear" the velocity of the images is constant, that of this rate at the start.
 
     Raises
     ------
@@ -301,7 +301,7 @@ class DeformedBox(Component):
 
 
 def present_virial(state: State) -> np.ndarray:
-    """W_aa and W_zx (4,) [J] of contacts and dipoles, whose energy is a third of the trace, with the loads of a state."""
+    """W_aa and W_zx (4,) [J] of contacts and dipoles, whose energy is a third of the trace, with the present loads."""
     grains, contacts, used = state.grains.arrays, state.contacts, int(state.count[CONTACTS])
     first, second = grains.position[:, contacts.pair[:, :used]].swapaxes(0, 1)
     branch, force = state.box.nearest((first - second).T).T, contacts.force[:, :used]

@@ -86,7 +86,7 @@ def wrap_tilt(grains, pair_list, long_range, cell, side):
 
 @stage("the shear of the box")
 def shear(grains, pair_list, long_range, cell, scratch):
-    """Shear the box as the drift has moved its grains; the work on their motion.  Before `deform`, whose rates it uses."""
+    """Shear the box as the drift has moved its grains; the work on their motion.  Before `deform` has changed rates."""
     dt, rate, strained, flux, upwards = scratch[DT], cell.span[SHEAR], 1.0 + scratch[DT] * cell.span[RATE], 0.0, 0.0
     for i in range(grains.mass.size):
         momentum = grains.mass[i] * grains.velocity[2, i]

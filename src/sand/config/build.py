@@ -147,8 +147,9 @@ def _of_other(case: Case, path: Path) -> Start:
 def same_box(first: Box, second: Box) -> bool:
     """Whether two boxes have the same axes, equal to the precision of a trajectory."""
     pairs = list(zip(first.lengths, second.lengths, strict=True))
-    alike = math.isclose(first.tilt, second.tilt, abs_tol=1e-6 * first.shortest)
-    return alike and all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
+    if abs(first.tilt - second.tilt) > 1e-6 * first.shortest:
+        return False
+    return all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
 
 
 def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:

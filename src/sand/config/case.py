@@ -103,7 +103,7 @@ class BoxSection(Section):
             yield "tilt is for a box that is periodic along x, y and z; leave it out"
 
     @property
-    def space(self) -> Box | None:
+    def space(self) -> Any:
         """The box; None for open space."""
         return self.periodic and Box(self.periodic.lengths, self.tilt or 0.0)
 

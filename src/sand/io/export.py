@@ -88,7 +88,7 @@ def to_lammps_dump(one: Exported) -> str:
     boundary = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     if tilt := frame.box.tilt:  # the bounds of the parallelepiped, and its tilts
-        ends, boundary = 0.5 * (np.array(frame.drawn) + [abs(tilt), 0.0, 0.0]), f"xy xz yz {boundary}"
+        ends, boundary = 0.5 * (np.array(frame.drawn) + np.array([abs(tilt), 0.0, 0.0])), f"xy xz yz {boundary}"
         box = "".join(f"{-v:.17g} {v:.17g} {own:.17g}\n" for v, own in zip(ends, (0.0, tilt, 0.0), strict=True))
     head = (
         f"ITEM: TIMESTEP\n{one.number}\n"

@@ -1,4 +1,4 @@
-"""Functions with other code in each kind of box, by the type of their last argument: `Span`, `MovingSpan`, `TiltedSpan`.
+"""Functions with other code in each kind of box, the type of their last argument: `Span`, `MovingSpan`, `TiltedSpan`.
 
 So a box that keeps its shape, or is not sheared, does not compile what others need.
 """

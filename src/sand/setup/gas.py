@@ -338,7 +338,7 @@ def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator)
         most = [0.5 * v - own - gap if opened else math.inf for v, opened in zip(lengths, is_open, strict=True)]
         for position, cell in itertools.islice(attempts, TRIES):
             inside = all(abs(x) <= end for x, end in zip(position, most, strict=True))
-            if inside and _is_free(position, own, gap, near.get(cell, ()), box.span):
+            if inside and _is_free(position, own, gap, near.get(cell, ()), Span(*box.span[:6])):
                 placed[i] = position
                 around = itertools.product(
                     *({(c + k) % m for k in (-1, 0, 1)} for c, m in zip(cell, sides, strict=True))
