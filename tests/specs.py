@@ -10,8 +10,8 @@ from __future__ import annotations
 
 SPECS = ("contacts", "dipoles", "listed", "fields", "flights", "threads", "scattering", "deformation", "shear", "small")
 """Contacts alone; with dipoles; with a Verlet list and a gas; with fields in time; an integrator of the user;
-blocks shared by threads; two-body scattering; a box that is deformed; that is sheared; anything that compiles in a second
-or two."""
+blocks shared by threads; two-body scattering; a box that is deformed; one that is sheared; anything that compiles in a
+second or two."""
 WORKERS = {"flights": "trajectories", "scattering": "trajectories"}
 """Groups that share a worker, because tests compare one with the other."""
 STARTS = (
