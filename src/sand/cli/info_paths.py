@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 
 from ..basics.errors import BadInput
 from ..config.folders import job_in
 from ..io import run_folder as files
+from ..io.table import read_table
 from . import report
 from .info_jobs import JOBS, Description, describe_job, describe_results
 from .info_run import describe_checkpoint, describe_ledger, describe_run, describe_summary, describe_trajectory
@@ -59,11 +59,11 @@ def describe_json(path: Path) -> Description:
 
 def describe_csv(path: Path) -> Description:
     """Describe a ledger, or any other table."""
-    names, *lines = list(csv.reader(files.read_text(path).splitlines())) or [[]]
-    if path.name == files.LEDGER or names[:1] == ["step"]:
+    if path.name == files.LEDGER:
         return describe_ledger(path)
-    if not names or any(len(line) != len(names) for line in lines):
-        raise BadInput(f"{path} is not a table, or it is damaged: its rows differ in length")
+    names, *lines = read_table(path)
+    if names[:1] == ["step"]:
+        return describe_ledger(path)
     rows = [("rows", str(len(lines))), ("columns", ", ".join(names))]
     return TABLES.get(path.name, "a table"), rows, {"kind": "table", "rows": len(lines), "columns": names}
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,8 @@ import numpy as np
 
 from ..basics.errors import BadInput, import_optional, warn
 from .damage import sealed
-from .run_folder import ROW, ROWS_CSV, RUNS, SWEEP_CSV, plain, read_json, read_text, replace_file, replacing, write_json
+from .run_folder import ROW, ROWS_CSV, RUNS, SWEEP_CSV, plain, read_json, replacing, write_json
+from .table import read_table, write_table
 
 CLAIM = ".claim"
 """File in the folder of a run that is locked by who computes it."""
@@ -99,11 +98,7 @@ def lines_of(row: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _write(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]], parquet: bool) -> None:
-    out = io.StringIO()
-    writer = csv.DictWriter(out, names, lineterminator="\n", restval="")
-    writer.writeheader()
-    writer.writerows(rows)
-    replace_file(path, out.getvalue().encode())
+    write_table(path, rows, names)
     if parquet:
         pyarrow = import_optional("pyarrow", "--parquet")
         import_optional("pyarrow.parquet", "--parquet")
@@ -150,10 +145,8 @@ def _changes(column: np.ndarray) -> np.ndarray:
 
 
 def _read(path: Path, needed: set[str], what: str) -> dict[str, np.ndarray]:
-    lines = list(csv.reader(read_text(path).splitlines()))
-    if not lines or not needed <= set(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
-        raise BadInput(f"{path} is not {what}, or it is damaged")
-    columns = {name: [line[k] for line in lines[1:]] for k, name in enumerate(lines[0])}
+    names, *lines = read_table(path, needed, what)
+    columns = {name: [line[k] for line in lines] for k, name in enumerate(names)}
     return {name: np.array(cells, str) if name in TEXTS else _column(cells) for name, cells in columns.items()}
 
 

@@ -189,6 +189,7 @@ def test_stress_between_walls_is_the_impulse_of_the_lid(kind, to, axis, sign):
     assert abs(content["drift"]) < 1e-3
 
 
+@pytest.mark.draws
 @pytest.mark.compiled("deformation")
 @pytest.mark.filterwarnings("ignore:the rate,")
 @pytest.mark.parametrize("kind", ["compress", "stretch"])
@@ -205,6 +206,8 @@ def test_stress_in_a_box_is_the_mean_of_its_axes(kind):
     stress = np.array([row["stress"] for row in table])
     assert len(stress) > 3 and stress.any()
     assert (stress if compressed else -stress) == pytest.approx(mean, rel=1e-6, abs=1e-6 * np.abs(mean).max())
+    labels = [axes.get_ylabel() for axes in found.simulation.figure().axes]
+    assert [label[:3] for label in labels].count("$P$") == 1
     last, sides = table[-1], found.plan.sides
     assert last["filling" if compressed else "strain"] == pytest.approx(0.2, rel=1e-4, abs=0.0)
     factors = [last[f"side_{axis}"] / side for axis, side in zip("xyz", sides, strict=True)]
