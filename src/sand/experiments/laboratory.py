@@ -34,7 +34,7 @@ WAYS = ("box", "walls")
 """By what a packing is loaded: its periodic box, or one of two walls. The functions of each are in laboratory_WAY."""
 OF_STATE = (
     *("contacts", "made", "moved", "broken", "clusters", "translation", "rotation"),
-    *("normal", "sliding", "rolling", "twisting", "total"),
+    *("normal", "sliding", "rolling", "twisting", "total", "tilt"),
 )
 """Columns of the ledger that the table repeats, besides pressures and losses."""
 
@@ -107,11 +107,12 @@ class Loading(Settings):
         Where it ends, needed with a rate: of "compress" a filling factor φ, at most 0.74; of "stretch" the strain
         L/L₀ − 1, and of "shear" the strain, the distance that the faces have slid over the distance between them.
     by : str, optional
-        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y; "shear"
-        needs walls.
+        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y. "shear"
+        slides the images above and below along x, or the lid.
     along : str, optional
         Axis of the strain, "x", "y" or "z"; "all" for equal strains of a box that is compressed. "auto", the default:
-        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear moves the lid along x.
+        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear is along x, and grows
+        along z.
     box : float or str or sequence, optional
         Sides of the box at the start [m], one or three; between walls those along x and y count. By default those of a
         frame, or of a cube that holds the body with a gap of a tenth of a radius.
@@ -151,9 +152,6 @@ class Loading(Settings):
             return
         if problems := list(self._load_problems()):
             yield from problems
-            return
-        if (self.kind, self.by) == ("shear", "box"):
-            yield "by = 'box' is for a box that is compressed or stretched; shear needs by = 'walls'"
             return
         if self.by == "box" and self.rate.unit == "m/s":
             yield "rate is a speed, which is for by = 'walls'; give a rate such as '1e-5 /t_c'"
