@@ -57,9 +57,7 @@ def compression_panels(rows: Sequence[Row]) -> list[Panel]:
         stress.append(curve_of(tables, "mean_filling", "stress", name))
         ratio.append(curve_of(over, "mean_filling", "stress", name))
         number.append(curve_of(tables, "mean_filling", "coordination", name))
-    whole = next(iter(rates_of(rows).values()))
-    reached = [row["mean_filling"] for row in whole]
-    x = np.geomspace(float(stress[0].x[0]), max(reached), 60)
+    whole, x = next(iter(rates_of(rows).values())), np.geomspace(stress[0].x[0], stress[0].x[-1], 60)
     below = x[x < CLOSEST]
     kataoka, tatsuuma = r"$(E_\mathrm{roll}/r^3)\,\phi^3$", r"$(E_\mathrm{roll}/r^3)(1/\phi-1/\phi_\mathrm{max})^{-3}$"
     laws = [
@@ -86,10 +84,8 @@ def compare_pressures(rows: Sequence[Row]) -> list[Compared]:
     compared = []
     for rate, some in rates_of(rows).items():
         for filling in FLUFFY:
-            found, fast = (
-                near(some, _over(kataoka_pressure), filling),
-                near(some, itemgetter("rate_ratio"), filling).value,
-            )
+            found = near(some, _over(kataoka_pressure), filling)
+            fast = near(some, itemgetter("rate_ratio"), filling).value
             what = f"P/((E_roll/r³) φ³) at φ = {filling:g}, C_v = {rate:g}"
             compared.append(_compared(what, found, _reason(fast), 0.2))
     dense = next(iter(rates_of(rows).values()))
