@@ -160,7 +160,7 @@ def compare_strengths(rows: Sequence[Row]) -> list[Compared]:
         law = tatsuuma_strength([row["filling_at_start"] for row in some], some[0]["surface_energy"], some[0]["radius"])
         ratio = mean_of(np.array([row["strength"] for row in some]) / law)
         fast, rising = max(row["rate_ratio"] for row in some), sum(row["at_end"] for row in some)
-        reason = f"the tension still rises at the end of {rising} runs" if rising else _reason(fast)
+        reason = f"still rising at the end of {rising} of {len(some)} runs" if rising else _reason(fast)
         what = f"tensile strength/(6e5 Pa φ^1.8) at φ = {filling:g}"
         compared.append(_compared(what, ratio, reason, 0.3))
     values = np.array([(row["filling_at_start"], row["strength"], row["seed"]) for row in found]).T

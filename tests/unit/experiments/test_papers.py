@@ -239,7 +239,7 @@ def test_strengths_are_compared():
     assert [one.ours.split()[0] for one in ratios] == ["1"] * 4 and all(one.verdict == "agrees" for one in ratios)
     assert slope.ours.startswith("1.8 (") and slope.verdict == "agrees"
     rising = compare_strengths(stretched(0.1, 1, 9e3, 5.0))
-    assert rising[0].verdict.endswith("the tension still rises at the end of 1 runs")
+    assert rising[0].verdict.endswith("still rising at the end of 1 of 1 runs")
 
 
 @pytest.mark.compiled("contacts")
