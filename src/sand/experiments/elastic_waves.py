@@ -1,0 +1,182 @@
+"""Waves in a packing at rest: standing waves, and pulses that a knock sends through it; see `elastic`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..basics.box import Box
+from ..basics.errors import BadInput
+from ..engine.changed_state import subset
+from ..setup.from_frame import Start
+from ..simulation.simulation import Simulation
+
+WIDTH = 0.08
+"""Standard deviation of the velocities of a knock along the packing, over L."""
+DISTANCES = np.linspace(0.12, 0.37, 11)
+"""Distances at which the arrival of a knock is timed, over L: a whole copy of the packing, with four of them."""
+FINER = 1.05
+"""Factor between the moments at which a standing wave is looked at."""
+LATEST = 300.0
+"""Time over that of the affine wave after which a standing wave must have turned."""
+MOMENTS = 120
+"""Moments at which a pulse is looked at."""
+
+
+def repeated(start: Start, axis: int, number: int) -> Start:
+    """A periodic packing as `number` copies of itself side by side along an axis, in a box as many times as long."""
+    grains, contacts, box, count = start.grains, start.contacts, start.box, len(start.grains)
+    lengths: Any = list(box.lengths)
+    length = lengths[axis]
+    copies = np.repeat(np.arange(number), count)
+    many = subset(grains, np.tile(np.arange(count), number))
+    many.arrays.id[...] = np.arange(count * number)
+    position = np.tile(box.wrap(grains.position), (number, 1))
+    position[:, axis] += (copies - 0.5 * (number - 1)) * length
+    many.arrays.position[...] = position.T
+    lengths[axis] = number * length
+    if contacts is not None:
+        apart = position[contacts.pair[:, 0]] - position[contacts.pair[:, 1]]  # of the first copy
+        crossed = np.rint(apart[:, axis] / length).astype(np.int64)
+        first = np.arange(number)[:, None]
+        pair = np.stack([contacts.pair[:, 0] + first * count, contacts.pair[:, 1] + (first + crossed) % number * count])
+        each = {name: np.concatenate([value] * number) for name, value in contacts._asdict().items()}
+        contacts = contacts._replace(**each | {"pair": pair.reshape(2, -1).T})
+    return Start(many, contacts, Box(tuple(lengths)), start.note)
+
+
+class Wave(NamedTuple):
+    """Axes along which a wave runs, and along which its grains move: the same one for longitudinal waves."""
+
+    along: int
+    polarised: int
+
+
+class Motion:
+    """The motion that a velocity profile begins in a packing at rest.
+
+    Grains begin to move at ± speed × profile in two copies: half the difference of both motions is free of all that
+    goes on without them.
+
+    Parameters
+    ----------
+    rest : Simulation
+        The packing, without drag.
+    wave : Wave
+        Its directions.
+    speed : float
+        Speed [m/s].
+    profile : ndarray
+        (N,) velocities over `speed`; their mean is taken away.
+    """
+
+    def __init__(self, rest: Simulation, wave: Wave, speed: float, profile: np.ndarray):
+        self.start, self.polarised, self.speed, self.pair = rest.time, wave.polarised, speed, []
+        for sign in (1.0, -1.0):
+            each = rest.copy()
+            with each.change() as change:
+                change.velocity[:, wave.polarised] += sign * speed * (profile - profile @ rest.grains.mass / _mass(rest))
+            self.pair.append(each)
+
+    def at(self, time: float) -> np.ndarray:
+        """Velocities (N,) over `speed` at a time [s] after the start, not before the last one."""
+        if time > 0.0:
+            for each in self.pair:
+                each.run(until=self.start + time)
+        one, other = (each.grains.velocity[:, self.polarised] for each in self.pair)
+        return np.asarray(0.5 * (one - other) / self.speed)
+
+    def drift(self) -> float:
+        """Largest energy error of both copies."""
+        return max(abs(each.ledger.drift) for each in self.pair)
+
+
+def standing_wave(rest: Simulation, wave: Wave, strain: float, stiffest: float) -> float:
+    """Phase speed ω/k [m/s] of the standing wave with k = 2π/L: velocities v cos kx, the mean of which turns at π/2ω.
+
+    Parameters
+    ----------
+    rest : Simulation
+        The packing, without drag.
+    strain : float
+        k v/ω, about.
+    stiffest : float
+        Speed of waves of affine motion [m/s], an upper bound.
+    """
+    length = _side(rest, wave)
+    profile = np.cos(2.0 * math.pi * rest.grains.position[:, wave.along] / length)
+    first = 0.25 * length / stiffest
+    weights = profile * rest.grains.mass
+    motion, time = Motion(rest, wave, strain * stiffest, profile), 0.5 * first
+    before = 0.0, float(weights @ motion.at(0.0))
+    while time < LATEST * first:
+        now = float(weights @ motion.at(time))
+        if now <= 0.0:
+            quarter = before[0] + (time - before[0]) * before[1] / (before[1] - now)
+            return 0.25 * length / quarter
+        before, time = (time, now), time * FINER
+    raise BadInput(f"a standing wave along {'xyz'[wave.along]} does not turn within {time:.3g} s: no elastic packing")
+
+
+class Knock(NamedTuple):
+    """Arrival of a pulse."""
+
+    speed: float  # [m/s]
+    misfit: float  # standard deviation of the arrivals from the line, over the time between the first and the last
+    distances: np.ndarray  # (D,) [m]
+    arrivals: np.ndarray  # (D,) [s]
+    times: np.ndarray  # (T,) [s]
+    passed: np.ndarray  # (T, D) momentum beyond the distances, over that of the knock
+    drift: float  # energy error
+
+
+def knock(rest: Simulation, wave: Wave, strain: float, expected: float) -> Knock:
+    """Speed of a pulse from a layer across the packing, which gets a velocity, from arrivals over distance.
+
+    Velocities are v exp(−d²/2w²) at the distance d from the layer, w = WIDTH L. The pulse arrives at a distance when half
+    of the momentum of the knock is beyond it, on both sides; a grain counts by a share that rises from 0 to 1 within
+    ± w of the distance. The speed is the slope of distance over arrival, by least squares of the times. The momentum is
+    that of the longest waves: dispersion widens the pulse, but hardly shifts its middle.
+
+    Parameters
+    ----------
+    rest : Simulation
+        The packing, without drag.
+    strain : float
+        v over the speed of the pulse, about.
+    expected : float
+        Expected speed [m/s], for the length of the record.
+    """
+    length, mass = _side(rest, wave), rest.grains.mass
+    apart = np.abs(rest.box.nearest(rest.grains.position)[:, wave.along])
+    distances, profile = DISTANCES * length, np.exp(-0.5 * (apart / (WIDTH * length)) ** 2)
+    motion, given = Motion(rest, wave, strain * expected, profile), float(profile @ mass)
+    part = np.clip(0.5 + (apart - distances[:, None]) / (2.0 * WIDTH * length), 0.0, 1.0)
+    beyond = part * mass / given
+    times = np.linspace(0.0, 0.6 * length / expected, MOMENTS + 1)
+    passed = np.array([beyond @ (motion.at(float(time)) + given / _mass(rest)) for time in times])
+    arrivals = np.array([first_above(times, column, 0.5) for column in passed.T])
+    slope, late = np.polyfit(distances, arrivals, 1)
+    misfit = float(np.std(arrivals - slope * distances - late) / np.ptp(arrivals))
+    return Knock(float(1.0 / slope), misfit, distances, arrivals, times, passed, motion.drift())
+
+
+def first_above(times: np.ndarray, values: np.ndarray, level: float) -> float:
+    """Time at which values first come to a level, linear between two of them; NaN if they do not."""
+    above = np.flatnonzero(values >= level)
+    if not len(above) or above[0] == 0:
+        return math.nan
+    k = int(above[0])
+    part = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(times[k - 1] + part * (times[k] - times[k - 1]))
+
+
+def _mass(simulation: Simulation) -> float:
+    return float(simulation.grains.mass.sum())
+
+
+def _side(rest: Simulation, wave: Wave) -> float:
+    lengths: Any = rest.box.lengths
+    return float(lengths[wave.along])
