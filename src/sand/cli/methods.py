@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
-from ..config.commands import LOADINGS
+from ..config.commands import PACKINGS
 from ..config.folders import job_in
 from ..io import run_folder as files
 from . import options, parsing, report
@@ -221,7 +221,7 @@ def _of_loading(folder: Path, path: Path) -> Sentences:
 
 
 def _loading(case: Any) -> Sentences:
-    """Sentences on a case of `sand compress`, `sand stretch` or `sand shear`."""
+    """Sentences on a case of `sand compress`, `stretch`, `shear` or `elastic`."""
     from .method_text import section
 
     yield f"The packing was: {section(case.aggregate)}."
@@ -296,7 +296,7 @@ KINDS: dict[str | None, Callable[[Path, Path], Sentences]] = {
     "collide": _of_collisions,
     "grow": _of_growth,
     "scatter": _of_scattering,
-    **dict.fromkeys(LOADINGS, _of_loading),
+    **dict.fromkeys(PACKINGS, _of_loading),
     "sweep": _of_sweep,
 }
 """What describes the folder of each command; the arguments are the folder and its case file."""

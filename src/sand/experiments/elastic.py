@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from ..analysis.clusters import percolation_axes
 from ..basics.arguments import checked
 from ..basics.box import Box
-from ..basics.errors import BadInput, warn
+from ..basics.errors import BadInput, ErrorCollector, warn
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.settings import Flag, List, Number, Reading, Settings, Whole
@@ -23,18 +22,21 @@ from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.gas import Gas
 from ..integrate.integrator import Integrator
+from ..setup.checks import pairs_in_contact
 from ..setup.from_frame import Start
 from ..simulation.simulation import Simulation
 from ..theory.elastic import ContactSprings, affine_moduli, affine_shear_moduli
 from .elastic_waves import Knock, Wave, knock, repeated, standing_wave
-from .job import Progress, ignored
-from .laboratory import BOX, Loading, contact_of, load, read_rate
+from .job import ignored
+from .laboratory import BOX, Loading, contact_of, filling_factor, plan, read_rate, run_to_end, scales_of, simulation_of
 from .laboratory_box import in_box
 
 AT_LIMIT = 1.0 - 1e-6
 """Share of the limit of sliding, rolling or twisting above which a contact counts as one that slips."""
 DOUBLINGS = 9
 """How often the time in which a packing comes to rest is doubled, at most."""
+WAVE, STIFFENS = 0.36, 2.3
+"""Speed of sound over √(3E_roll/(r³ρ)) at φ = 0.1, and its exponent of φ, by which the cost is estimated (ice)."""
 LINEAR = 0.05
 """Largest change of the bulk modulus from that of the smallest strain in the linear range."""
 
@@ -85,7 +87,9 @@ class Elastic(Settings):
         if not wrong & {"strains"} and not len(self.strains):
             yield "strains is empty; give at least one, such as 1e-6"
         if not wrong & {"compress_to", "rate"} and self.compress_to is not None:
-            yield from Loading("compress", self.rate, self.compress_to, box=self.box).contradictions(set())
+            errors = ErrorCollector()
+            errors.take(_compression, self)
+            yield from errors.problems
 
 
 class Moduli(NamedTuple):
@@ -137,6 +141,7 @@ class Moduli(NamedTuple):
                 "along": "xyz"[wave.along],
                 "polarised": "xyz"[wave.polarised],
                 "speed": one.speed,
+                "widening": one.widening,
                 "misfit": one.misfit,
                 "standing": self.standing[wave],
                 "drift": one.drift,
@@ -207,21 +212,13 @@ def measure(
     """
     how = Elastic() if settings is None else settings
     contact, given = contact_of(forces), list(forces or [Contact()])
-    if any(isinstance(force, Gas) for force in given):
-        raise BadInput("forces: grains are brought to rest by a drag of its own; leave gas out")
-    progress("compressing" if how.compress_to is not None else "coming to rest", 0.0)
     options: dict[str, Any] = {"stepping": stepping, "seed": seed, "observers": observers}
-    start = packing(body, how, given, options)
-    rest = Simulation(
-        start.grains,
-        [*given, _drag(start.grains, 1.0)],
-        box=start.box,
-        contacts=start.contacts,
-        deformation=COMPONENTS["deformation"](0.0),
-        frame_every="1 s",
-        **options,
-    )
-    refuse_no_network(rest)
+    rest = begin(body, how, forces, options).simulation
+    if how.compress_to is not None:
+        progress("compressing", 0.0)
+        planned = plan(body, _compression(how), given)
+        loaded = run_to_end(planned, simulation_of(planned, given, **options))
+        rest = _at_start(_start_of(loaded.simulation), given, options)
     progress("coming to rest", 0.05)
     springs = contact_springs(rest, contact)
     stiffest = math.sqrt(np.diag(_affine(rest, springs)).max() / _density(rest))
@@ -260,13 +257,59 @@ def measure(
     )
 
 
-def packing(body: Any, how: Elastic, forces: Sequence[Force], options: dict[str, Any]) -> Start:
-    """The packing in its periodic box, its grains without velocity; compressed first, with `compress_to`."""
+class Begun(NamedTuple):
+    """The beginning of a measurement."""
+
+    simulation: Simulation  # of the packing in its box, or of its compression
+    until: float  # time of all motions together [s], about
+
+
+def begin(body: Any, how: Elastic, forces: Sequence[Force] | None, options: dict[str, Any]) -> Begun:
+    """The packing in its box, or its compression, and how long all takes.  Raises BadInput."""
+    given = list(forces or [Contact()])
+    contact = contact_of(given)
+    if any(isinstance(force, Gas) for force in given):
+        raise BadInput("forces: grains are brought to rest by a drag of its own; leave gas out")
+    if how.compress_to is None:
+        start = _in_its_box(body, how)
+        made, sides, before = _at_start(start, given, options), np.array(start.box.lengths, float), 0.0
+        filling, scales = filling_factor(start.grains.radius, sides), scales_of(start.grains, contact)
+    else:
+        planned = plan(body, _compression(how), given)
+        made, sides, before = simulation_of(planned, given, **options), planned.sides, planned.until
+        filling, scales = how.compress_to, planned.scales
+        sides = sides * (planned.filling(sides) / filling) ** (1.0 / 3.0)
+    speed = WAVE * scales.wave_speed * (10.0 * filling) ** STIFFENS
+    waves = 250.0 * how.copies if how.sound else 0.0
+    return Begun(made, before + (20.0 + 200.0 * len(how.strains) + waves) * float(sides.max()) / (2.0 * math.pi * speed))
+
+
+def _compression(how: Elastic) -> Loading:
+    return Loading("compress", how.rate, how.compress_to, box=how.box)
+
+
+def _at_start(start: Start, forces: Sequence[Force], options: dict[str, Any]) -> Simulation:
+    """A packing in its box without velocity, with a drag.  Raises BadInput if it does not percolate."""
+    grains = start.grains.copy()
+    grains.arrays.velocity[...], grains.arrays.spin[...] = 0.0, 0.0
+    made = Simulation(
+        grains,
+        [*forces, _drag(grains, 1.0)],
+        box=start.box,
+        contacts=start.contacts,
+        deformation=COMPONENTS["deformation"](0.0),
+        frame_every="1 s",
+        **options,
+    )
+    pairs = pairs_in_contact(grains, start.box)[0] if start.contacts is None else start.contacts.pair
+    refuse_no_network(grains.position, np.asarray(pairs, np.int64), start.box)
+    return made
+
+
+def _in_its_box(body: Any, how: Elastic) -> Start:
+    """A packing in the periodic box that it fills.  Raises BadInput."""
     given = body if isinstance(body, Start) else Start(body, None, Box.open(), "")
-    if how.compress_to is not None:
-        loaded = load(given, Loading("compress", how.rate, how.compress_to, box=how.box), forces=forces, **options)
-        given = _start_of(loaded.simulation)
-    elif not given.box.is_open:
+    if not given.box.is_open:
         given = in_box(how, given, "xyz")
     elif how.box is None:
         raise BadInput(
@@ -279,17 +322,14 @@ def packing(body: Any, how: Elastic, forces: Sequence[Force], options: dict[str,
         wrapped = given.grains.copy()
         wrapped.arrays.position[...] = how.box.wrap(given.grains.position).T
         given = Start(wrapped, given.contacts, how.box, given.note)
-    grains = given.grains.copy()
-    grains.arrays.velocity[...], grains.arrays.spin[...] = 0.0, 0.0
-    return given._replace(grains=grains)
+    return given
 
 
-def refuse_no_network(simulation: Simulation) -> None:
-    """Raise BadInput if contacts do not join the grains to their own images along x, y and z."""
-    pairs = np.asarray(simulation.contacts["pair"], np.int64)
+def refuse_no_network(position: np.ndarray, pairs: np.ndarray, box: Box) -> None:
+    """Raise BadInput if contacts (C, 2) do not join grains to their own images along x, y and z."""
     if not len(pairs):
         raise BadInput("the packing has no contacts; compress it first: compress_to = 0.2")
-    found = percolation_axes(simulation.grains.position, pairs, simulation.box).any(axis=0)
+    found = percolation_axes(position, pairs, box).any(axis=0)
     if missing := [axis for axis, one in zip("xyz", found, strict=True) if not one]:
         raise BadInput(
             f"no contacts join the grains to their own images along {', '.join(missing)}, so that the packing does not "
@@ -432,7 +472,7 @@ def _at_rest(simulation: Simulation, changed: float) -> dict[str, float]:
     residual = {f"residual_{axis}": float(stress.total[a, a]) for a, axis in enumerate("xyz")}
     return {
         "grains": len(grains),
-        "filling": 4.0 / 3.0 * math.pi * float((grains.radius**3).sum()) / stress.volume,
+        "filling": filling_factor(grains.radius, simulation.box.lengths),
         "density": _density(simulation),
         "coordination": 2.0 * len(contacts["pair"]) / len(grains),
         "at_limit": _at_limit(simulation),

@@ -121,24 +121,24 @@ def standing_wave(rest: Simulation, wave: Wave, strain: float, stiffest: float) 
 
 
 class Knock(NamedTuple):
-    """Arrival of a pulse."""
+    """A pulse that a knock has sent through a packing."""
 
-    speed: float  # [m/s]
-    misfit: float  # standard deviation of the arrivals from the line, over the time between the first and the last
+    speed: float  # c [m/s]
+    widening: float  # Γ [m²/s]
+    misfit: float  # root of the mean square of what the fit leaves of `passed`
     distances: np.ndarray  # (D,) [m]
-    arrivals: np.ndarray  # (D,) [s]
+    arrivals: np.ndarray  # (D,) times at which half of the momentum has passed [s]; NaN where it does not
     times: np.ndarray  # (T,) [s]
     passed: np.ndarray  # (T, D) momentum beyond the distances, over that of the knock
     drift: float  # energy error
 
 
 def knock(rest: Simulation, wave: Wave, strain: float, expected: float) -> Knock:
-    """Speed of a pulse from a layer across the packing, which gets a velocity, from arrivals over distance.
+    """Speed of a pulse from a layer across the packing, which gets a velocity, from its arrival at several distances.
 
-    Velocities are v exp(−d²/2w²) at the distance d from the layer, w = WIDTH L. The pulse arrives at a distance when half
-    of the momentum of the knock is beyond it, on both sides; a grain counts by a share that rises from 0 to 1 within
-    ± w of the distance. The speed is the slope of distance over arrival, by least squares of the times. The momentum is
-    that of the longest waves: dispersion widens the pulse, but hardly shifts its middle.
+    Velocities are v exp(−d²/2w²) at the distance d from the layer, w = WIDTH L. Seen is the momentum beyond some
+    distances, on both sides of the layer, until the pulses meet; a grain counts by a share that rises from 0 to 1
+    within ± w of a distance. The speed is that of `passed_momentum`, fitted by least squares.
 
     Parameters
     ----------
@@ -147,20 +147,47 @@ def knock(rest: Simulation, wave: Wave, strain: float, expected: float) -> Knock
     strain : float
         v over the speed of the pulse, about.
     expected : float
-        Expected speed [m/s], for the length of the record.
+        Expected speed [m/s], for the length of the record and the start of the fit.
     """
+    from scipy.optimize import least_squares  # slow import
+
     length, mass = _side(rest, wave), rest.grains.mass
     apart = np.abs(rest.box.nearest(rest.grains.position)[:, wave.along])
     distances, profile = DISTANCES * length, np.exp(-0.5 * (apart / (WIDTH * length)) ** 2)
     motion, given = Motion(rest, wave, strain * expected, profile), float(profile @ mass)
     part = np.clip(0.5 + (apart - distances[:, None]) / (2.0 * WIDTH * length), 0.0, 1.0)
     beyond = part * mass / given
-    times = np.linspace(0.0, 0.6 * length / expected, MOMENTS + 1)
+    times = np.linspace(0.0, 0.45 * length / expected, MOMENTS + 1)
     passed = np.array([beyond @ (motion.at(float(time)) + given / _mass(rest)) for time in times])
+
+    def left(logarithms: np.ndarray) -> np.ndarray:
+        speed, widening = np.exp(logarithms)
+        return np.ravel(passed_momentum(times, distances, length, speed, widening) - passed)
+
+    found = least_squares(left, np.log([expected, 0.1 * WIDTH * length * expected]))
+    speed, widening = np.exp(found.x).tolist()
     arrivals = np.array([first_above(times, column, 0.5) for column in passed.T])
-    slope, late = np.polyfit(distances, arrivals, 1)
-    misfit = float(np.std(arrivals - slope * distances - late) / np.ptp(arrivals))
-    return Knock(float(1.0 / slope), misfit, distances, arrivals, times, passed, motion.drift())
+    misfit = float(np.sqrt(np.mean(found.fun**2)))
+    return Knock(speed, widening, misfit, distances, arrivals, times, passed, motion.drift())
+
+
+def passed_momentum(
+    times: np.ndarray, distances: np.ndarray, length: float, speed: float, widening: float
+) -> np.ndarray:
+    """Momentum (T, D) beyond distances from a layer, over that of a knock on it, in a period L.
+
+    Two pulses of Gaussian form run apart with the speed c; scattering and damping widen them, as those of sound in any
+    medium: the variance of a pulse is (1 + 1/3) w² + 2Γt, of which w²/3 is that of the shares of grains. With the normal
+    distribution N, and of the images of the layer those at ± L, it is
+
+        Σ_n N((ct − d + nL)/s) − N((ct − L + d + nL)/s) + N((−ct − d)/s).
+    """
+    from scipy.special import ndtr
+
+    wide = np.sqrt(4.0 / 3.0 * (WIDTH * length) ** 2 + 2.0 * widening * times)[:, None]
+    run, d = speed * times[:, None], distances[None]
+    images = sum(ndtr((run - d + n * length) / wide) - ndtr((run - length + d + n * length) / wide) for n in (-1, 0, 1))
+    return np.asarray(images + ndtr((-run - d) / wide))
 
 
 def first_above(times: np.ndarray, values: np.ndarray, level: float) -> float:
