@@ -81,6 +81,7 @@ def moduli_text(run: dict[str, Any]) -> str:
     static = " and ".join(f"{run[f'speed_{kind}_static']:.3g}" for kind in ("longitudinal", "transverse"))
     sound = f"sound {waves} m/s" if run["waves"] else "sound not measured"
     return (
-        f"filling factor {run['filling']:.3g}, residual pressure {residual}; K {bulk}, G {shear}, linear up to a strain "
-        f"of {run['linear_to']:g}; {sound}, of the moduli {static} m/s; {run['coordination']:.2f} contacts per grain"
+        f"filling factor {run['filling']:.3g}, residual pressure {residual}; K {bulk}, G {shear}, linear up to "
+        f"a strain of {run['linear_to']:g}; {sound}, of the moduli {static} m/s; "
+        f"{run['coordination']:.2f} contacts per grain"
     )

@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.clusters import percolation_axes
 from ..basics.arguments import checked
 from ..basics.box import Box
-from ..basics.errors import BadInput, ErrorCollector, warn
+from ..basics.errors import BadInput, ErrorCollector, naming, warn
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.settings import Flag, List, Number, Reading, Settings, Whole
@@ -115,7 +115,7 @@ class Moduli(NamedTuple):
         return last
 
     def speed(self, polarised: str, of: str) -> float:
-        """Mean speed [m/s] of `of`, "knock" or "standing", waves: "longitudinal" or "transverse"; NaN if there are none."""
+        """Mean speed [m/s] of "longitudinal" or "transverse" waves, `of` a "knock" or "standing"; NaN without waves."""
         found: dict[Wave, float] = self.standing if of == "standing" else {w: k.speed for w, k in self.knocks.items()}
         chosen = [c for wave, c in found.items() if (wave.along == wave.polarised) == (polarised == "longitudinal")]
         return float(np.mean(chosen)) if chosen else math.nan
@@ -153,7 +153,11 @@ class Moduli(NamedTuple):
             for wave, one in self.knocks.items()
         ]
         matrices = {"relaxed": self.relaxed.tolist(), "affine": self.affine.tolist()}
-        return content | matrices | {"table": {name: [row[name] for row in self.table] for name in self.table[0]}, "waves": waves}
+        return (
+            content
+            | matrices
+            | {"table": {name: [row[name] for row in self.table] for name in self.table[0]}, "waves": waves}
+        )
 
 
 def mean_moduli(moduli: np.ndarray) -> dict[str, float]:
@@ -230,7 +234,7 @@ def measure(
     changed = come_to_rest(rest, time, 0.2 * how.accuracy, least)
     springs = contact_springs(rest, contact)
     at_rest = _at_rest(rest, changed)
-    table, relaxed = [], None
+    table, matrices = [], []
     strains = sorted(how.strains)
     for k, strain in enumerate(strains):
         columns = []
@@ -238,7 +242,7 @@ def measure(
             progress(f"strain {strain:g} along {'xyz'[axis]}", 0.1 + 0.6 * (3 * k + axis) / (3 * len(strains)))
             columns.append(strain_both_ways(rest, axis, strain, time, how.accuracy))
         moduli = np.column_stack([one.moduli for one in columns])
-        relaxed = moduli if relaxed is None else relaxed
+        matrices.append(moduli)
         most = {name: max(getattr(one, name) for one in columns) for name in Column._fields[1:]}
         table.append({"strain": strain, **mean_moduli(moduli), **most})
     knocks, standing = {}, {}
@@ -253,7 +257,14 @@ def measure(
             knocks[wave] = knock(free, wave, strains[0], standing[wave])
     volume = rest.box.volume
     return Moduli(
-        rest, at_rest, table, _affine(rest, springs), affine_shear_moduli(springs, volume), relaxed, knocks, standing
+        rest,
+        at_rest,
+        table,
+        _affine(rest, springs),
+        affine_shear_moduli(springs, volume),
+        matrices[0],
+        knocks,
+        standing,
     )
 
 
@@ -275,17 +286,21 @@ def begin(body: Any, how: Elastic, forces: Sequence[Force] | None, options: dict
         made, sides, before = _at_start(start, given, options), np.array(start.box.lengths, float), 0.0
         filling, scales = filling_factor(start.grains.radius, sides), scales_of(start.grains, contact)
     else:
-        planned = plan(body, _compression(how), given)
+        with naming("compress_to"):
+            planned = plan(body, _compression(how), given)
         made, sides, before = simulation_of(planned, given, **options), planned.sides, planned.until
         filling, scales = how.compress_to, planned.scales
         sides = sides * (planned.filling(sides) / filling) ** (1.0 / 3.0)
     speed = WAVE * scales.wave_speed * (10.0 * filling) ** STIFFENS
     waves = 250.0 * how.copies if how.sound else 0.0
-    return Begun(made, before + (20.0 + 200.0 * len(how.strains) + waves) * float(sides.max()) / (2.0 * math.pi * speed))
+    return Begun(
+        made, before + (20.0 + 200.0 * len(how.strains) + waves) * float(sides.max()) / (2.0 * math.pi * speed)
+    )
 
 
 def _compression(how: Elastic) -> Loading:
-    return Loading("compress", how.rate, how.compress_to, box=how.box)
+    with naming("compress_to"):
+        return Loading("compress", how.rate, how.compress_to, box=how.box)
 
 
 def _at_start(start: Start, forces: Sequence[Force], options: dict[str, Any]) -> Simulation:
@@ -328,12 +343,12 @@ def _in_its_box(body: Any, how: Elastic) -> Start:
 def refuse_no_network(position: np.ndarray, pairs: np.ndarray, box: Box) -> None:
     """Raise BadInput if contacts (C, 2) do not join grains to their own images along x, y and z."""
     if not len(pairs):
-        raise BadInput("the packing has no contacts; compress it first: compress_to = 0.2")
-    found = percolation_axes(position, pairs, box).any(axis=0)
-    if missing := [axis for axis, one in zip("xyz", found, strict=True) if not one]:
+        raise BadInput("the packing has no contacts; compress it first, with compress_to")
+    found = percolation_axes(position, pairs, box)
+    if missing := [axis for k, axis in enumerate("xyz") if not found[:, k].any()]:
         raise BadInput(
             f"no contacts join the grains to their own images along {', '.join(missing)}, so that the packing does not "
-            "resist a strain; compress it further: compress_to = 0.2"
+            "resist a strain; give a box that it fills, or compress it, with compress_to"
         )
 
 
@@ -366,7 +381,9 @@ def strain_both_ways(rest: Simulation, axis: int, strain: float, time: float, ac
             break
         before, held = moduli, 2.0 * held
     limits = max(_at_limit(each) for each in pair)
-    made, broken = (max(each.ledger.rows[-1][name] - rest.ledger.rows[-1][name] for each in pair) for name in ("made", "broken"))
+    made, broken = (
+        max(each.ledger.rows[-1][name] - rest.ledger.rows[-1][name] for each in pair) for name in ("made", "broken")
+    )
     for each in pair:
         _stretch(each, axis, length, time)
         each.run(until=each.time + held)

@@ -43,7 +43,10 @@ def _arrivals(runs: Sequence[dict[str, Any]]) -> Panel:
     curves, guides = [], []
     for kind in ("longitudinal", "transverse"):
         waves = [w for run in runs for w in run["waves"] if (w["along"] == w["polarised"]) == (kind == "longitudinal")]
-        times, distances = (1e9 * np.array([w["arrivals"] for w in waves]), 1e6 * np.array([w["distances"] for w in waves]))
+        times, distances = (
+            1e9 * np.array([w["arrivals"] for w in waves]),
+            1e6 * np.array([w["distances"] for w in waves]),
+        )
         curves.append(Curve(kind, times.mean(axis=0), distances.mean(axis=0)))
         speed = float(np.mean([run[f"speed_{kind}_static"] for run in runs]))
         ends = np.array([0.0, distances.max()])

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..basics.box import Box
 from ..basics.errors import BadInput
-from ..engine.changed_state import subset
+from ..basics.grains import Grains
 from ..setup.from_frame import Start
 from ..simulation.simulation import Simulation
 
@@ -21,7 +21,7 @@ FINER = 1.05
 """Factor between the moments at which a standing wave is looked at."""
 LATEST = 300.0
 """Time over that of the affine wave after which a standing wave must have turned."""
-MOMENTS = 120
+MOMENTS = 60
 """Moments at which a pulse is looked at."""
 
 
@@ -31,11 +31,14 @@ def repeated(start: Start, axis: int, number: int) -> Start:
     lengths: Any = list(box.lengths)
     length = lengths[axis]
     copies = np.repeat(np.arange(number), count)
-    many = subset(grains, np.tile(np.arange(count), number))
-    many.arrays.id[...] = np.arange(count * number)
     position = np.tile(box.wrap(grains.position), (number, 1))
     position[:, axis] += (copies - 0.5 * (number - 1)) * length
-    many.arrays.position[...] = position.T
+    vectors: dict[str, Any] = {
+        name: np.tile(getattr(grains, name), (number, 1)) for name in ("velocity", "spin", "moment")
+    }
+    scalars: dict[str, Any] = {name: np.tile(getattr(grains, name), number) for name in ("charge", "mass")}
+    materials = [grains.materials[k] for k in grains.material] * number
+    many = Grains(position, np.tile(grains.radius, number), materials, **vectors, **scalars)
     lengths[axis] = number * length
     if contacts is not None:
         apart = position[contacts.pair[:, 0]] - position[contacts.pair[:, 1]]  # of the first copy
@@ -77,7 +80,9 @@ class Motion:
         for sign in (1.0, -1.0):
             each = rest.copy()
             with each.change() as change:
-                change.velocity[:, wave.polarised] += sign * speed * (profile - profile @ rest.grains.mass / _mass(rest))
+                change.velocity[:, wave.polarised] += (
+                    sign * speed * (profile - profile @ rest.grains.mass / _mass(rest))
+                )
             self.pair.append(each)
 
     def at(self, time: float) -> np.ndarray:
@@ -177,17 +182,17 @@ def passed_momentum(
     """Momentum (T, D) beyond distances from a layer, over that of a knock on it, in a period L.
 
     Two pulses of Gaussian form run apart with the speed c; scattering and damping widen them, as those of sound in any
-    medium: the variance of a pulse is (1 + 1/3) w² + 2Γt, of which w²/3 is that of the shares of grains. With the normal
-    distribution N, and of the images of the layer those at ± L, it is
+    medium: the variance of a pulse is (1 + 1/3) w² + 2Γt, of which w²/3 is that of the shares of grains. With the
+    normal distribution N, and the images of the layer at ± L, it is
 
-        Σ_n N((ct − d + nL)/s) − N((ct − L + d + nL)/s) + N((−ct − d)/s).
+        Σ_n N((ct − d + nL)/s) − N((ct − L + d + nL)/s).
     """
     from scipy.special import ndtr
 
     wide = np.sqrt(4.0 / 3.0 * (WIDTH * length) ** 2 + 2.0 * widening * times)[:, None]
     run, d = speed * times[:, None], distances[None]
-    images = sum(ndtr((run - d + n * length) / wide) - ndtr((run - length + d + n * length) / wide) for n in (-1, 0, 1))
-    return np.asarray(images + ndtr((-run - d) / wide))
+    images = (ndtr((run - d + n * length) / wide) - ndtr((run - length + d + n * length) / wide) for n in (-1, 0, 1))
+    return np.asarray(sum(images))
 
 
 def first_above(times: np.ndarray, values: np.ndarray, level: float) -> float:

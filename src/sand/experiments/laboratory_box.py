@@ -15,6 +15,7 @@ from ..contact.model import Contact
 from ..setup.from_frame import Start
 
 if TYPE_CHECKING:
+    from .elastic import Elastic
     from .laboratory import Loading, Plan
 
 LOST = "lost_box"
@@ -23,7 +24,7 @@ GAP = 0.1
 """Gap between a body and its image in the box that just holds it, in radii."""
 
 
-def in_box(loading: Loading, body: Start, axes: str) -> Start:
+def in_box(loading: Loading | Elastic, body: Start, axes: str) -> Start:
     """A packing in a box that is periodic along these axes: that of its frame, or a body in a box that holds it.
 
     Raises
