@@ -12,12 +12,9 @@ import numpy as np
 from ..analysis.clusters import percolation_axes
 from ..basics.arguments import checked
 from ..basics.box import Box
-from ..basics.errors import BadInput, ErrorCollector, naming, warn
-from ..basics.grains import Grains
-from ..basics.initial_pairs import StrainedContacts
+from ..basics.errors import BadInput, ErrorCollector, naming
 from ..basics.settings import Flag, List, Number, Reading, Settings, Whole
 from ..config.case import COMPONENTS
-from ..contact.law import contact_constants
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.gas import Gas
@@ -25,18 +22,26 @@ from ..integrate.integrator import Integrator
 from ..setup.checks import pairs_in_contact
 from ..setup.from_frame import Start
 from ..simulation.simulation import Simulation
-from ..theory.elastic import ContactSprings, affine_moduli, affine_shear_moduli
+from ..theory.elastic import affine_shear_moduli
+from .elastic_strain import (
+    Column,
+    affine_of,
+    come_to_rest,
+    contact_springs,
+    density_of,
+    drag,
+    start_of,
+    state_at_rest,
+    strain_both_ways,
+    without_drag,
+)
 from .elastic_waves import Knock, Wave, knock, repeated, standing_wave
 from .job import ignored
-from .laboratory import BOX, Loading, contact_of, filling_factor, plan, read_rate, run_to_end, scales_of, simulation_of
+from .laboratory import BOX, Loading, contact_of, filling_factor, plan, read_rate, run_to_end, simulation_of
 from .laboratory_box import in_box
 
-AT_LIMIT = 1.0 - 1e-6
-"""Share of the limit of sliding, rolling or twisting above which a contact counts as one that slips."""
-DOUBLINGS = 9
-"""How often the time in which a packing comes to rest is doubled, at most."""
-WAVE, STIFFENS = 0.36, 2.3
-"""Speed of sound over √(3E_roll/(r³ρ)) at φ = 0.1, and its exponent of φ, by which the cost is estimated (ice)."""
+WAVE, STIFFENS = 0.005, 2.3
+"""Speed of sound over √(E/ρ) of the solid at φ = 0.1, and its exponent of φ, by which the cost is estimated."""
 LINEAR = 0.05
 """Largest change of the bulk modulus from that of the smallest strain in the linear range."""
 
@@ -97,22 +102,29 @@ class Moduli(NamedTuple):
 
     rest: Simulation  # the packing at rest
     at_rest: dict[str, float]  # filling factor, residual stress, …
-    table: list[dict[str, float]]  # a row for each strain, in increasing order
+    strains: list[float]  # in increasing order
+    columns: list[list[Column]]  # responses to each strain along x, y, z
     affine: np.ndarray  # (3, 3) C_ab [Pa] of affine motion
     affine_shear: np.ndarray  # (3, 3) [Pa]
-    relaxed: np.ndarray  # (3, 3) C_ab = −dP_aa/dε_b [Pa] at the smallest strain
     knocks: dict[Wave, Knock]
     standing: dict[Wave, float]  # phase speeds of standing waves [m/s]
 
     @property
+    def relaxed(self) -> np.ndarray:
+        """C_ab = −dP_aa/dε_b (3, 3) [Pa] at the smallest strain."""
+        return matrix_of(self.columns[0])
+
+    @property
+    def table(self) -> list[dict[str, float]]:
+        """A row for each strain: means of the moduli, and the largest values of all else."""
+        most = [{name: max(getattr(one, name) for one in each) for name in Column._fields[1:]} for each in self.columns]
+        rows = zip(self.strains, self.columns, most, strict=True)
+        return [{"strain": strain, **mean_moduli(matrix_of(each)), **other} for strain, each, other in rows]
+
+    @property
     def linear_to(self) -> float:
         """Largest strain up to which the bulk modulus is that of the smallest one within LINEAR."""
-        first, last = self.table[0]["bulk"], self.table[0]["strain"]
-        for row in self.table:
-            if abs(row["bulk"] / first - 1.0) > LINEAR:
-                break
-            last = row["strain"]
-        return last
+        return linear_range([(row["strain"], row["bulk"]) for row in self.table])
 
     def speed(self, polarised: str, of: str) -> float:
         """Mean speed [m/s] of "longitudinal" or "transverse" waves, `of` a "knock" or "standing"; NaN without waves."""
@@ -152,12 +164,23 @@ class Moduli(NamedTuple):
             }
             for wave, one in self.knocks.items()
         ]
-        matrices = {"relaxed": self.relaxed.tolist(), "affine": self.affine.tolist()}
-        return (
-            content
-            | matrices
-            | {"table": {name: [row[name] for row in self.table] for name in self.table[0]}, "waves": waves}
-        )
+        matrices, table = {"relaxed": self.relaxed.tolist(), "affine": self.affine.tolist()}, self.table
+        return content | matrices | {"table": {name: [row[name] for row in table] for name in table[0]}, "waves": waves}
+
+
+def matrix_of(columns: Sequence[Column]) -> np.ndarray:
+    """C_ab (3, 3) [Pa] of the responses to strains along x, y and z."""
+    return np.column_stack([one.moduli for one in columns])
+
+
+def linear_range(moduli: Sequence[tuple[float, float]]) -> float:
+    """Largest of some increasing strains up to which the modulus is that of the first one within LINEAR."""
+    last = moduli[0][0]
+    for strain, modulus in moduli:
+        if abs(modulus / moduli[0][1] - 1.0) > LINEAR:
+            break
+        last = strain
+    return last
 
 
 def mean_moduli(moduli: np.ndarray) -> dict[str, float]:
@@ -222,50 +245,37 @@ def measure(
         progress("compressing", 0.0)
         planned = plan(body, _compression(how), given)
         loaded = run_to_end(planned, simulation_of(planned, given, **options))
-        rest = _at_start(_start_of(loaded.simulation), given, options)
+        rest = _at_start(start_of(loaded.simulation), given, options)
     progress("coming to rest", 0.05)
     springs = contact_springs(rest, contact)
-    stiffest = math.sqrt(np.diag(_affine(rest, springs)).max() / _density(rest))
-    slowed = standing_wave(_without_drag(rest), Wave(0, 0), how.strains[0], stiffest)
+    stiffest = math.sqrt(np.diag(affine_of(rest, springs)).max() / density_of(rest))
+    slowed = standing_wave(without_drag(rest), Wave(0, 0), min(how.strains), stiffest)
     time = float(rest.box.lengths[0] or 0.0) / (2.0 * math.pi * slowed)
     with rest.change() as change:
-        change.replace(_drag(rest.grains, time))
-    least = min(how.strains) * _density(rest) * stiffest**2
+        change.replace(drag(rest.grains, time))
+    least = min(how.strains) * density_of(rest) * stiffest**2
     changed = come_to_rest(rest, time, 0.2 * how.accuracy, least)
     springs = contact_springs(rest, contact)
-    at_rest = _at_rest(rest, changed)
-    table, matrices = [], []
+    at_rest = state_at_rest(rest, changed)
     strains = sorted(how.strains)
+    columns: list[list[Column]] = []  # for each strain those of the axes
     for k, strain in enumerate(strains):
-        columns = []
-        for axis in range(3):
-            progress(f"strain {strain:g} along {'xyz'[axis]}", 0.1 + 0.6 * (3 * k + axis) / (3 * len(strains)))
-            columns.append(strain_both_ways(rest, axis, strain, time, how.accuracy))
-        moduli = np.column_stack([one.moduli for one in columns])
-        matrices.append(moduli)
-        most = {name: max(getattr(one, name) for one in columns) for name in Column._fields[1:]}
-        table.append({"strain": strain, **mean_moduli(moduli), **most})
+        columns.append([])
+        for axis, name in enumerate("xyz"):
+            progress(f"strain {strain:g} along {name}", 0.1 + 0.2 * (3 * k + axis) / len(strains))
+            columns[k].append(strain_both_ways(rest, axis, strain, time, how.accuracy))
     knocks, standing = {}, {}
-    for axis in range(3 if how.sound else 0):
-        many = repeated(_start_of(rest), axis, how.copies)
+    for axis, name in enumerate("xyz" if how.sound else ""):
+        progress(f"waves along {name}", 0.7 + 0.1 * axis)
+        many = repeated(start_of(rest), axis, how.copies)
         free = Simulation(
             many.grains, given, box=many.box, contacts=many.contacts, frame_every="1 s", stepping=stepping, seed=seed
         )
         for wave in (Wave(axis, axis), Wave(axis, (axis + 1) % 3)):
-            progress(f"waves along {'xyz'[axis]}", 0.7 + 0.1 * axis)
             standing[wave] = standing_wave(free, wave, strains[0], stiffest)
             knocks[wave] = knock(free, wave, strains[0], standing[wave])
-    volume = rest.box.volume
-    return Moduli(
-        rest,
-        at_rest,
-        table,
-        _affine(rest, springs),
-        affine_shear_moduli(springs, volume),
-        matrices[0],
-        knocks,
-        standing,
-    )
+    affine, shear = affine_of(rest, springs), affine_shear_moduli(springs, rest.box.volume)
+    return Moduli(rest, at_rest, strains, columns, affine, shear, knocks, standing)
 
 
 class Begun(NamedTuple):
@@ -278,24 +288,22 @@ class Begun(NamedTuple):
 def begin(body: Any, how: Elastic, forces: Sequence[Force] | None, options: dict[str, Any]) -> Begun:
     """The packing in its box, or its compression, and how long all takes.  Raises BadInput."""
     given = list(forces or [Contact()])
-    contact = contact_of(given)
+    contact_of(given)
     if any(isinstance(force, Gas) for force in given):
         raise BadInput("forces: grains are brought to rest by a drag of its own; leave gas out")
     if how.compress_to is None:
         start = _in_its_box(body, how)
-        made, sides, before = _at_start(start, given, options), np.array(start.box.lengths, float), 0.0
-        filling, scales = filling_factor(start.grains.radius, sides), scales_of(start.grains, contact)
+        made, lengths, before = _at_start(start, given, options), np.array(start.box.lengths, float), 0.0
+        filling = filling_factor(start.grains.radius, lengths)
     else:
         with naming("compress_to"):
             planned = plan(body, _compression(how), given)
-        made, sides, before = simulation_of(planned, given, **options), planned.sides, planned.until
-        filling, scales = how.compress_to, planned.scales
-        sides = sides * (planned.filling(sides) / filling) ** (1.0 / 3.0)
-    speed = WAVE * scales.wave_speed * (10.0 * filling) ** STIFFENS
-    waves = 250.0 * how.copies if how.sound else 0.0
-    return Begun(
-        made, before + (20.0 + 200.0 * len(how.strains) + waves) * float(sides.max()) / (2.0 * math.pi * speed)
-    )
+        made, filling, before = simulation_of(planned, given, **options), how.compress_to, planned.until
+        lengths = planned.sides * (planned.filling(planned.sides) / filling) ** (1.0 / 3.0)
+    solid = made.grains.materials[0]
+    speed = WAVE * math.sqrt(solid.young_modulus / solid.density) * (10.0 * filling) ** STIFFENS
+    number = 20.0 + 200.0 * len(how.strains) + (250.0 * how.copies if how.sound else 0.0)
+    return Begun(made, before + number * float(lengths.max()) / (2.0 * math.pi * speed))
 
 
 def _compression(how: Elastic) -> Loading:
@@ -309,7 +317,7 @@ def _at_start(start: Start, forces: Sequence[Force], options: dict[str, Any]) ->
     grains.arrays.velocity[...], grains.arrays.spin[...] = 0.0, 0.0
     made = Simulation(
         grains,
-        [*forces, _drag(grains, 1.0)],
+        [*forces, drag(grains, 1.0)],
         box=start.box,
         contacts=start.contacts,
         deformation=COMPONENTS["deformation"](0.0),
@@ -350,154 +358,3 @@ def refuse_no_network(position: np.ndarray, pairs: np.ndarray, box: Box) -> None
             f"no contacts join the grains to their own images along {', '.join(missing)}, so that the packing does not "
             "resist a strain; give a box that it fills, or compress it, with compress_to"
         )
-
-
-class Column(NamedTuple):
-    """Response to a small strain of the box along one axis."""
-
-    moduli: np.ndarray  # (3,) −dP_aa/dε [Pa]
-    changed: float  # relative change of these in the second half of the time
-    unrecovered: float  # what stays of the change of stress when the box is as before, over the change
-    at_limit: int  # largest number of contacts at a limit
-    made: int
-    broken: int
-    drift: float  # energy error over the kinetic and elastic energy
-
-
-def strain_both_ways(rest: Simulation, axis: int, strain: float, time: float, accuracy: float) -> Column:
-    """Strain two copies of a packing by ± ε, read the stress when they are at rest, and return.
-
-    The moduli are −(P(+ε) − P(−ε))/2ε: what goes on without a strain is in both, and cancels.
-    """
-    pair, length = [rest.copy(), rest.copy()], float(rest.box.lengths[axis] or 0.0)
-    for each, sign in zip(pair, (1.0, -1.0), strict=True):
-        _stretch(each, axis, length * (1.0 + sign * strain), time)
-    begun, held, before, moduli, changed = pair[0].time, 4.0 * time, None, np.zeros(3), math.inf
-    for _ in range(DOUBLINGS):
-        for each in pair:
-            each.run(until=begun + held)
-        moduli = -(_pressure(pair[0]) - _pressure(pair[1])) / (2.0 * strain)
-        if before is not None and (changed := _change(moduli, before)) < accuracy:
-            break
-        before, held = moduli, 2.0 * held
-    limits = max(_at_limit(each) for each in pair)
-    made, broken = (
-        max(each.ledger.rows[-1][name] - rest.ledger.rows[-1][name] for each in pair) for name in ("made", "broken")
-    )
-    for each in pair:
-        _stretch(each, axis, length, time)
-        each.run(until=each.time + held)
-    left = np.abs(_pressure(pair[0]) - _pressure(pair[1])).max() / (2.0 * strain * np.abs(moduli).max())
-    drift = max(abs(each.ledger.drift) for each in pair)
-    return Column(moduli, changed, float(left), limits, int(made), int(broken), drift)
-
-
-def come_to_rest(simulation: Simulation, time: float, accuracy: float, least: float) -> float:
-    """Run until the stress changes by less than `accuracy`, or `least` [Pa], while the time is doubled.
-
-    Returns the last change [Pa]. Warns if it is still larger after DOUBLINGS.
-    """
-    before, held, start = _pressure(simulation), 4.0 * time, simulation.time
-    for _ in range(DOUBLINGS):
-        simulation.run(until=start + held)
-        now = _pressure(simulation)
-        changed = float(np.abs(now - before).max())
-        if changed < max(accuracy * np.abs(now).max(), least):
-            return changed
-        before, held = now, 2.0 * held
-    warn(f"the packing is not at rest after {simulation.time:.3g} s: its stress still changes by {changed:.3g} Pa")
-    return changed
-
-
-def contact_springs(simulation: Simulation, contact: Contact) -> ContactSprings:
-    """The contacts of a packing and their springs, with the present normal stiffness of the contact law."""
-    table, grains, law = simulation.contacts, simulation.grains, contact.contact_law
-    pair = np.asarray(table["pair"], np.int64)
-    constants_of, stiffness = contact_constants(law), np.zeros((2, len(pair)))
-    materials = [grains.materials[k] for k in grains.material]
-    for c, (i, j) in enumerate(pair.tolist()):
-        numbers = (float(value) for value in (*grains.radius[[i, j]], *grains.mass[[i, j]]))
-        constants, overlap = constants_of(contact.pairing(materials[i], materials[j]), *numbers), table["overlap"][c]
-        root = law.radius_root(overlap, constants)
-        stiffness[:, c] = law.stiffness(overlap, root, constants), constants.slide_stiffness
-        if contact.stiffness == "dt97":
-            stiffness[1, c] *= root * root
-    branch = simulation.box.nearest(grains.position[pair[:, 0]] - grains.position[pair[:, 1]])
-    vectors = table["slide_vector"], table["roll_vector"]
-    return ContactSprings(branch, grains.radius[pair], *vectors, table["normal_force"], *stiffness)
-
-
-def _start_of(simulation: Simulation) -> Start:
-    """Grains, contacts and box of a simulation, as the start of another one."""
-    table = simulation.contacts
-    bonds = (np.array(table[name]) for name in ("slide_vector", "roll_vector", "twist"))
-    pair = np.asarray(table["pair"], np.int64)
-    return Start(simulation.grains.copy(), StrainedContacts(pair, *bonds), simulation.box, "")
-
-
-def _drag(grains: Grains, time: float) -> Gas:
-    """A drag by which the velocity of the quickest grain to stop falls to 1/e in a time [s]."""
-    unit = Gas(300.0, density=1.0, brownian=False, cross_section=1e-40)
-    return Gas(300.0, density=unit.shortest_time(grains) / time, brownian=False, cross_section=1e-40)
-
-
-def _without_drag(simulation: Simulation) -> Simulation:
-    free = simulation.copy()
-    with free.change() as change:
-        change.forces = tuple(force for force in change.forces if not isinstance(force, Gas))
-    return free
-
-
-def _stretch(simulation: Simulation, axis: int, length: float, time: float) -> None:
-    """Bring a side of the box to a length [m] in a time [s], by a constant velocity."""
-    rates = np.zeros(3)
-    rates[axis] = (length / float(simulation.box.lengths[axis] or 1.0) - 1.0) / time
-    deformation = COMPONENTS["deformation"]
-    for each, ends in ((deformation(tuple(rates), law="linear"), simulation.time + time), (deformation(0.0), None)):
-        with simulation.change() as change:
-            change.deformation = each
-        if ends is not None:
-            simulation.run(until=ends)
-
-
-def _pressure(simulation: Simulation) -> np.ndarray:
-    return np.diag(simulation.stress().total).copy()
-
-
-def _change(now: np.ndarray, before: np.ndarray) -> float:
-    return float(np.abs(now - before).max() / np.abs(now).max())
-
-
-def _density(simulation: Simulation) -> float:
-    return float(simulation.grains.mass.sum()) / simulation.box.volume
-
-
-def _affine(simulation: Simulation, springs: ContactSprings) -> np.ndarray:
-    pressure = np.diag(simulation.stress().parts["contacts"])
-    return affine_moduli(springs, pressure, simulation.box.volume)
-
-
-def _at_limit(simulation: Simulation) -> int:
-    shares = [simulation.contacts[name] for name in ("slide_share", "roll_share", "twist_share")]
-    return int((np.max(shares, axis=0) > AT_LIMIT).sum())
-
-
-def _at_rest(simulation: Simulation, changed: float) -> dict[str, float]:
-    """What describes the packing at rest."""
-    stress, grains, contacts = simulation.stress(), simulation.grains, simulation.contacts
-    kinetic = float(stress.parts["kinetic"].trace()) * stress.volume / 2.0
-    residual = {f"residual_{axis}": float(stress.total[a, a]) for a, axis in enumerate("xyz")}
-    return {
-        "grains": len(grains),
-        "filling": filling_factor(grains.radius, simulation.box.lengths),
-        "density": _density(simulation),
-        "coordination": 2.0 * len(contacts["pair"]) / len(grains),
-        "at_limit": _at_limit(simulation),
-        "residual": stress.pressure,
-        **residual,
-        "residual_change": changed,
-        "kinetic": kinetic,
-        "time": simulation.time,
-        "steps": simulation.steps,
-        "drift": simulation.ledger.drift,
-    }

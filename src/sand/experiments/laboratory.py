@@ -217,12 +217,6 @@ def contact_of(forces: Sequence[Force] | None) -> Contact:
     return contact
 
 
-def scales_of(grains: Grains, contact: Contact) -> PackingScales:
-    """Scales of a packing, of its mean radius and the material of its first grain."""
-    settings = {name: getattr(contact, name) for name in ("roll_factor", "rolling_limit", "surface_energy_factor")}
-    return packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **settings)
-
-
 def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None = None) -> Plan:
     """Place a body in a box, or between walls.
 
@@ -248,7 +242,8 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
     refuse_pieces(given.grains, np.asarray(pairs, np.int64), given.box, "the body")
     way, grains = _way(loading), given.grains
     start, sides = way.placed(loading, given, contact)
-    scales = scales_of(grains, contact)
+    settings = {name: getattr(contact, name) for name in ("roll_factor", "rolling_limit", "surface_energy_factor")}
+    scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **settings)
     unit = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}[loading.rate.unit]
     found = Plan(loading, start, {}, sides, loading.rate.value / unit, 0.0, 0.0, scales)
     filling = found.filling(sides)

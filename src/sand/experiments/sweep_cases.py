@@ -313,9 +313,9 @@ class SweptElastic(SweptLoading):
         return Expected(_without_figure(cost), cost.memory, 0.0)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
-        """Measure the packing; what depends on the strain or on the distance is left out."""
+        """Measure the packing; its waves and matrices are left out."""
         found = measured(self.case, seed, observers)
-        return {name: value for name, value in found.items() if not isinstance(value, (list, dict))}
+        return {name: value for name, value in found.items() if name == TABLE or not isinstance(value, list)}
 
 
 def _resumed(folder: Path | None, make: Callable[[], Any]) -> Any:
