@@ -333,7 +333,7 @@ def _in_its_box(body: Any, how: Elastic) -> Start:
     """A packing in the periodic box that it fills.  Raises BadInput."""
     given = body if isinstance(body, Start) else Start(body, None, Box.open(), "")
     if not given.box.is_open:
-        given = in_box(how, given, "xyz")
+        given = in_box(how.box, given, "xyz")
     elif how.box is None:
         raise BadInput(
             "box: the aggregate fills no periodic box, and a free body has no modulus; give compress_to, the filling "

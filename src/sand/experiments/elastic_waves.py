@@ -183,7 +183,7 @@ def passed_momentum(
 
     Two pulses of Gaussian form run apart with the speed c; scattering and damping widen them, as those of sound in any
     medium: the variance of a pulse is (1 + 1/3) w² + 2Γt, of which w²/3 is that of the shares of grains. With the
-    normal distribution N, and the images of the layer at ± L, it is
+    normal distribution N, until the pulses meet, n = 0, 1, it is
 
         Σ_n N((ct − d + nL)/s) − N((ct − L + d + nL)/s).
     """
@@ -191,7 +191,7 @@ def passed_momentum(
 
     wide = np.sqrt(4.0 / 3.0 * (WIDTH * length) ** 2 + 2.0 * widening * times)[:, None]
     run, d = speed * times[:, None], distances[None]
-    images = (ndtr((run - d + n * length) / wide) - ndtr((run - length + d + n * length) / wide) for n in (-1, 0, 1))
+    images = (ndtr((run - d + n * length) / wide) - ndtr((run - length + d + n * length) / wide) for n in (0, 1))
     return np.asarray(sum(images))
 
 
