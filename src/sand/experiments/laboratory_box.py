@@ -43,7 +43,7 @@ def in_box(box: Box | None, body: Start, axes: str) -> Start:
     reach = grains.radius[:, None]
     low, high = (grains.position - reach).min(axis=0), (grains.position + reach).max(axis=0)
     cube = float((high - low).max()) + GAP * float(grains.radius.mean())
-    lengths = [cube, cube, cube] if box is None else list(box.lengths)
+    lengths: list[Any] = [cube, cube, cube] if box is None else list(box.lengths)
     for k, axis in enumerate("xyz"):
         if axis not in axes:
             lengths[k] = None
