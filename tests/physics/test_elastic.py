@@ -44,7 +44,7 @@ def test_crystals():
         np.testing.assert_allclose(found.affine, expected, rtol=0, atol=1e-9 * c11)
         np.testing.assert_allclose(found.relaxed, expected, rtol=0, atol=3e-8 * c11)
         row, content = found.table[0], found.to_dict()
-        assert row["unrecovered"] < 1e-7 and row["made"] == row["broken"] == row["at_limit"] == 0
+        assert row["unrecovered"] < 1e-7 and row["made"] == row["broken"] == row["at_limit_strained"] == 0
         assert content["bulk"] == pytest.approx((own + 2 * other) / 3, rel=1e-7, abs=0)
         assert content["shear"] == pytest.approx((own - other) / 2, rel=1e-7, abs=0)
         assert abs(content["residual"]) < 1e-9 * c11 and content["anisotropy"] < 1e-7
@@ -131,7 +131,7 @@ def test_a_disordered_packing_against_its_stiffness_matrix():
     found = moduli_of(sim, strains=[1e-6], accuracy=1e-3)
     assert found.affine[0, 0] > 1.2 * expected[0, 0]
     np.testing.assert_allclose(found.relaxed, expected, rtol=0, atol=2e-3 * expected.max())
-    assert found.table[0]["at_limit"] == 0 and found.table[0]["unrecovered"] < 2e-3
+    assert found.table[0]["at_limit_strained"] == 0 and found.table[0]["unrecovered"] < 2e-3
 
 
 def chain(number):

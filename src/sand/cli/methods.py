@@ -212,9 +212,9 @@ def _of_loading(folder: Path, path: Path) -> Sentences:
 
     case = check_laboratory(files.read_toml(path), str(path))
     runs = _content(folder / files.LABORATORY).get("runs", [])
-    seeds = case.section.seeds
+    seeds, done = case.section.seeds, "measured at rest" if case.section.kind == "elastic" else "loaded"
     yield (
-        f"Packings that differ by the seed alone were loaded, seeds {_seeds(seeds)}; {len(runs)} of {len(seeds)} runs "
+        f"Packings that differ by the seed alone were {done}, seeds {_seeds(seeds)}; {len(runs)} of {len(seeds)} runs "
         "are finished."
     )
     yield from _loading(case)

@@ -31,10 +31,10 @@ class Column(NamedTuple):
     moduli: np.ndarray  # (3,) −dP_aa/dε [Pa]
     changed: float  # relative change of these in the second half of the time
     unrecovered: float  # what stays of the change of stress when the box is as before, over the change
-    at_limit: int  # largest number of contacts at a limit
+    at_limit_strained: int  # largest number of contacts at a limit
     made: int
     broken: int
-    drift: float  # energy error over the kinetic and elastic energy
+    drift_strained: float  # energy error, see `Ledger.drift`
 
 
 def strain_both_ways(rest: Simulation, axis: int, strain: float, time: float, accuracy: float) -> Column:

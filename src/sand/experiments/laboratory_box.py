@@ -55,7 +55,7 @@ def in_box(box: Box | None, body: Start, axes: str) -> Start:
                 f"box: {given} along {axis} is less than the body, {needed}; give a larger box, or leave it out"
             )
     grains.arrays.position[...] -= (0.5 * (low + high))[:, None]
-    return Start(grains, body.contacts, Box(tuple(lengths)), body.note)  # type: ignore[arg-type]
+    return Start(grains, body.contacts, Box(tuple(lengths)), body.note)
 
 
 def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.ndarray]:
