@@ -35,7 +35,7 @@ def run_case(path: Path) -> Description:
 
     case = read_case(path)
     if case.grains.kind == "given":
-        rows = [("grains", f"{case.grains.number}, from a script"), ("box", case.box.periodic.describe())]
+        rows = [("grains", f"{case.grains.number}, from a script"), ("box", case.box.space.describe())]
         return "the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
     with naming(path):
         simulation = simulation_of(case, None)

@@ -136,9 +136,7 @@ def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     yield f"The initial state was {count}, {origin}: {section(grains, 'kind', 'number', 'classes')}."
     for one in grains.classes:
         yield f"A class of its members had: {settings(one)}."
-    where = (
-        "open space" if case.box.periodic is None else f"a box, {case.box.periodic.describe().replace(' um', ' µm')}"
-    )
+    where = "open space" if case.box.space is None else f"a box, {case.box.space.describe().replace(' um', ' µm')}"
     yield f"They moved in {where}."
     used = _names(grains.material) + [name for one in grains.classes for name in _names(one.material)]
     yield from _common(case, [*used, *case.materials], results, case.forces.build())

@@ -94,6 +94,18 @@ class BoxSection(Section):
 
     periodic: Annotated[Any, Reading(_box)] = None
     """Length of a cube or list of three lengths [m], "open" for an open axis; none: open space."""
+    tilt: Annotated[Any, Number("m")] = None
+    """Displacement [m] along x of the image one length beyond along z, as shear leaves it."""
+
+    def contradictions(self) -> Iterator[str]:
+        """A tilt of a box that is not periodic along all axes."""
+        if self.tilt and (self.periodic is None or None in self.periodic.lengths):
+            yield "tilt is for a box that is periodic along x, y and z; leave it out"
+
+    @property
+    def space(self) -> Any:
+        """The box; None for open space."""
+        return self.periodic and Box(self.periodic.lengths, self.tilt or 0.0)
 
 
 @with_keys(Material, "name", optional=True)

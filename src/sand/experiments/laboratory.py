@@ -33,7 +33,7 @@ WAYS = ("box", "walls")
 """By what a packing is loaded: its periodic box, or one of two walls. The functions of each are in laboratory_WAY."""
 OF_STATE = (
     *("contacts", "made", "moved", "broken", "clusters", "translation", "rotation"),
-    *("normal", "sliding", "rolling", "twisting", "total"),
+    *("normal", "sliding", "rolling", "twisting", "total", "tilt"),
 )
 """Columns of the ledger that the table repeats, besides pressures and losses."""
 
@@ -91,11 +91,12 @@ class Loading(Settings):
         Where it ends: of "compress" a filling factor φ, at most 0.74; of "stretch" the strain L/L₀ − 1, and of "shear"
         the strain, the distance that the faces have slid over the distance between them.
     by : str, optional
-        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y; "shear"
-        needs walls.
+        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y. "shear"
+        slides the images above and below along x, or the lid.
     along : str, optional
         Axis of the strain, "x", "y" or "z"; "all" for equal strains of a box that is compressed. "auto", the default:
-        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear moves the lid along x.
+        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear is along x, and grows
+        along z.
     box : float or str or sequence, optional
         Sides of the box at the start [m], one or three; between walls those along x and y count. By default those of a
         frame, or of a cube that holds the body with a gap of a tenth of a radius.
@@ -123,9 +124,6 @@ class Loading(Settings):
         if not {"kind", "to"} & wrong and self.kind == "compress" and self.to > CLOSEST:
             yield f"to = {self.to:g} is above {CLOSEST}, the filling factor of the closest packing of equal grains"
         if wrong & {"kind", "rate", "by", "along"}:
-            return
-        if (self.kind, self.by) == ("shear", "box"):
-            yield "by = 'box' is for a box that is compressed or stretched; shear needs by = 'walls'"
             return
         if self.by == "box" and self.rate.unit == "m/s":
             yield "rate is a speed, which is for by = 'walls'; give a rate such as '1e-5 /t_c'"

@@ -66,6 +66,8 @@ def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.n
 
 def moved(plan: Plan, contact: Contact) -> dict[str, Any]:
     """The motion of the box, as an argument of `Simulation`."""
+    if plan.loading.kind == "shear":
+        return {"deformation": COMPONENTS["deformation"](shear=plan.rate)}
     sign = -1.0 if plan.loading.kind == "compress" else 1.0
     rates = [sign * plan.rate if axis in plan.loading.axes else 0.0 for axis in "xyz"]
     return {"deformation": COMPONENTS["deformation"](rates)}
@@ -76,11 +78,13 @@ def times(loading: Loading, filling: float, rate: float) -> tuple[float, float]:
     number = len(loading.axes)
     if loading.kind == "compress":
         return math.log(loading.to / filling) / (number * rate), loading.every / (number * rate)
-    return math.log1p(loading.to) / rate, loading.every / rate
+    return (loading.to if loading.kind == "shear" else math.log1p(loading.to)) / rate, loading.every / rate
 
 
 def last_sides(plan: Plan) -> np.ndarray:
     """Lengths (3,) at the end [m]."""
+    if plan.loading.kind == "shear":
+        return plan.sides
     factor = math.exp((-1.0 if plan.loading.kind == "compress" else 1.0) * plan.rate * plan.until)
     return plan.sides * np.array([factor if axis in plan.loading.axes else 1.0 for axis in "xyz"])
 
@@ -91,6 +95,9 @@ def sides(plan: Plan, row: dict[str, float]) -> np.ndarray:
 
 
 def stress(plan: Plan, before: dict[str, float], row: dict[str, float]) -> float:
-    """Mean stress [Pa] between two rows of the ledger, the work of the box over its change of volume."""
+    """Mean stress [Pa] between two rows of the ledger: the work over the change of volume, or over V dγ in shear."""
+    if plan.loading.kind == "shear":
+        work = row["work_shear"] - before["work_shear"]
+        return float(work / (np.prod(plan.sides) * (row["shear"] - before["shear"])))
     first, last = (float(np.prod(sides(plan, one))) for one in (before, row))
     return float((before[LOST] - row[LOST]) / abs(last - first))

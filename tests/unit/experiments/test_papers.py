@@ -361,6 +361,19 @@ def test_packings_that_are_compressed_before(tmp_path, monkeypatch):
     assert not (tmp_path / "known" / "compressed").exists()
 
 
+def test_an_interruption_names_the_same_command(tmp_path, monkeypatch, capsys):
+    """`sand resume` would continue the sweep, but neither compress packings nor compare: the command itself does."""
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Reproduction, "run", stopped)
+    assert main(["reproduce", "tatsuuma2019", "--small", "--quiet"]) == 130
+    text = capsys.readouterr().err
+    assert "to continue, call the same command again" in text and "sand resume" not in text
+
+
 def test_the_list(capsys):
     """Without a name: all figures with their numbers of runs.  An unknown one: the nearest name."""
     assert main(["reproduce", "--json"]) == 0
