@@ -121,6 +121,26 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
     return "a valid case", rows, {"kind": "laboratory case", "case": content, "cost": cost, "limits": limits} | numbers
 
 
+def _elastic_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.laboratory_case import read_laboratory
+
+    content, case = files.read_toml(path), read_laboratory(path, "elastic")
+    seeds = case.section.seeds
+    with naming(path):
+        begun = case.first_plan()
+    limits, grains = limits_of(begun.simulation), len(begun.simulation.grains)
+    cost, costs = cost_of(begun.simulation, begun.until, math.inf, None, len(seeds), 1)
+    rows = [
+        ("packing", f"{grains} grains, box at the start {begun.simulation.box.describe()}"),
+        ("seeds", str(len(seeds))),
+        *of_each(costs, len(seeds), "seed"),
+        ("cost", "a rough estimate: how long a packing needs to come to rest is seen then"),
+        *limits.items(),
+        start,
+    ]
+    return "a valid case", rows, {"kind": "elastic case", "case": content, "cost": cost, "limits": limits}
+
+
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
     from ..experiments.scattering.flight_cost import expected_flights
     from ..experiments.scattering.scatter_case import read_scattering
@@ -154,6 +174,7 @@ JOB_CASES: dict[str, Callable[[Path, tuple[str, str]], Description]] = {
     "collide": _collision_case,
     "grow": _growth_case,
     **dict.fromkeys(LOADINGS, _laboratory_case),
+    "elastic": _elastic_case,
     "sweep": _sweep_case,
 }
 """Description of the case files of jobs; the second argument is the row with the command that runs the case."""

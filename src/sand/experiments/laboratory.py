@@ -269,6 +269,14 @@ def _way(loading: Loading) -> Any:
     return importlib.import_module(f".laboratory_{loading.by}", __package__)
 
 
+def contact_of(forces: Sequence[Force] | None) -> Contact:
+    """The contact model among the forces, the default one if there are none.  Raises BadInput."""
+    contact = next((one for one in forces or () if isinstance(one, Contact)), None) if forces else Contact()
+    if contact is None:
+        raise BadInput("forces: there is no sand.Contact(), by which grains touch; add it")
+    return contact
+
+
 def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None = None) -> Plan:
     """Place a body in a box, or between walls.
 
@@ -287,9 +295,7 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
         If the body is not in one piece, or does not fit into the box, or its end has been reached.
     """
     given = body if isinstance(body, Start) else Start(body, None, Box.open(), "")
-    contact = next((one for one in forces or () if isinstance(one, Contact)), None) if forces else Contact()
-    if contact is None:
-        raise BadInput("forces: there is no sand.Contact(), by which grains touch; add it")
+    contact = contact_of(forces)
     if given.contacts is not None and not len(given.contacts.pair):
         raise BadInput(f"the frame has no contacts, and nothing to {loading.kind}; take an earlier or a later one")
     pairs = pairs_in_contact(given.grains, given.box)[0] if given.contacts is None else given.contacts.pair

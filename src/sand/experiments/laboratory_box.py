@@ -23,16 +23,16 @@ GAP = 0.1
 """Gap between a body and its image in the box that just holds it, in radii."""
 
 
-def in_box(loading: Loading, body: Start, axes: str) -> Start:
-    """A packing in a box that is periodic along these axes: that of its frame, or a body in a box that holds it.
+def in_box(box: Box | None, body: Start, axes: str) -> Start:
+    """A packing in a box that is periodic along these axes: that of its frame, or a body in one, given or its own.
 
     Raises
     ------
     BadInput
-        If the frame has another box, or the body does not fit into that of `loading`.
+        If the frame has another box, or the body does not fit into the given one.
     """
     if not body.box.is_open:
-        if loading.box is not None:
+        if box is not None:
             raise BadInput(f"box: the packing has its own, {body.box.describe()}; leave box out")
         if open_axes := [axis for axis in axes if body.box.lengths["xyz".index(axis)] is None]:
             raise BadInput(
@@ -44,7 +44,7 @@ def in_box(loading: Loading, body: Start, axes: str) -> Start:
     reach = grains.radius[:, None]
     low, high = (grains.position - reach).min(axis=0), (grains.position + reach).max(axis=0)
     cube = float((high - low).max()) + GAP * float(grains.radius.mean())
-    lengths = [cube, cube, cube] if loading.box is None else list(loading.box.lengths)
+    lengths: list[Any] = [cube, cube, cube] if box is None else list(box.lengths)
     for k, axis in enumerate("xyz"):
         if axis not in axes:
             lengths[k] = None
@@ -56,12 +56,12 @@ def in_box(loading: Loading, body: Start, axes: str) -> Start:
                 f"box: {given} along {axis} is less than the body, {needed}; give a larger box, or leave it out"
             )
     grains.arrays.position[...] -= (0.5 * (low + high))[:, None]
-    return Start(grains, body.contacts, Box(tuple(lengths)), body.note)  # type: ignore[arg-type]
+    return Start(grains, body.contacts, Box(tuple(lengths)), body.note)
 
 
 def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.ndarray]:
     """The packing in its box, and the lengths of the box."""
-    start = in_box(loading, body, "xyz")
+    start = in_box(loading.box, body, "xyz")
     return start, np.array(start.box.lengths, float)
 
 

@@ -1,4 +1,4 @@
-"""Case files of `sand compress`, `sand stretch` and `sand shear`."""
+"""Case files of `sand compress`, `sand stretch`, `sand shear` and `sand elastic`."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from ..setup.deposit import deposit
 from ..setup.from_file import from_trajectory, is_own_trajectory
 from ..setup.from_frame import Start
 from .collision_case import BodySection
+from .elastic import Begun, Elastic, begin
 from .laboratory import Loading, Plan, filling_factor, plan
 
 
@@ -102,9 +103,8 @@ def _filling(frame: Frame) -> float:
     return filling_factor(frame.radius, lengths)
 
 
-@with_keys(Loading, "kind")
-class LoadingSection(Section):
-    """How the aggregate is loaded."""
+class SeedsSection(Section):
+    """Table of a command with one part for each seed."""
 
     kind: ClassVar[str]
     seeds: Seeds = Field(default_factory=lambda: [1])
@@ -115,12 +115,32 @@ class LoadingSection(Section):
     def contradictions(self) -> Iterator[str]:
         """Those of the settings."""
         errors = ErrorCollector()
-        errors.take(self.loading)
+        errors.take(self.settings)
         yield from errors.problems
 
-    def loading(self) -> Loading:
+    def settings(self) -> Any:
+        """The settings.  Raises BadInput."""
+        raise NotImplementedError
+
+
+@with_keys(Loading, "kind")
+class LoadingSection(SeedsSection):
+    """How the aggregate is loaded."""
+
+    def settings(self) -> Loading:
         """The settings.  Raises BadInput."""
         return Loading(self.kind, **self.model_dump(exclude={"seeds", "out"}))
+
+
+@with_keys(Elastic)
+class ElasticSection(SeedsSection):
+    """Section [elastic]: how moduli and speed of sound of a packing at rest are measured."""
+
+    kind = "elastic"
+
+    def settings(self) -> Elastic:
+        """The settings.  Raises BadInput."""
+        return Elastic(**self.model_dump(exclude={"seeds", "out"}))
 
 
 class CompressionSection(LoadingSection):
@@ -141,8 +161,8 @@ class ShearSection(LoadingSection):
     kind = "shear"
 
 
-class LaboratoryCase(Section):
-    """Case file of `sand compress`, `sand stretch` or `sand shear`, without the table of the command."""
+class PackingCase(Section):
+    """Case file of a packing, without the table of the command."""
 
     aggregate: PackingSection
     materials: dict[str, MaterialSection] = Field(default_factory=dict)
@@ -152,23 +172,45 @@ class LaboratoryCase(Section):
     @property
     def section(self) -> Any:
         """The table of the command."""
-        return next(table for table in vars(self).values() if isinstance(table, LoadingSection))
+        return next(table for table in vars(self).values() if isinstance(table, SeedsSection))
 
     def physics(self) -> list[Any] | None:
         """Forces, as `laboratory.plan` takes them."""
         return self.forces.build() or None
 
-    def first_plan(self) -> Plan:
+    def packing(self, seed: int) -> Grains | Start:
+        """The packing of a seed.  Raises BadInput."""
+        materials = {**PRESETS, **{name: table.build(name) for name, table in self.materials.items()}}
+        return self.aggregate.packing(materials, seed)
+
+    def first_plan(self) -> Any:
         """The plan of the first seed; files of all others are read, too, to find errors.  Raises BadInput."""
         first = self.plan(self.section.seeds[0])
         for seed in self.section.seeds[1:] if self.aggregate.kind == "file" else ():
             self.plan(seed)
         return first
 
+    def plan(self, seed: int) -> Any:
+        """The packing of a seed, and what is done with it.  Raises BadInput."""
+        raise NotImplementedError
+
+
+class LaboratoryCase(PackingCase):
+    """Case file of `sand compress`, `sand stretch` or `sand shear`, without the table of the command."""
+
     def plan(self, seed: int) -> Plan:
         """The packing of a seed, and how it is loaded.  Raises BadInput."""
-        materials = {**PRESETS, **{name: table.build(name) for name, table in self.materials.items()}}
-        return plan(self.aggregate.packing(materials, seed), self.section.loading(), self.physics())
+        return plan(self.packing(seed), self.section.settings(), self.physics())
+
+
+class ElasticCase(PackingCase):
+    """Case file of `sand elastic`."""
+
+    elastic: ElasticSection
+
+    def plan(self, seed: int) -> Begun:
+        """The beginning of the measurement of a seed.  Raises BadInput."""
+        return begin(self.packing(seed), self.section.settings(), self.physics(), {"stepping": self.stepping})
 
 
 class CompressionCase(LaboratoryCase):
@@ -189,9 +231,14 @@ class ShearCase(LaboratoryCase):
     shear: ShearSection
 
 
-OF_COMMAND = {"compress": "compression", "stretch": "stretch", "shear": "shear"}
-"""Table of the loading, by command."""
-CASES: dict[str, type[LaboratoryCase]] = {"compress": CompressionCase, "stretch": StretchCase, "shear": ShearCase}
+OF_COMMAND = {"compress": "compression", "stretch": "stretch", "shear": "shear", "elastic": "elastic"}
+"""Table of the command."""
+CASES: dict[str, type[PackingCase]] = {
+    "compress": CompressionCase,
+    "stretch": StretchCase,
+    "shear": ShearCase,
+    "elastic": ElasticCase,
+}
 """Models of the case files, by command."""
 
 
@@ -200,12 +247,12 @@ def model_of(content: dict[str, Any], command: str | None = None) -> Any:
     return with_integrator(CASES[command or command_for(content) or ""], content)
 
 
-def check_laboratory(content: dict[str, Any], name: str, command: str | None = None) -> LaboratoryCase:
+def check_laboratory(content: dict[str, Any], name: str, command: str | None = None) -> Any:
     """Validate the content of a case file; `name` begins each message.  Raises BadInput."""
     problems = material_errors(content, ("aggregate",), "silica")
     return validate(model_of(content, command), content, name, problems)
 
 
-def read_laboratory(path: str | Path, command: str) -> LaboratoryCase:
+def read_laboratory(path: str | Path, command: str) -> Any:
     """Read and check a case file of a command.  Raises BadInput, all errors of the file, one line each."""
     return check_laboratory(read_content(path, command), str(path), command)

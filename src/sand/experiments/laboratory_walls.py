@@ -32,7 +32,7 @@ def placed(loading: Loading, body: Start, contact: Contact) -> tuple[Start, np.n
         raise BadInput(
             "by = 'walls': the frame is periodic along z, where the walls are; start from a body, or between walls"
         )
-    start = in_box(loading, body, "xy")
+    start = in_box(loading.box, body, "xy")
     low, high = _planes(start, contact)
     return start, np.array([*start.box.lengths[:2], high - low])
 
