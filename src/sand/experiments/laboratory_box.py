@@ -37,7 +37,8 @@ def in_box(box: Box | None, body: Start, axes: str) -> Start:
         if open_axes := [axis for axis in axes if body.box.lengths["xyz".index(axis)] is None]:
             raise BadInput(
                 f"the box of the packing is open along {open_axes[0]}; it must be periodic along {', '.join(axes)}"
-                + "; by = 'walls' loads a packing that is open along z" * (open_axes == ["z"])
+                + "; `sand compress`, `stretch` and `shear` load a packing that is open along z with by = 'walls'"
+                * (open_axes == ["z"])
             )
         return body
     grains = body.grains.copy()

@@ -204,7 +204,7 @@ def test_a_cake_is_one_body_by_the_floor():
     between.arrays.position[2, np.argsort(between.position[:, 2])[20:]] += 5e-8
     with pytest.raises(sand.BadInput, match=r"the body: grain \d+ .*has no contact with the rest"):
         plan(start._replace(grains=between), pressed())
-    with pytest.raises(sand.BadInput, match="open along z; it must be periodic along x, y, z; by = 'walls' loads"):
+    with pytest.raises(sand.BadInput, match="open along z; it must be periodic along x, y, z; `sand compress`"):
         plan(start, Loading("compress", "1e-4 /t_c", 0.4))
 
 
