@@ -36,7 +36,7 @@ CAPABILITIES = {
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
     "plot of packings, stress in exports and in the figure of a run, tables described by info": 357,
     "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 196,
-    "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 716,
+    "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 720,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
