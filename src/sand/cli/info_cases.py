@@ -106,7 +106,9 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
     rows = [
         ("aggregate", f"{len(simulation.grains)} grains, filling factor {planned.filling(planned.sides):.3g}"),
         ("between walls" if planned.loading.by == "walls" else "box", sides),
-        ("rate of strain", f"{planned.rate_text(planned.rate)}; the largest that is slow enough: {good}"),
+        ("rate of strain", f"{planned.rate_text(planned.rate)}; the largest that is slow enough: {good}")
+        if good
+        else ("lid", "moves freely under the pressure, with the mass of all grains"),
         ("E_roll", energy),
         ("dashpots", f"1 % of the critical one is damping_constant = {0.01 * scales.critical_damping:.2g} kg/s"),
         ("seeds", str(len(seeds))),

@@ -13,16 +13,18 @@ from pydantic import Field
 from ..basics.errors import BadInput, ErrorCollector
 from ..basics.grains import Grains
 from ..basics.material import PRESETS, Material
-from ..basics.settings import For, Number, Whole
+from ..basics.settings import For, Number, Whole, Word
 from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
 from ..config.commands import command_for
 from ..config.folders import without_run
 from ..config.key_errors import validate
-from ..config.sections import PathName, Section, Seeds, Stepping, with_integrator, with_keys
+from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator, with_keys
 from ..integrate.verlet import Verlet
 from ..io.frame import Frame
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
+from ..setup.aggregates import KINDS
+from ..setup.deposit import deposit
 from ..setup.from_file import from_trajectory, is_own_trajectory
 from ..setup.from_frame import Start
 from .collision_case import BodySection
@@ -31,8 +33,19 @@ from .laboratory import Loading, Plan, filling_factor, plan
 
 
 class PackingSection(BodySection):
-    """Section [aggregate]: an aggregate (another one for each seed if it is random), a file, or a frame of a run."""
+    """Section [aggregate]: an aggregate or deposit (another for each seed if it is random), a file, or a frame."""
 
+    kind: Annotated[str, Word("file", "deposit", among=KINDS)]
+    """Builder (as for `sand build`), `deposit` for a cake between walls, or `file`."""
+    width: Annotated[
+        Any, Number("m", above=0.0), For("kind", "deposit", needed="the side of its column, such as '6 um'")
+    ] = None
+    """Side of the column on which the grains of a deposit fall [m]; it is periodic along x and y."""
+    contacts: Annotated[int | None, Whole(1, 3), For("kind", "deposit")] = None
+    """Number of contacts to which a falling grain of a deposit rolls on: 1, at which it sticks at its first touch, by
+    default; 2 or 3."""
+    moment: Annotated[Moment, For("kind", "deposit", *KINDS)] = None
+    """Moment of each magnetic grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moments."""
     frame: Annotated[int | None, Whole(-(2**31), 2**31 - 1), For("kind", "file")] = None
     """Index of the frame, if `file` is a run of SAND; −1, the last, by default. Of a folder with seed-1, seed-2, … each
     seed takes its own run."""
@@ -44,9 +57,12 @@ class PackingSection(BodySection):
         yield from super().contradictions()
         if self.frame is not None and self.filling is not None:
             yield "frame and filling both choose a frame; leave one of them out"
+        for name in ("shape", "dimension", "prefactor") if self.kind == "deposit" else ():
+            if getattr(self, name) is not None:
+                yield f"{name} is not used by kind = 'deposit'; leave it out"
 
     def packing(self, materials: dict[str, Material], seed: int) -> Grains | Start:
-        """The body, or the frame with its contacts and box.  Raises BadInput."""
+        """The body, a deposit, or the frame with its contacts and box.  Raises BadInput."""
         if self.kind == "file":
             path = Path(str(self.file))
             path = own if (own := path / f"seed-{seed}").is_dir() else path
@@ -59,6 +75,10 @@ class PackingSection(BodySection):
                 if self.filling is not None:
                     number = frame_with(path, self.filling)
                 return from_trajectory(path, number, materials)
+        if self.kind == "deposit":
+            names = ("radius", "width", "contacts", "moment", "moments", "magnetic")
+            given = {name: value for name in names if (value := getattr(self, name)) is not None}
+            return deposit(self.grains or 0, material=materials[self.material], seed=seed, **given)
         named = [name for name in ("frame", "filling") if getattr(self, name) is not None]
         if named and Path(str(self.file)).exists():
             raise BadInput(f"{named[0]} is for a run of SAND; {self.file} is another file: leave {named[0]} out")
