@@ -57,7 +57,7 @@ FAULTS = (
     Fault("velocities that shear does not turn", "sign", "formula", "numerics/flow.py",
           "along = v[0] - dt * sheared(upwards, span)", "along = v[0] + dt * sheared(upwards, span)",
           "unit/numerics/test_flow.py::test_a_drift_in_a_sheared_box"),
-    Fault("crossings of a wrapped tilt that are not counted", "forgotten image", "loop", "components/deformation_stage.py",
+    Fault("a wrapped tilt without its crossings", "forgotten image", "loop", "components/deformation_stage.py",
           "np.int32(turns) * grains.image[2, i]", "np.int32(0) * grains.image[2, i]",
           "physics/test_shear.py::test_wrapping_the_tilt_changes_nothing"),
     Fault("the anchors of lists jump where the tilt is wrapped", "forgotten image", "loop",
