@@ -207,7 +207,7 @@ def test_a_cake_is_one_body_by_the_floor():
         plan(start._replace(grains=between), pressed())
     with pytest.raises(sand.BadInput, match="open along z; it must be periodic along x, y, z; by = 'walls' loads"):
         plan(start, Loading("compress", "1e-4 /t_c", 0.4))
-    with pytest.raises(sand.BadInput, match="box: the packing has its own, .*; leave box out"):
+    with pytest.raises(sand.BadInput, match=r"box: the packing has its own, .*; leave box out"):
         plan(start, pressed(box="2 um"))
 
 
