@@ -335,6 +335,7 @@ def test_what_cannot_be_used_is_refused():
 
 
 @pytest.mark.validate
+@pytest.mark.filterwarnings("ignore:.*broke while aggregates grew")
 def test_threads_change_no_bit():
     """5000 grains in several blocks: the same bits with 1, 2 and 3 threads, while the tilt is wrapped."""
     grid = np.stack(np.meshgrid(*[np.arange(17.0) - 8.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 2.001 * RADIUS

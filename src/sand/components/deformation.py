@@ -119,6 +119,11 @@ def read_deformation(value: Any) -> tuple[Deformation, ...]:
     return () if value is None else (value,)
 
 
+def box_columns(*, sheared: bool) -> list[str]:
+    """Columns of the ledger of a box that is deformed."""
+    return list(OF_BOX if sheared else OF_BOX[: -len(OF_SHEAR)])
+
+
 class DeformedBox(Component):
     """A box that is deformed (`Deformation`), and the work of its boundaries."""
 
@@ -252,7 +257,7 @@ class DeformedBox(Component):
 
     def columns(self) -> list[str]:
         """Lengths of the box, filling factor, work of the boundaries and pressure; of shear the same."""
-        return list(OF_BOX if self.shears(self._box) else OF_BOX[: -len(OF_SHEAR)])
+        return box_columns(sheared=self.shears(self._box))
 
     def losses(self) -> list[str]:
         """The energy that the boundaries took from the grains."""

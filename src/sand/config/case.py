@@ -15,7 +15,7 @@ from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, did_you_mean, naming
 from ..basics.material import NEAREST, PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
-from ..components.deformation import Deformation, DeformedBox
+from ..components.deformation import Deformation, DeformedBox, box_columns
 from ..components.driven import Driven
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
@@ -338,8 +338,8 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
         table = content.get("stepping")
         awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
         stress = isinstance(run, dict) and run.get("stress") is True
-        box = DeformedBox(())
-        columns += [*box.columns(), *box.losses()] if "deformation" in content else []
+        if isinstance(deformation := content.get("deformation"), dict):
+            columns += [*box_columns(sheared="shear" in deformation), *DeformedBox(()).losses()]
         condition.check([*Ledger(awake=awake, stress=stress).columns, *columns, *wall_columns(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems

@@ -313,6 +313,10 @@ def _compression(how: Elastic) -> Loading:
 
 def _at_start(start: Start, forces: Sequence[Force], options: dict[str, Any]) -> Simulation:
     """A packing in its box without velocity, with a drag.  Raises BadInput if it does not percolate."""
+    if start.box.tilt:
+        raise BadInput(
+            "the box is tilted; the moduli need a box with right angles, such as a frame of sand compress has"
+        )
     grains = start.grains.copy()
     grains.arrays.velocity[...], grains.arrays.spin[...] = 0.0, 0.0
     made = Simulation(

@@ -10,7 +10,7 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.experiments import elastic_job
-from sand.experiments.elastic import linear_range, mean_moduli
+from sand.experiments.elastic import Elastic, begin, linear_range, mean_moduli
 from sand.experiments.elastic_figure import elastic_figure
 from sand.experiments.elastic_waves import WIDTH, first_above, passed_momentum
 
@@ -110,6 +110,13 @@ def test_a_job(tmp_path, monkeypatch, capsys):
         == 0
     )
     assert sand.open("swept").table["bulk"] == pytest.approx([bulk], rel=1e-6, abs=0.0)
+
+
+def test_a_tilted_box_is_refused():
+    """Copies in a row, and strains along its sides, are those of a box with right angles."""
+    body = sand.setup.lattice(4, radius="0.1 um", material="ice")
+    with pytest.raises(sand.BadInput, match="the box is tilted; the moduli need a box with right angles"):
+        begin(body, Elastic(box=sand.Box.periodic(4 * D, tilt=1e-7)), None, {})
 
 
 def test_figure():

@@ -194,6 +194,7 @@ def pressed(pressure="10 kPa", until="1 us", kind="compress", **changes):
     return Loading(kind, by="walls", pressure=pressure, until=until, **changes)
 
 
+@pytest.mark.compiled("small")
 def test_a_cake_is_one_body_by_the_floor():
     """Trees of a deposit stand on the floor, which is at z = 0; a grain that touches neither is named."""
     start = cake(40)
@@ -206,8 +207,11 @@ def test_a_cake_is_one_body_by_the_floor():
         plan(start._replace(grains=between), pressed())
     with pytest.raises(sand.BadInput, match="open along z; it must be periodic along x, y, z; `sand compress`"):
         plan(start, Loading("compress", "1e-4 /t_c", 0.4))
+    with pytest.raises(sand.BadInput, match=r"box: the packing has its own, .*; leave box out"):
+        plan(start, pressed(box="2 um"))
 
 
+@pytest.mark.compiled("small")
 def test_loads_that_follow_one_another():
     """P(t) = P₀ (P₁/P₀)^(t/T) between two pressures, to half of the largest step of the ramp, 5 %/20, and its chord.
 
@@ -223,6 +227,7 @@ def test_loads_that_follow_one_another():
     assert found.until == 4e-6 and found.row_every == pytest.approx(8e-8, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.compiled("small")
 def test_rest_under_a_constant_load():
     """At rest once φ has changed by less than 1e-4 in a tenth of the time; not in the first rows, nor as it grows."""
     found = plan(cake(), pressed("10 kPa", "10 us"))

@@ -361,6 +361,7 @@ def test_packings_that_are_compressed_before(tmp_path, monkeypatch):
     assert not (tmp_path / "known" / "compressed").exists()
 
 
+@pytest.mark.compiled("small")
 def test_an_interruption_names_the_same_command(tmp_path, monkeypatch, capsys):
     """`sand resume` would continue the sweep, but neither compress packings nor compare: the command itself does."""
 

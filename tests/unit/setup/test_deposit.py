@@ -8,6 +8,8 @@ import pytest
 import sand
 from sand.setup import deposit
 
+pytestmark = pytest.mark.compiled("small")
+
 R, WIDTH = 1e-7, 1.3e-6
 IMAGES = WIDTH * np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], indexing="ij"), -1).reshape(-1, 2)
 REST = 2.0 * R - sand.theory.contact("silica", R).rest_overlap
