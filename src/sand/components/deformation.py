@@ -21,7 +21,8 @@ from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
 from ..engine.engine import Engine
-from ..forces.pair.dipoles import Dipoles
+from ..engine.step_parameters import ForcesByType
+from ..forces.pair.ewald_force import MOST_STRAIN
 from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
 from .deformation_stage import (
@@ -34,6 +35,7 @@ from .deformation_stage import (
     DeformationNumbers,
     deformation_stages,
 )
+from .deformed_ewald import follow_box, problems_of_forces, store_choices, use_choices, with_choices
 
 AXES = "xyz"
 LEAST_STRAIN = 1e-9
@@ -137,7 +139,6 @@ class DeformedBox(Component):
                 found.append(f"axis {axis} of the box is open, but a box that is deformed has three periodic ones")
         if self.moves_box:
             others = [REFUSED[each.name] for each in setup.components if each.name in REFUSED]
-            others += [f"the force '{each.name}'" for each in setup.forces.long_range if not isinstance(each, Dipoles)]
             positions = [each for each in setup.forces.external if getattr(each, "position_dependent", False)]
             others += [f"the force '{each.name}', whose energy depends on the position," for each in positions]
             if setup.stepping.name != "verlet":
@@ -146,28 +147,23 @@ class DeformedBox(Component):
             step, rates = getattr(setup.stepping, "step", "auto"), [each.rate for each in forces_at_points(self.given)]
             if step != "auto" and step * np.abs(rates).max() > LARGEST_STRAIN:
                 found.append(f"a step of {step:g} s strains the box by more than {LARGEST_STRAIN:g}; use step = 'auto'")
-            found += self._problems_of_dipoles(setup)
+            found += problems_of_forces(setup)
         return [f"deformation: {line}" for line in found]
 
-    def _problems_of_dipoles(self, setup: Setup) -> list[str]:
-        """Dipoles are summed over all images, with parameters in units of a side that does not grow."""
-        dipoles = next((each for each in setup.forces.long_range if isinstance(each, Dipoles)), None)
-        if dipoles is None:
-            return []
-        if not dipoles.uses_ewald(setup.grains, setup.box) or dipoles.ewald(setup.grains, setup.box).order:
-            return ["dipoles need periodic = 'ewald' and reciprocal = 'direct' in a box that is deformed"]
-        rates = [rate for each in forces_at_points(self.given) for rate in each.rate]
-        uniform = all(len(set(each.rate)) == 1 for each in forces_at_points(self.given))
-        if self.given.law == PRESSURE or not uniform or max(rates) > 0.0:
-            return ["dipoles need three equal rates of at most 0, and none that follows a pressure"]
-        return []
+    def at_start(self, forces: ForcesByType, setup: Setup) -> ForcesByType:
+        """The forces, with parameters of Ewald sums that last while the box is deformed."""
+        self._ewald, self._cutoff = np.zeros((2, 12)), 0.0
+        if self.moves_box:
+            forces, self._cutoff = with_choices(forces, setup)
+            store_choices(forces.long_range, self._ewald)
+        return forces
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Stages of the deformation; none if all rates are 0."""
-        self._lengths = np.array(setup.box.lengths, np.float64)
+        self._lengths = self._lengths_of_sums = np.array(setup.box.lengths, np.float64)
         if not self.moves_box:
             return {}
-        shortest = least_side(setup.grains.radius)
+        shortest = max(least_side(setup.grains.radius), 2.0 * self._cutoff)
         number, time = LAWS.index(self.given.law), self.given.time or 0.0
         return deformation_stages(DeformationNumbers(number, time, shortest, bool(setup.forces.long_range)))
 
@@ -176,24 +172,33 @@ class DeformedBox(Component):
         state.add_groups(self.groups, {})
         cell = _cell_of(state)
         cell.span[:], cell.start[:] = state.fixed_box.moving_span, self._lengths
+        cell.ewald[:], cell.chosen[:] = self._ewald, self._lengths
 
     def begin(self, engine: Engine) -> None:
         """Set rates and pressure of the present intervals of the ramps, and A where rates have changed."""
         cell, given = _cell_of(engine.stored_state), force_at(self.given, engine.stored_state.time)
         cell.goal[0] = given.pressure or 0.0
         if (cell.rate != given.rate).any():
-            cell.rate[:] = given.rate
+            cell.rate[:], cell.lasts[0] = given.rate, min(cell.lasts[0], engine.stored_state.time)
             if given.law != PRESSURE:
                 cell.span[RATE:] = cell.rate * (cell.start / cell.span[:3] if given.law == LINEAR else 1.0)
+        if cell.ewald.any() and (cell.chosen != self._lengths_of_sums).any():
+            self._lengths_of_sums = cell.chosen.copy()
+            use_choices(engine, cell, self._cutoff)
 
     def next_time(self, engine: Engine) -> float:
-        """Next time [s] at which a ramp changes a rate or the pressure."""
-        ramps = ramps_of(self.given).values()
-        return min((ramp.next_change(engine.stored_state.time) for ramp in ramps), default=math.inf)
+        """Next time [s] at which a ramp changes a rate or the pressure, or Ewald sums need other parameters."""
+        ramps, state = ramps_of(self.given).values(), engine.stored_state
+        lasts = float(_cell_of(state).lasts[0]) if self._ewald.any() else math.inf
+        return min([lasts, *(ramp.next_change(state.time) for ramp in ramps)])
 
     def update(self, engine: Engine) -> None:
-        """As `begin`."""
+        """As `begin`; choose the parameters of Ewald sums anew, where the box has changed."""
         self.begin(engine)
+        cell = _cell_of(engine.stored_state)
+        longer = cell.start / cell.span[:3] if self.given.law == LINEAR else 1.0
+        follow_box(engine, cell, self._cutoff, (1.0 + 2.0 * MOST_STRAIN) * float(np.abs(cell.rate * longer).max()))
+        self._lengths_of_sums = cell.chosen.copy()
 
     def kept(self, kept: np.ndarray) -> Component:
         """The same deformation."""
@@ -208,6 +213,7 @@ class DeformedBox(Component):
         """Take over the lengths of a box that the user has changed; the work up to then was that of the box before."""
         time = arrays["clock"][TIME]
         arrays["cell/work"], arrays["cell/strain"] = self._work, np.zeros(3)
+        arrays |= {"cell/ewald": self._ewald, "cell/chosen": self._lengths, "cell/lasts": np.zeros(1)}
         if (arrays["cell/rate"] != force_at(self.given, time).rate).any():
             arrays["cell/changed"] = np.array([time])
         if (arrays["cell/span"][:3] != self._lengths).any():
@@ -264,12 +270,12 @@ class DeformedBox(Component):
 
 
 def present_virial(state: State) -> np.ndarray:
-    """W_aa (3,) [J] of contacts and dipoles, whose energy is a third of the trace, with the loads of a state."""
+    """W_aa (3,) [J] of contacts and long-range forces, with the loads of a state."""
     grains, contacts, used = state.grains.arrays, state.contacts, int(state.count[CONTACTS])
     first, second = grains.position[:, contacts.pair[:, :used]].swapaxes(0, 1)
     branch = state.box.nearest((first - second).T)
     of_contacts: np.ndarray = (branch.T * contacts.force[:, :used]).sum(axis=1)
-    return of_contacts - 0.5 * float((grains.moment * grains.field).sum())
+    return of_contacts + _cell_of(state).far_virial
 
 
 def present_work(state: State) -> np.ndarray:

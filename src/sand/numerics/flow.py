@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from ..basics.box import MovingSpan, Span
 from ..compiler.jit import compiled_form, formula, loop
-from .vec import axpy, load, sub
+from .vec import accrue, axpy, dot, load, sub
 
 
 def unless_still(still: Callable) -> Callable[[Callable], Callable]:
@@ -53,10 +53,39 @@ def squared_approach(squared_speed, reach, span):
     return (2.0 * math.sqrt(squared_speed) + reach * rate_of_strain(span)) ** 2
 
 
-@unless_still(lambda length, span: 1.0)
-def shrinkage(length, span):
-    """Factor by which the box is shorter along x than a length [m]."""
-    return length * span.inverse_x
+@unless_still(lambda volume, span: 1.0)
+def compression(volume, span):
+    """A volume [m³] over that of the box."""
+    return volume * span.inverse_x * span.inverse_y * span.inverse_z
+
+
+@unless_still(lambda virial, separation, force, span: virial)
+def with_pair(virial, separation, force, span):
+    """Sums (3,) of r_a F_a [J], with those of one more pair; 0 in a box that keeps its shape, as nothing needs them."""
+    return axpy(1.0, (separation[0] * force[0], separation[1] * force[1], separation[2] * force[2]), virial)
+
+
+@unless_still(lambda virial, energy, q, quarter, span: virial)
+def with_wave(virial, energy, q, quarter, span):
+    """As `with_pair`, with U_q [1 − 2 q_a² (1/q² + 1/4α²)] of one more wave q [1/m]; `quarter` is 1/4α² [m²]."""
+    slope = 2.0 * energy * (1.0 / dot(q, q) + quarter) if energy > 0.0 else 0.0
+    return (
+        virial[0] + energy - slope * q[0] * q[0],
+        virial[1] + energy - slope * q[1] * q[1],
+        virial[2] + energy - slope * q[2] * q[2],
+    )
+
+
+@unless_still(lambda sums, column, virial, span: None)
+def add_virial(sums, column, virial, span):
+    """Add W_aa (3,) [J] to a column of an array (3, …) of sums."""
+    accrue(sums, column, virial)
+
+
+@unless_still(lambda sums, column, moment, field, span: None)
+def add_virial_of_moment(sums, column, moment, field, span):
+    """Add −μ_a B_a [J] to a column of an array (3, …) of sums."""
+    accrue(sums, column, (-moment[0] * field[0], -moment[1] * field[1], -moment[2] * field[2]))
 
 
 @unless_still(lambda built, span: 0.0)
