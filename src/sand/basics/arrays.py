@@ -138,6 +138,9 @@ class CellArrays(NamedTuple):
     changed: Annotated[np.ndarray, Array((1,), "s", required=False)]
     # virial W_aa of the last sums of long-range forces
     far_virial: Annotated[np.ndarray, Array((3,), "J", required=False)]
+    # `span` at the start of a step of rigid bodies; ½ Σ m u_a² of the grains of these less that of the bodies, then
+    begun: Annotated[np.ndarray, Array((9,), required=False)]
+    inner: Annotated[np.ndarray, Array((3,), "J", required=False)]
     # parameters of Ewald sums of charges and of dipoles, numbers of `EwaldChoice`; lengths at which they were chosen,
     # and time up to which they may stay
     ewald: Annotated[np.ndarray, Array((2, 12), required=False)]

@@ -15,7 +15,7 @@ from ..basics.box import Box, least_side
 from ..basics.errors import BadInput, shown
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
-from ..basics.state import CELL, CONTACTS, TIME, State
+from ..basics.state import BODIES, CELL, CONTACTS, TIME, State
 from ..basics.units import si
 from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
@@ -34,7 +34,9 @@ from .deformation_stage import (
     RATE,
     DeformationNumbers,
     deformation_stages,
+    stages_of_part,
 )
+from .deformed_bodies import stages_with_bodies
 from .deformed_ewald import follow_box, problems_of_forces, store_choices, use_choices, with_choices
 
 AXES = "xyz"
@@ -43,7 +45,6 @@ LEAST_STRAIN = 1e-9
 REFUSED = {
     "walls": "walls",
     "driven": "driven grains",
-    "settling": "settling_time of contacts",
 }
 """Components that do not work in a box that is deformed, and what sentences call them."""
 
@@ -118,7 +119,21 @@ class DeformedBox(Component):
     every_step = True
     groups: ClassVar[Mapping[str, type]] = {CELL: CellArrays}
 
+    in_parts = True
+    is_part = False
+    """Whether it acts in contact steps of awake clusters."""
     _lengths: np.ndarray
+
+    def for_part(self) -> Component:
+        """As `Component.for_part`."""
+        part = DeformedBox(self.items)
+        part.is_part = True
+        return part
+
+    @property
+    def holds(self) -> bool:  # type: ignore[override]
+        """As `moves_box`: loads on awake clusters act on grains, which move relative to the flow within them."""
+        return self.moves_box
 
     @property
     def given(self) -> Deformation:
@@ -133,6 +148,8 @@ class DeformedBox(Component):
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""
+        if self.is_part:
+            return []
         found, where = [], "cannot be used in a box that is deformed; leave one of them out"
         for axis, length in zip(AXES, setup.box.lengths, strict=True):
             if length is None:
@@ -141,7 +158,12 @@ class DeformedBox(Component):
             others = [REFUSED[each.name] for each in setup.components if each.name in REFUSED]
             positions = [each for each in setup.forces.external if getattr(each, "position_dependent", False)]
             others += [f"the force '{each.name}', whose energy depends on the position," for each in positions]
-            if setup.stepping.name != "verlet":
+            moves_bodies = getattr(setup.stepping, "moves_bodies", False)
+            if moves_bodies and self.given.law == PRESSURE:
+                found.append("rigid clusters cannot be used with law = 'pressure'; give rates, or use sand.Verlet")
+            if moves_bodies and setup.forces.gas:
+                found.append("rigid clusters cannot be used with a gas in a box that is deformed; use sand.Verlet")
+            if setup.stepping.name != "verlet" and not moves_bodies:
                 others.append(f"stepping = '{setup.stepping.name}'")
             found += [f"{other} {where}" for other in others]
             step, rates = getattr(setup.stepping, "step", "auto"), [each.rate for each in forces_at_points(self.given)]
@@ -153,7 +175,7 @@ class DeformedBox(Component):
     def at_start(self, forces: ForcesByType, setup: Setup) -> ForcesByType:
         """The forces, with parameters of Ewald sums that last while the box is deformed."""
         self._ewald, self._cutoff = np.zeros((2, 12)), 0.0
-        if self.moves_box:
+        if self.moves_box and not self.is_part:
             forces, self._cutoff = with_choices(forces, setup)
             store_choices(forces.long_range, self._ewald)
         return forces
@@ -163,9 +185,14 @@ class DeformedBox(Component):
         self._lengths = self._lengths_of_sums = np.array(setup.box.lengths, np.float64)
         if not self.moves_box:
             return {}
+        if self.is_part:
+            return stages_of_part(bool(setup.forces.long_range))
         shortest = max(least_side(setup.grains.radius), 2.0 * self._cutoff)
         number, time = LAWS.index(self.given.law), self.given.time or 0.0
-        return deformation_stages(DeformationNumbers(number, time, shortest, bool(setup.forces.long_range)))
+        numbers = DeformationNumbers(number, time, shortest, bool(setup.forces.long_range))
+        if getattr(setup.stepping, "moves_bodies", False):
+            return stages_with_bodies(numbers)
+        return deformation_stages(numbers)
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the box in memory."""
@@ -239,7 +266,7 @@ class DeformedBox(Component):
         cell, grains = _cell_of(state), state.grains.arrays
         lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
         work = present_work(state)
-        pressure = (present_virial(state) + (grains.mass * grains.velocity**2).sum(axis=1)) / volume
+        pressure = present_virial(state, with_motion=True) / volume
         filling = 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume
         values = [*lengths, filling, *work, *pressure, -math.fsum(work)]
         return dict(zip([*self.columns(), *self.losses()], map(float, values), strict=True))
@@ -269,13 +296,21 @@ class DeformedBox(Component):
         return self.given.parameters()
 
 
-def present_virial(state: State) -> np.ndarray:
-    """W_aa (3,) [J] of contacts and long-range forces, with the loads of a state."""
+def present_virial(state: State, *, with_motion: bool = False) -> np.ndarray:
+    """W_aa (3,) [J] of contacts and long-range forces, and of motion, with the loads of a state.
+
+    Rigid bodies have that of `deformed_bodies`, and no contacts.
+    """
     grains, contacts, used = state.grains.arrays, state.contacts, int(state.count[CONTACTS])
+    cell, bodies, moving = _cell_of(state), state.bodies, np.ones(len(state.grains), bool)
+    virial = cell.far_virial.copy()
+    if state.count[BODIES]:
+        moving, firsts = bodies.asleep == 0, np.unique(bodies.first[bodies.asleep == 1])
+        virial = cell.virial + with_motion * (bodies.momentum[:, firsts] ** 2 / bodies.mass[firsts]).sum(axis=1)
+    virial += with_motion * (grains.mass * grains.velocity**2)[:, moving].sum(axis=1)
     first, second = grains.position[:, contacts.pair[:, :used]].swapaxes(0, 1)
     branch = state.box.nearest((first - second).T)
-    of_contacts: np.ndarray = (branch.T * contacts.force[:, :used]).sum(axis=1)
-    return of_contacts + _cell_of(state).far_virial
+    return np.asarray(virial + (branch.T * contacts.force[:, :used] * moving[contacts.pair[0, :used]]).sum(axis=1))
 
 
 def present_work(state: State) -> np.ndarray:

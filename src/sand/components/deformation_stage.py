@@ -67,19 +67,32 @@ def twice_kinetic_energy(grains, a):
     return total
 
 
+@loop
+def advance_box(cell, a, dt, twice_kinetic):
+    """Deform the box along an axis for dt [s]; the work on the motion, whose Σ m u_a² [J] then is `twice_kinetic`."""
+    rate = cell.span[RATE + a]
+    cell.work[a] -= dt * rate * (1.0 + 0.5 * dt * rate) * twice_kinetic
+    cell.span[a] *= 1.0 + dt * rate
+    cell.span[INVERSE + a] /= 1.0 + dt * rate
+    cell.span[RATE + a] /= 1.0 + dt * rate
+    cell.strain[a] += 0.5 * dt * (rate + cell.span[RATE + a])
+
+
 @stage("the deformation of the box")
 def deform(grains, cell, scratch):
     """Deform the box as the drift has moved its grains; the work on their motion."""
-    dt = scratch[DT]
     for a in range(3):
-        rate = cell.span[RATE + a]
-        cell.work[a] -= dt * rate * (1.0 + 0.5 * dt * rate) * twice_kinetic_energy(grains, a)
-        cell.span[a] *= 1.0 + dt * rate
-        cell.span[INVERSE + a] /= 1.0 + dt * rate
-        cell.span[RATE + a] /= 1.0 + dt * rate
-        cell.strain[a] += 0.5 * dt * (rate + cell.span[RATE + a])
-    cell.elapsed[0] += dt
+        advance_box(cell, a, scratch[DT], twice_kinetic_energy(grains, a))
+    cell.elapsed[0] += scratch[DT]
     return 0
+
+
+@loop
+def set_rates(cell, law):
+    """Set A to that of the next step; one that follows a pressure stays."""
+    for a in range(3):
+        if law != 2:
+            cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if law == 1 else 1.0)
 
 
 @loop
@@ -128,14 +141,18 @@ def work_of_box(grains, contacts, long_range, cell, count, scratch, span, parame
     if due:
         found = contact_virial(grains, contacts.pair, contacts.force, count[CONTACTS], span)
         add_work(cell, (found[0] + far[0], found[4] + far[1], found[8] + far[2]))
-    for a in range(3):
-        if parameters.law != 2:
-            cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if parameters.law == 1 else 1.0)
+    set_rates(cell, parameters.law)
     if due:
         if parameters.law == 2:
             follow_pressure(grains, cell, cell.elapsed[0], parameters.time)
         cell.elapsed[0] = 0.0
     return 0
+
+
+def stages_of_part(long_range: bool) -> HookStages:
+    """Stages of awake clusters in a step of rigid bodies, in which the box changes linearly."""
+    work = work_of_box, DeformationNumbers(LAWS.index(LINEAR), 0.0, 0.0, long_range)
+    return {Hook.AFTER_DRIFT: [(deform, ())], Hook.AFTER_KICK: [work], Hook.END_OF_BODIES: [work]}
 
 
 def deformation_stages(numbers: DeformationNumbers) -> HookStages:

@@ -88,6 +88,28 @@ def add_virial_of_moment(sums, column, moment, field, span):
     accrue(sums, column, (-moment[0] * field[0], -moment[1] * field[1], -moment[2] * field[2]))
 
 
+@formula
+def extends_over_half(low, high, span):
+    """Whether a cuboid between two corners [m] extends over half of the box along an axis."""
+    x, y, z = (
+        (high[0] - low[0]) * span.inverse_x,
+        (high[1] - low[1]) * span.inverse_y,
+        (high[2] - low[2]) * span.inverse_z,
+    )
+    return max(x, max(y, z)) >= 0.5
+
+
+@unless_still(lambda offset, member, first, end, span: False)
+def spans_half(offset, member, first, end, span):
+    """Whether grains member[first … end − 1], at vectors (3, N) [m], extend over half of the box along an axis."""
+    low = high = load(offset, member[first])
+    for k in range(first, end):
+        x = load(offset, member[k])
+        low = min(low[0], x[0]), min(low[1], x[1]), min(low[2], x[2])
+        high = max(high[0], x[0]), max(high[1], x[1]), max(high[2], x[2])
+    return extends_over_half(low, high, span)
+
+
 @unless_still(lambda built, span: 0.0)
 def strain_since(built, span):
     """Σ |L/L₀ − 1| of the box since its lengths were L₀ = `built` (3,) [m]."""
@@ -126,6 +148,22 @@ def after_step(span, dt):
         span.x * x, span.y * y, span.z * z, span.inverse_x / x, span.inverse_y / y, span.inverse_z / z,
         span.rate_x / x, span.rate_y / y, span.rate_z / z,
     )  # fmt: skip
+
+
+@unless_still(lambda dt, span: span)
+def box_after(dt, span):
+    """`after_step`; a box that keeps its shape is the same."""
+    return after_step(span, dt)
+
+
+@unless_still(lambda velocity, separation, span: velocity)
+def less_flow(velocity, separation, span):
+    """v − A s [m/s], the velocity relative to the flow of a point at s [m] from one at which it is given by v."""
+    return (
+        velocity[0] - span.rate_x * separation[0],
+        velocity[1] - span.rate_y * separation[1],
+        velocity[2] - span.rate_z * separation[2],
+    )
 
 
 @formula
