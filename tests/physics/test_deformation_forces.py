@@ -147,7 +147,7 @@ def test_interruptions_change_no_bit_of_an_ewald_sum(tmp_path):
 @pytest.mark.validate
 @pytest.mark.parametrize("force", [sand.Charges(reciprocal="mesh"), sand.Dipoles(periodic="ewald", reciprocal="mesh")])
 def test_threads_change_no_bit_of_an_ewald_sum(force):
-    """1000 grains, whose sums are divided into blocks, in a box with unequal rates: the same bits with 1 and 2 threads."""
+    """1000 grains, whose sums are divided into blocks, at unequal rates: the same bits with 1 and 2 threads."""
     ends = []
     for threads in (1, 2):
         sand.set_threads(threads)

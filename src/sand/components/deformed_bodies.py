@@ -76,7 +76,8 @@ def deform_with_bodies(grains, long_range, bodies, cell, count, scratch, paramet
         return 0
     if block == BEFORE:
         _, inner, _, own = sums_of_bodies(grains, bodies, cell, count)
-        cell.begun[:] = cell.span
+        for k in range(9):
+            cell.begun[k] = cell.span[k]
         for a in range(3):
             cell.virial[a], cell.inner[a] = far[a] - inner[a], own[a]
         return 0
