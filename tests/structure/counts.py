@@ -35,6 +35,8 @@ CAPABILITIES = {
     "rates": 464,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
     "energy, folders of several runs named by view": 18,
+    "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
+    "plot of packings, stress in exports and in the figure of a run, tables described by info": 357,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
