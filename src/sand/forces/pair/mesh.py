@@ -96,13 +96,16 @@ def _moments(x: tuple, y: tuple, z: tuple, power: int) -> np.ndarray:
     return found + 2.0 * (_product(x[1], y[1], z[0]) + _product(x[1], y[0], z[1]) + _product(x[0], y[1], z[1]))
 
 
+_legendre = functools.cache(np.polynomial.legendre.leggauss)
+
+
 def lattice_sum(lengths: tuple[float, float, float], alpha: float) -> float:
     """Σ R over all wave vectors q ≠ 0 [m²].
 
     4π ∫ (Π_a Σ_n exp(−q_a² t) − 1) dt from 1/4α², over ln t.
     """
     start, end = 1.0 / (4.0 * alpha**2), NEGLIGIBLE * (max(lengths) / (2.0 * math.pi)) ** 2
-    x, weight = np.polynomial.legendre.leggauss(QUADRATURE)
+    x, weight = _legendre(QUADRATURE)
     t = start * (end / start) ** (0.5 * (x + 1.0))
     product = np.ones_like(t)
     for side in lengths:
