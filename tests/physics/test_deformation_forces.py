@@ -120,14 +120,14 @@ def test_a_cutoff_of_charges_in_a_plasma_stays_as_it_is(record_bound):
     """
     force = sand.ScreenedCharges("0.05 um", cutoff="0.15 um")
     sim = moving(force, SHRINKING, stepping=sand.Verlet(step="0.1 ns"))
-    result = sim.run(until="100 ns")
-    assert result.outcome is sand.Outcome.BOX_TOO_SMALL
-    assert sim.box.lengths[0] == pytest.approx(0.3e-6, rel=1e-3, abs=0.0)
+    sim.run(until="70 ns")
     first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
     assert abs(last["yukawa"]) > 1.5 * abs(first["yukawa"])
     error = abs(last["total"] - first["total"]) / abs(last["lost_box"])
     record_bound("screened charges: ledger over the work", error, most=1e-4)
     assert last["yukawa"] == pytest.approx(at_rest(sim, force).loads()["energy"]["yukawa"], rel=1e-12, abs=0.0)
+    assert sim.run(until="100 ns").outcome is sand.Outcome.BOX_TOO_SMALL
+    assert sim.box.lengths[0] == pytest.approx(0.3e-6, rel=1e-3, abs=0.0)
 
 
 def test_interruptions_change_no_bit_of_an_ewald_sum(tmp_path):
