@@ -49,7 +49,7 @@ class Fault:
 FAULTS = (
     # formulas
     Fault("velocities of a deformed box that grow with it", "sign", "formula", "numerics/flow.py",
-          "return v[0] / (1.0 + dt * span.rate_x)", "return v[0] * (1.0 + dt * span.rate_x)",
+          "return along / (1.0 + dt * span.rate_x)", "return along * (1.0 + dt * span.rate_x)",
           "unit/numerics/test_flow.py::test_a_drift_keeps_the_velocity_in_the_laboratory"),
     Fault("the time of a contact with the mass of a grain", "factor 2", "formula", "theory/compression.py",
           "math.sqrt(0.5 * mass", "math.sqrt(mass",

@@ -76,7 +76,7 @@ def deform_with_bodies(grains, long_range, bodies, cell, count, scratch, paramet
         return 0
     if block == BEFORE:
         _, inner, _, own = sums_of_bodies(grains, bodies, cell, count)
-        for k in range(9):
+        for k in range(cell.span.size):
             cell.begun[k] = cell.span[k]
         for a in range(3):
             cell.virial[a], cell.inner[a] = far[a] - inner[a], own[a]
@@ -84,7 +84,7 @@ def deform_with_bodies(grains, long_range, bodies, cell, count, scratch, paramet
     if parameters.long_range:
         sum_far_virial(long_range, cell)
     _, inner, _, _ = sums_of_bodies(grains, bodies, cell, count)
-    add_work(cell, (far[0] - inner[0], far[1] - inner[1], far[2] - inner[2]))
+    add_work(cell, (far[0] - inner[0], far[1] - inner[1], far[2] - inner[2], 0.0))
     set_rates(cell, parameters.law)
     _, _, strained, _ = sums_of_bodies(grains, bodies, cell, count)
     for a in range(3):

@@ -15,7 +15,7 @@ from ..basics.arrays import (
     empty_long_range_arrays,
     empty_pair_list,
 )
-from ..basics.box import Box, MovingSpan
+from ..basics.box import Box, Span
 from ..basics.grains import Grains
 from ..basics.state import RECORDED, State
 from ..contact.constants_table import constant_names
@@ -51,7 +51,7 @@ def new_state(
     needed |= set(RATE_ARRAYS if parameters.respa.taylor else ())
     needed |= {name for sums in pair_forces for name in sums.arrays}
     needed |= set(FORCE_ARRAYS if pair_forces or content.flight else ())
-    needed |= {"virial"} if pair_forces and isinstance(parameters.span, MovingSpan) else set()
+    needed |= {"virial"} if pair_forces and not isinstance(parameters.span, Span) else set()
     return State(
         grains,
         box,

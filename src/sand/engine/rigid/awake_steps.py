@@ -135,8 +135,8 @@ class AwakeSteps:
             stage.run(inner.table, numbers, Hook.END_OF_BODIES)
         if own.cell is not None and state.cell is not None:
             # that of the pairs of the part is not counted again with that of all pairs
-            twice = state.cell.strain * (far_before + own.cell.far_virial)
-            state.cell.work[:] = own.cell.work + 0.5 * twice
+            state.cell.work[:] = own.cell.work
+            state.cell.work[:3] += 0.5 * state.cell.strain[:3] * (far_before + own.cell.far_virial)
         self.measures.slipped[:] = self._slips(state, own) if own.count[SLIPPED] else 0.0
         self._have_changed = self.part.give_back(engine)
         self.columns = self.part.columns
@@ -222,7 +222,7 @@ class AwakeSteps:
 
 def _begin_in_box(cell: CellArrays) -> None:
     """Let a box change linearly from that at the start of a step of bodies to that at its end."""
-    cell.span[:], cell.start[:], cell.rate[:] = cell.begun, cell.begun[:3], cell.begun[6:]
+    cell.span[:], cell.start[:], cell.rate[:3] = cell.begun, cell.begun[:3], cell.begun[6:9]
     cell.strain[:] = 0.0
 
 

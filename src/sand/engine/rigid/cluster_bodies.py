@@ -125,8 +125,8 @@ def rest_cluster(state: State, index: np.ndarray) -> float:
     s = turn @ bodies.offset[:, index]
     momentum = (m * v).sum(axis=1)
     u, flow = v - (momentum / m.sum())[:, None], 0.0
-    if state.cell is not None and state.cell.span[6:].any():  # A s, relative to which they have the velocities
-        flow = state.cell.span[6:, None] * s
+    if state.cell is not None and state.cell.span[6:9].any():  # A s, relative to which they have the velocities
+        flow = state.cell.span[6:9, None] * s
         u = u + flow
     angular = turn.T @ (m * _cross(s, u) + inertia * w).sum(axis=1)
     bodies.momentum[:, first], bodies.angular_momentum[:, first] = momentum, angular

@@ -27,7 +27,8 @@ import numpy as np
 
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
-from ...numerics.flow import add_virial, add_virial_of_moment, compression, unless_still, with_wave
+from ...numerics.flow import add_virial, add_virial_of_moment, compression, with_wave
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, add, cross, dot, load, nearest_image, put, scale, sub
 from .dipole_formulas import pair_load

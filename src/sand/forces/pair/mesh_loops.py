@@ -27,7 +27,8 @@ import numpy as np
 from ...basics.alignment import SIMD_WIDTH
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
-from ...numerics.flow import add_virial, compression, unless_still
+from ...numerics.flow import add_virial, compression
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
 from .long_range_loops import Round

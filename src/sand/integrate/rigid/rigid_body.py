@@ -20,7 +20,8 @@ import math
 
 from ...basics.state import BODIES
 from ...compiler.jit import formula, loop
-from ...numerics.flow import after_step, box_after, drifted_with_flow, less_flow, slowed, unless_still
+from ...numerics.flow import after_step, box_after, drifted_with_flow, less_flow, slowed
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.quaternion import normalised, turned, turned_back
 from ...numerics.vec import accrue, add, axpy, cross, dot, load, load4, nearest_image, norm, put, put4, scale, sub
 from ..motion import count_crossings
@@ -178,7 +179,7 @@ def moved_centre(bodies, first, dt, span):
     """
     velocity = scale(1.0 / bodies.mass[first], load(bodies.momentum, first))
     put(bodies.momentum, first, slowed(load(bodies.momentum, first), span, dt))
-    return nearest_image(drifted_with_flow(load(bodies.centre, first), velocity, span, dt), after_step(span, dt))
+    return nearest_image(drifted_with_flow(load(bodies.centre, first), velocity, span, dt), after_step(dt, span))
 
 
 @loop

@@ -32,7 +32,8 @@ from ...compiler.jit import caller, formula, loop
 from ...compiler.program import call_stage, has_stage
 from ...compiler.stage import stage
 from ...neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
-from ...numerics.flow import extends_over_half, relative_velocity, unless_still
+from ...numerics.flow import extends_over_half, relative_velocity
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.quaternion import turned
 from ...numerics.vec import accrue, dot, load, load4, nearest_image, norm, put, sub
 from ..force_calls import add_external_loads, sum_external, sum_pair_forces
