@@ -291,35 +291,6 @@ def test_a_pressure_is_reached_and_kept():
     assert rows[-1]["total"] == pytest.approx(rows[0]["total"], abs=error)
 
 
-@pytest.mark.compiled("deformation", "dipoles")
-def test_dipoles_of_all_images_follow_the_box(record_bound):
-    """Free dipoles in a cube that shrinks: the Ewald sum has α L and r_c/L of its start, and the trace of W is 3U.
-
-    Energy and pressure tensor are those of a new Ewald sum in the present box, to its accuracy, and the ledger closes:
-    the work of the box on the dipoles is −A 3U dt, with errors of the steps.
-    """
-    rng = np.random.default_rng(2)
-    grid = np.stack(np.meshgrid(*[np.arange(3.0) - 1.0] * 3, indexing="ij"), -1).reshape(-1, 3) * 1.2e-7
-    moment = rng.normal(size=(27, 3)) * 3e-18
-    grains = sand.Grains(grid + rng.uniform(-1e-8, 1e-8, (27, 3)), "10 nm", "iron", moment=moment)
-    forces = [sand.Dipoles(periodic="ewald", reciprocal="direct", accuracy=1e-6)]
-    sim = sand.Simulation(grains, forces, box="0.4 um", deformation=sand.Deformation("-4e6 1/s"))
-    sim.run(until="60 ns")
-    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
-    assert last["box_x"] == pytest.approx(0.4e-6 * math.exp(-0.24), rel=1e-3, abs=0.0)
-    now = sand.Grains(sim.grains.position, "10 nm", "iron", moment=sim.grains.moment)
-    other = sand.Simulation(now, forces, box=sim.box)
-    fresh = other.loads()["energy"]["magnetic"]
-    assert last["magnetic"] == pytest.approx(fresh, abs=1e-5 * np.abs(last["magnetic"]))
-    tensor = other.stress().parts["magnetic"]
-    assert sim.stress().parts["magnetic"] == pytest.approx(tensor, abs=1e-5 * np.abs(tensor).max())
-    change = last["magnetic"] - first["magnetic"]
-    assert abs(change) > 0.3 * abs(first["magnetic"]) and abs(last["lost_box"]) > 0.1 * abs(change)
-    record_bound(
-        "error of the ledger over the work", abs(last["total"] - first["total"]) / abs(last["lost_box"]), most=1e-3
-    )
-
-
 def test_a_change_sets_the_rate_and_the_box():
     """New rates begin at the change; a box that is changed goes on from its new lengths, with the same contacts."""
     sim = packing(0.0, number=12, side=2.4e-6)

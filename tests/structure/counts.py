@@ -31,6 +31,8 @@ CAPABILITIES = {
     "figures of papers, sequential collisions, impact parameters in characteristic radii": 681,
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
     "grains in frames, pictures and page": 491,
+    "Ewald sums of dipoles and charges, forces with cut-offs, and rigid clusters in a box that is deformed at any "
+    "rates": 468,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
     "energy, folders of several runs named by view": 18,
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "

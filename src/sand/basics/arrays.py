@@ -110,6 +110,8 @@ class LongRangeArrays(NamedTuple):
     past_moment: Annotated[np.ndarray, Array((3, GRAINS), "A m^2", fewer=0)]
     # time integral of the displacement since the last summation
     path: Annotated[np.ndarray, Array((3, GRAINS), "m s", fewer=0)]
+    # shares in the virial W_aa of all images, in a box that is deformed; they add up to W_aa
+    virial: Annotated[np.ndarray, Array((3, GRAINS), "J", saved=False)]
     # forces and flux densities of each block of a sum over all pairs
     block_sums: Annotated[np.ndarray, Array(("blocks", 3, "padded"), saved=False)]
 
@@ -126,7 +128,10 @@ class CellArrays(NamedTuple):
     # pressure that the rates follow, and the present running means along each axis
     goal: Annotated[np.ndarray, Array((1,), "Pa")]
     pressure: Annotated[np.ndarray, Array((3,), "Pa")]
-    # virial W_aa of contacts and dipoles, and W_zx, when it was last summed; strains that go with them, and time, since
+    # whether there are such means
+    measured: Annotated[np.ndarray, Array((1,), required=False)]
+    # virial W_aa of contacts and long-range forces, and W_zx, when it was last summed; strains that go with them, and
+    # time, since
     virial: Annotated[np.ndarray, Array((4,), "J", earlier=3)]
     strain: Annotated[np.ndarray, Array((4,), earlier=3)]
     # shear strain since the start
@@ -134,6 +139,16 @@ class CellArrays(NamedTuple):
     elapsed: Annotated[np.ndarray, Array((1,), "s")]
     # time from which a row of the ledger may begin a mean: that of the last change of rates or, just after it, of a box
     changed: Annotated[np.ndarray, Array((1,), "s", required=False)]
+    # virial W_aa of the last sums of long-range forces
+    far_virial: Annotated[np.ndarray, Array((3,), "J", required=False)]
+    # `span` at the start of a step of rigid bodies; ½ Σ m u_a² of the grains of these less that of the bodies, then
+    begun: Annotated[np.ndarray, Array((11,), required=False)]
+    inner: Annotated[np.ndarray, Array((3,), "J", required=False)]
+    # parameters of Ewald sums of charges and of dipoles, numbers of `EwaldChoice`; lengths at which they were chosen,
+    # and time up to which they may stay
+    ewald: Annotated[np.ndarray, Array((2, 12), required=False)]
+    chosen: Annotated[np.ndarray, Array((3,), "m", required=False)]
+    lasts: Annotated[np.ndarray, Array((1,), "s", rule="no nan", required=False)]
     # work of the boundaries on the grains, by the deformation along each axis and by shear, up to then
     work: Annotated[np.ndarray, Array((4,), "J", summed=True, earlier=3)]
 

@@ -15,13 +15,14 @@ from ..basics.box import Box, MovingSpan, TiltedSpan, box_of, least_side
 from ..basics.errors import BadInput, shown
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
-from ..basics.state import CELL, CONTACTS, TILT, TIME, State
+from ..basics.state import BODIES, CELL, CONTACTS, TILT, TIME, State
 from ..basics.units import si
 from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
 from ..engine.component import Component, Setup
 from ..engine.engine import Engine
-from ..forces.pair.dipoles import Dipoles
+from ..engine.step_parameters import ForcesByType
+from ..forces.pair.ewald_force import MOST_STRAIN
 from ..integrate.hooks import HookStages
 from ..integrate.parts import ContactParameters
 from .deformation_stage import (
@@ -34,7 +35,10 @@ from .deformation_stage import (
     SHEAR,
     DeformationNumbers,
     deformation_stages,
+    stages_of_part,
 )
+from .deformed_bodies import stages_with_bodies
+from .deformed_ewald import follow_box, problems_of_forces, store_choices, use_choices, with_choices
 
 AXES = "xyz"
 OF_SHEAR = ("tilt", "shear", "work_shear", "mean_shear_stress")
@@ -48,7 +52,6 @@ LEAST_STRAIN = 1e-9
 REFUSED = {
     "walls": "walls",
     "driven": "driven grains",
-    "settling": "settling_time of contacts",
 }
 """Components that do not work in a box that is deformed, and what sentences call them."""
 
@@ -132,7 +135,22 @@ class DeformedBox(Component):
     every_step = True
     groups: ClassVar[Mapping[str, type]] = {CELL: CellArrays}
 
+    in_parts = True
+    is_part = False
+    """Whether it acts in contact steps of awake clusters."""
     _box: Box
+    _lengths: np.ndarray
+
+    def for_part(self) -> Component:
+        """As `Component.for_part`."""
+        part = DeformedBox(self.items)
+        part.is_part = True
+        return part
+
+    @property
+    def holds(self) -> bool:  # type: ignore[override]
+        """As `moves_box`: loads on awake clusters act on grains, which move relative to the flow within them."""
+        return self.moves_box
 
     @property
     def given(self) -> Deformation:
@@ -155,6 +173,8 @@ class DeformedBox(Component):
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""
+        if self.is_part:
+            return []
         found, where = [], "cannot be used in a box that is deformed; leave one of them out"
         for axis, length in zip(AXES, setup.box.lengths, strict=True):
             if length is None:
@@ -162,51 +182,53 @@ class DeformedBox(Component):
         if self.moves_box:
             others = [REFUSED[each.name] for each in setup.components if each.name in REFUSED]
             sheared = self.shears(setup.box)
-            others += [
-                f"the force '{each.name}'"
-                for each in setup.forces.long_range
-                if sheared or not isinstance(each, Dipoles)
-            ]
+            others += [f"the force '{each.name}'" for each in setup.forces.long_range if sheared]
             positions = [each for each in setup.forces.external if getattr(each, "position_dependent", False)]
             others += [f"the force '{each.name}', whose energy depends on the position," for each in positions]
-            if setup.stepping.name != "verlet":
+            moves_bodies = getattr(setup.stepping, "moves_bodies", False)
+            if moves_bodies and self.given.law == PRESSURE:
+                found.append("rigid clusters cannot be used with law = 'pressure'; give rates, or use sand.Verlet")
+            if moves_bodies and setup.forces.gas:
+                found.append("rigid clusters cannot be used with a gas in a box that is deformed; use sand.Verlet")
+            if setup.stepping.name != "verlet" and (sheared or not moves_bodies):
                 others.append(f"stepping = '{setup.stepping.name}'")
             found += [f"{other} {where}" for other in others]
             points = forces_at_points(self.given)
             step, rates = getattr(setup.stepping, "step", "auto"), [(*each.rate, each.shear or 0.0) for each in points]
             if step != "auto" and step * np.abs(rates).max() > LARGEST_STRAIN:
                 found.append(f"a step of {step:g} s strains the box by more than {LARGEST_STRAIN:g}; use step = 'auto'")
-            found += [] if sheared else self._problems_of_dipoles(setup)
+            found += [] if sheared else problems_of_forces(setup)
         return [f"deformation: {line}" for line in found]
 
-    def _problems_of_dipoles(self, setup: Setup) -> list[str]:
-        """Dipoles are summed over all images, with parameters in units of a side that does not grow."""
-        dipoles = next((each for each in setup.forces.long_range if isinstance(each, Dipoles)), None)
-        if dipoles is None:
-            return []
-        if not dipoles.uses_ewald(setup.grains, setup.box) or dipoles.ewald(setup.grains, setup.box).order:
-            return ["dipoles need periodic = 'ewald' and reciprocal = 'direct' in a box that is deformed"]
-        rates = [rate for each in forces_at_points(self.given) for rate in each.rate]
-        uniform = all(len(set(each.rate)) == 1 for each in forces_at_points(self.given))
-        if self.given.law == PRESSURE or not uniform or max(rates) > 0.0:
-            return ["dipoles need three equal rates of at most 0, and none that follows a pressure"]
-        return []
+    def at_start(self, forces: ForcesByType, setup: Setup) -> ForcesByType:
+        """The forces, with parameters of Ewald sums that last while the box is deformed."""
+        self._ewald, self._cutoff = np.zeros((2, 12)), 0.0
+        if self.moves_box and not self.is_part:
+            forces, self._cutoff = with_choices(forces, setup)
+            store_choices(forces.long_range, self._ewald)
+        return forces
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Stages of the deformation; none if all rates are 0."""
         self._box = setup.box
+        self._lengths = self._lengths_of_sums = np.array(setup.box.lengths, np.float64)
         if not self.moves_box:
             return {}
-        shortest = least_side(setup.grains.radius)
+        if self.is_part:
+            return stages_of_part(bool(setup.forces.long_range))
+        shortest = max(least_side(setup.grains.radius), 2.0 * self._cutoff)
         number, time = LAWS.index(self.given.law), self.given.time or 0.0
-        dipoles, sheared = bool(setup.forces.long_range), self.shears(setup.box)
-        return deformation_stages(DeformationNumbers(number, time, shortest, dipoles, sheared))
+        numbers = DeformationNumbers(number, time, shortest, bool(setup.forces.long_range), self.shears(setup.box))
+        if getattr(setup.stepping, "moves_bodies", False):
+            return stages_with_bodies(numbers)
+        return deformation_stages(numbers)
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the box in memory."""
         state.add_groups(self.groups, {})
         cell = _cell_of(state)
         cell.span[:], cell.start[:] = state.fixed_box.moving_span(sheared=True), self._box.lengths
+        cell.ewald[:], cell.chosen[:] = self._ewald, self._lengths
 
     def begin(self, engine: Engine) -> None:
         """Set rates and pressure of the present intervals of the ramps, and A where rates have changed."""
@@ -214,19 +236,27 @@ class DeformedBox(Component):
         cell.goal[0] = given.pressure or 0.0
         rates, linear = (*given.rate, given.shear or 0.0), given.law == LINEAR
         if (cell.rate != rates).any():
-            cell.rate[:] = rates
+            cell.rate[:], cell.lasts[0] = rates, min(cell.lasts[0], engine.stored_state.time)
             if given.law != PRESSURE:
                 cell.span[RATE:TILT] = cell.rate[:3] * (cell.start / cell.span[:3] if linear else 1.0)
             cell.span[SHEAR] = cell.rate[3] * (cell.start[2] / cell.span[2] if linear else 1.0)
+        if cell.ewald.any() and (cell.chosen != self._lengths_of_sums).any():
+            self._lengths_of_sums = cell.chosen.copy()
+            use_choices(engine, cell, self._cutoff)
 
     def next_time(self, engine: Engine) -> float:
-        """Next time [s] at which a ramp changes a rate or the pressure."""
-        ramps = ramps_of(self.given).values()
-        return min((ramp.next_change(engine.stored_state.time) for ramp in ramps), default=math.inf)
+        """Next time [s] at which a ramp changes a rate or the pressure, or Ewald sums need other parameters."""
+        ramps, state = ramps_of(self.given).values(), engine.stored_state
+        lasts = float(_cell_of(state).lasts[0]) if self._ewald.any() else math.inf
+        return min([lasts, *(ramp.next_change(state.time) for ramp in ramps)])
 
     def update(self, engine: Engine) -> None:
-        """As `begin`."""
+        """As `begin`; choose the parameters of Ewald sums anew, where the box has changed."""
         self.begin(engine)
+        cell = _cell_of(engine.stored_state)
+        longer = cell.start / cell.span[:3] if self.given.law == LINEAR else 1.0
+        follow_box(engine, cell, self._cutoff, (1.0 + 2.0 * MOST_STRAIN) * float(np.abs(cell.rate[:3] * longer).max()))
+        self._lengths_of_sums = cell.chosen.copy()
 
     def kept(self, kept: np.ndarray) -> Component:
         """The same deformation."""
@@ -241,6 +271,7 @@ class DeformedBox(Component):
         """Take over the lengths of a box that the user has changed; the work up to then was that of the box before."""
         time, span = arrays["clock"][TIME], arrays["cell/span"]
         arrays["cell/work"], arrays["cell/strain"] = self._work, np.zeros(4)
+        arrays |= {"cell/ewald": self._ewald, "cell/chosen": self._lengths, "cell/lasts": np.zeros(1)}
         given = force_at(self.given, time)
         if (arrays["cell/rate"] != (*given.rate, given.shear or 0.0)).any():
             arrays["cell/changed"] = np.array([time])
@@ -267,9 +298,7 @@ class DeformedBox(Component):
         """Values of the columns; the pressure is that of the present moment."""
         cell, grains = _cell_of(state), state.grains.arrays
         lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
-        work, (x, y, z) = present_work(state), grains.velocity
-        flux = (grains.mass * np.array([x * x, y * y, z * z, z * x])).sum(axis=1)
-        pressure = (present_virial(state) + flux) / volume
+        work, pressure = present_work(state), present_virial(state, with_motion=True) / volume
         filling = 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume
         values = [*lengths, filling, *work[:3], *pressure[:3], cell.span[TILT], cell.shear[0], work[3], -pressure[3]]
         named = {name: float(value) for name, value in zip(OF_BOX, values, strict=True)}
@@ -305,13 +334,24 @@ class DeformedBox(Component):
         return self.given.parameters()
 
 
-def present_virial(state: State) -> np.ndarray:
-    """W_aa and W_zx (4,) [J] of contacts and dipoles, whose energy is a third of the trace, with the present loads."""
+def present_virial(state: State, *, with_motion: bool = False) -> np.ndarray:
+    """W_aa and W_zx (4,) [J] of contacts and long-range forces, and of motion, with the loads of a state.
+
+    Rigid bodies have that of `deformed_bodies`, and no contacts.
+    """
     grains, contacts, used = state.grains.arrays, state.contacts, int(state.count[CONTACTS])
+    cell, bodies, moving = _cell_of(state), state.bodies, np.ones(len(state.grains), bool)
+    virial = np.append(cell.far_virial, 0.0)
+    if state.count[BODIES]:
+        moving, firsts = bodies.asleep == 0, np.unique(bodies.first[bodies.asleep == 1])
+        virial = cell.virial.copy()
+        virial[:3] += with_motion * (bodies.momentum[:, firsts] ** 2 / bodies.mass[firsts]).sum(axis=1)
+    x, y, z = grains.velocity
+    virial += with_motion * (grains.mass * np.array([x * x, y * y, z * z, z * x]))[:, moving].sum(axis=1)
     first, second = grains.position[:, contacts.pair[:, :used]].swapaxes(0, 1)
-    branch, force = state.box.nearest((first - second).T).T, contacts.force[:, :used]
-    of_dipoles = 0.5 * float((grains.moment * grains.field).sum())
-    return np.append((branch * force).sum(axis=1) - of_dipoles, (branch[2] * force[0]).sum())
+    branch = state.box.nearest((first - second).T).T
+    force = contacts.force[:, :used] * moving[contacts.pair[0, :used]]
+    return np.asarray(virial + np.append((branch * force).sum(axis=1), (branch[2] * force[0]).sum()))
 
 
 def present_work(state: State) -> np.ndarray:

@@ -6,6 +6,7 @@ from ..basics.state import CONTACTS
 from ..compiler.jit import loop
 from ..compiler.recipes import factory
 from ..compiler.stage import Stage, stage
+from ..numerics.flow import with_flow
 from ..numerics.vec import across, add, cross, dot, load, norm, scale, sub
 from .constants_table import column_loops
 from .damping import loads_on_grains, measured_load
@@ -64,7 +65,7 @@ def measure_bodies(grains, contacts, span, parameters):
         v, w = load(grains.velocity, first), load(grains.spin, first)
         if contacts.start[first + 1] > contacts.start[first]:
             size, mass = list_cluster(grains, contacts, clusters, span, first, math.inf), 0.0
-            v, w = rigid_motion(grains, clusters, size)
+            v, w = rigid_motion(grains, clusters, size, span)
         else:
             rotation = 0.5 * grains.inertia[first] * dot(w, w)
         for k in range(size if size > 1 else 0):
@@ -73,7 +74,8 @@ def measure_bodies(grains, contacts, span, parameters):
             turning = cross(w, load(clusters.offset, i))
             rotation += 0.5 * (grains.mass[i] * dot(turning, turning) + grains.inertia[i] * dot(w, w))
             # velocities relative to the rigid motion, so that no energies of almost equal size are subtracted
-            own_v, own_w = sub(sub(load(grains.velocity, i), v), turning), sub(load(grains.spin, i), w)
+            own_v = sub(with_flow(sub(load(grains.velocity, i), v), load(clusters.offset, i), span), turning)
+            own_w = sub(load(grains.spin, i), w)
             internal += 0.5 * (grains.mass[i] * dot(own_v, own_v) + grains.inertia[i] * dot(own_w, own_w))
         out[0, bodies], out[1, bodies], out[2, bodies] = size, mass, 0.5 * mass * dot(v, v)
         out[3, bodies], out[4, bodies] = rotation, internal

@@ -10,6 +10,7 @@ has none.  The internal kinetic energy, K − P²/2M − ½ Ω·J Ω, falls by t
 """
 
 from ..compiler.jit import formula, loop
+from ..numerics.flow import spans_half, with_flow
 from ..numerics.vec import add, axpy, cross, dot, load, nearest_image, put, scale, sub
 
 PERIOD_FRACTION = 0.05
@@ -72,8 +73,11 @@ def list_cluster(grains, contacts, clusters, span, first, since):
 
 
 @loop
-def rigid_motion(grains, clusters, size):
-    """Velocity V and rotation Ω of the listed cluster; its offsets become those from the centre of mass."""
+def rigid_motion(grains, clusters, size, span):
+    """Velocity V and rotation Ω of the listed cluster; its offsets become those from the centre of mass.
+
+    In a box that is deformed, V is that relative to the flow at the centre of mass, and Ω that of the laboratory.
+    """
     mass, centre, momentum = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(size):
         i = clusters.member[k]
@@ -86,7 +90,7 @@ def rigid_motion(grains, clusters, size):
         i = clusters.member[k]
         m, inertia, s = grains.mass[i], grains.inertia[i], sub(load(clusters.offset, i), centre)
         put(clusters.offset, i, s)
-        angular = axpy(m, cross(s, sub(load(grains.velocity, i), velocity)), angular)
+        angular = axpy(m, cross(s, with_flow(sub(load(grains.velocity, i), velocity), s, span)), angular)
         angular = axpy(inertia, load(grains.spin, i), angular)
         tensor = with_grain(tensor, m, inertia, s)
     return velocity, solve_symmetric(tensor, angular)
@@ -95,6 +99,9 @@ def rigid_motion(grains, clusters, size):
 @loop
 def settle_clusters(grains, contacts, clusters, span, since, part):
     """Remove a part of the motion of all grains relative to the rigid motion of their cluster.
+
+    In a box that is deformed, clusters that span half of it are left out: they may be joined to their own images, and
+    are then strained with the box.
 
     Parameters
     ----------
@@ -117,12 +124,15 @@ def settle_clusters(grains, contacts, clusters, span, since, part):
         if clusters.listed[first] == 0 and contacts.start[first + 1] > contacts.start[first]:
             size = list_cluster(grains, contacts, clusters, span, first, since)
             if size > 1:
-                velocity, rotation = rigid_motion(grains, clusters, size)
+                velocity, rotation = rigid_motion(grains, clusters, size, span)
+                if spans_half(clusters.offset, clusters.member, 0, size, span):
+                    continue
                 for k in range(size):
                     i = clusters.member[k]
-                    v, w = load(grains.velocity, i), load(grains.spin, i)
-                    rigid = add(velocity, cross(rotation, load(clusters.offset, i)))
-                    change_v, change_w = scale(part, sub(v, rigid)), scale(part, sub(w, rotation))
+                    v, w, s = load(grains.velocity, i), load(grains.spin, i), load(clusters.offset, i)
+                    rigid = add(velocity, cross(rotation, s))
+                    change_v = scale(part, sub(with_flow(v, s, span), rigid))
+                    change_w = scale(part, sub(w, rotation))
                     new_v, new_w = sub(v, change_v), sub(w, change_w)
                     put(grains.velocity, i, new_v)
                     put(grains.spin, i, new_w)

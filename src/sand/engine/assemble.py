@@ -158,7 +158,7 @@ def build_engine(
     )
 
     def build(others: Sequence[Force], search: Neighbours) -> Engine:
-        own = [each for each in extra if each.in_parts]
+        own = [each.for_part() for each in extra if each.in_parts]
         # held loads are the loads of all pairs less the sum of the part, from which impulses leave out pairs in contact
         steps = dataclasses.replace(verlet, far="every step") if holding else verlet
         return build_engine(wrapped, others, box, steps, search, seed, own, fresh=False)

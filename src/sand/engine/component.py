@@ -108,6 +108,10 @@ class Component:
         """Whether there is such a component because of this force."""
         return False
 
+    def for_part(self) -> Component:
+        """What acts on grains of awake clusters, if it is `in_parts`."""
+        return self
+
     def problems(self, setup: Setup) -> list[str]:
         """Why it does not fit to the other parts of a simulation, a sentence each."""
         return []

@@ -15,7 +15,7 @@ from ..basics.arrays import (
     empty_long_range_arrays,
     empty_pair_list,
 )
-from ..basics.box import Box
+from ..basics.box import Box, Span
 from ..basics.grains import Grains
 from ..basics.state import RECORDED, State
 from ..contact.constants_table import constant_names
@@ -51,6 +51,7 @@ def new_state(
     needed |= set(RATE_ARRAYS if parameters.respa.taylor else ())
     needed |= {name for sums in pair_forces for name in sums.arrays}
     needed |= set(FORCE_ARRAYS if pair_forces or content.flight else ())
+    needed |= {"virial"} if pair_forces and not isinstance(parameters.span, Span) else set()
     return State(
         grains,
         box,
@@ -67,7 +68,7 @@ def new_state(
             count,
             NEIGHBOURS_PER_GRAIN * count if search.listed else CELL_NEIGHBOURS if search.celled else 0,
             all_blocks(grains) if pair_forces and over_all_pairs else 0,
-            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
+            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS, "virial"} - needed,
         ),
         clusters=cluster_arrays(0),
         uniform_contacts=uniform_contacts,

@@ -15,7 +15,7 @@ import numpy as np
 from ..basics.array_groups import copy_group, resized
 from ..basics.arrays import SAVED_BODIES, ContactArrays, body_arrays, cluster_arrays
 from ..basics.grains import GrainArrays
-from ..basics.state import BROKEN, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE, SETTLED, State
+from ..basics.state import BROKEN, CELL, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE, SETTLED, State
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
 from ..integrate.part_copies import ColumnCopies, add_sums_of_part, array_pairs, begin_part, copy_columns
@@ -141,7 +141,7 @@ class Part:
             if state.uniform_contacts:
                 state.contacts.constants[...] = own.contacts.constants
         copy_columns.run(table, self._copies_of(state, own).give)
-        self._give_component_arrays(own, state, np.arange(len(self.index)), self.index)
+        self._give_component_arrays(own, state, np.arange(len(self.index)), self.index, but=CELL)
         if changed:
             resort_contacts_by_grain.run(engine.table_of(state))
         add_sums_of_part.run(table, (own.clock, own.count, own.lost, self._numbers))
@@ -174,9 +174,11 @@ class Part:
         self._engines[count] = engine
         return engine
 
-    def _give_component_arrays(self, source: State, target: State, own: np.ndarray, theirs: np.ndarray) -> None:
-        """Copy the groups of the components that act in the part (`Component.in_parts`)."""
-        for name in self.prototype.stored_state.of_components:
+    def _give_component_arrays(
+        self, source: State, target: State, own: np.ndarray, theirs: np.ndarray, but: str = ""
+    ) -> None:
+        """Copy the groups of the components that act in the part (`Component.in_parts`), without one of them."""
+        for name in self.prototype.stored_state.of_components.keys() - {but}:
             target.of_components[name] = copy_group(source.of_components[name], target.of_components[name], own, theirs)
 
     def _copies_of(self, state: State, own: State) -> Copies:

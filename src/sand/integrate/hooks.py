@@ -37,6 +37,9 @@ class Hook(IntEnum):
     NONE_AWAKE = 14  # bodies have moved by clock[STEP], and no cluster takes contact steps in which other things move
     END_OF_BODIES = 15  # called by the engine: awake clusters end a step of bodies; act for all time since the last
     ENERGIES = 16  # not called by the driver: add energies to an array, for a row of the ledger
+    BEFORE_BODIES = 17  # as BEFORE_DRIFT, of bodies
+    AFTER_BODIES = 18  # bodies are where they are at the end of the step; grains of awake clusters are not
+    KICKED_BODIES = 19  # momenta of bodies, and loads, are those of the end of the step; velocities of grains follow
 
 
 HookStages = Mapping[Hook, list[tuple[Any, Any]]]

@@ -30,10 +30,12 @@ docs/physics/long-range.md.
 
 @loop
 def clear_long_range_loads(long_range):
-    """Set all long-range forces and torques to 0."""
+    """Set all long-range forces and torques, and the virial, to 0."""
     for i in range(long_range.force.shape[1]):
         put(long_range.force, i, (0.0, 0.0, 0.0))
         put(long_range.torque, i, (0.0, 0.0, 0.0))
+    for i in range(long_range.virial.shape[1]):
+        put(long_range.virial, i, (0.0, 0.0, 0.0))
 
 
 @loop

@@ -10,7 +10,7 @@ import math
 from ..basics.box import MovingSpan, TiltedSpan
 from ..compiler.jit import formula, loop
 from .kinds_of_box import unless_still, unless_straight
-from .vec import axpy, load, sub
+from .vec import accrue, axpy, dot, load, sub
 
 
 @unless_straight(lambda span: 0.0)
@@ -59,10 +59,61 @@ def squared_approach(squared_speed, reach, span):
     return (2.0 * math.sqrt(squared_speed) + reach * rate_of_strain(span)) ** 2
 
 
-@unless_still(lambda length, span: 1.0)
-def shrinkage(length, span):
-    """Factor by which the box is shorter along x than a length [m]."""
-    return length * span.inverse_x
+@unless_still(lambda volume, span: 1.0)
+def compression(volume, span):
+    """A volume [m³] over that of the box."""
+    return volume * span.inverse_x * span.inverse_y * span.inverse_z
+
+
+@unless_still(lambda virial, separation, force, span: virial)
+def with_pair(virial, separation, force, span):
+    """Sums (3,) of r_a F_a [J], with those of one more pair; 0 in a box that keeps its shape, as nothing needs them."""
+    return axpy(1.0, (separation[0] * force[0], separation[1] * force[1], separation[2] * force[2]), virial)
+
+
+@unless_still(lambda virial, energy, q, quarter, span: virial)
+def with_wave(virial, energy, q, quarter, span):
+    """As `with_pair`, with U_q [1 − 2 q_a² (1/q² + 1/4α²)] of one more wave q [1/m]; `quarter` is 1/4α² [m²]."""
+    slope = 2.0 * energy * (1.0 / dot(q, q) + quarter) if energy > 0.0 else 0.0
+    return (
+        virial[0] + energy - slope * q[0] * q[0],
+        virial[1] + energy - slope * q[1] * q[1],
+        virial[2] + energy - slope * q[2] * q[2],
+    )
+
+
+@unless_still(lambda sums, column, virial, span: None)
+def add_virial(sums, column, virial, span):
+    """Add W_aa (3,) [J] to a column of an array (3, …) of sums."""
+    accrue(sums, column, virial)
+
+
+@unless_still(lambda sums, column, moment, field, span: None)
+def add_virial_of_moment(sums, column, moment, field, span):
+    """Add −μ_a B_a [J] to a column of an array (3, …) of sums."""
+    accrue(sums, column, (-moment[0] * field[0], -moment[1] * field[1], -moment[2] * field[2]))
+
+
+@formula
+def extends_over_half(low, high, span):
+    """Whether a cuboid between two corners [m] extends over half of the box along an axis."""
+    x, y, z = (
+        (high[0] - low[0]) * span.inverse_x,
+        (high[1] - low[1]) * span.inverse_y,
+        (high[2] - low[2]) * span.inverse_z,
+    )
+    return max(x, max(y, z)) >= 0.5
+
+
+@unless_still(lambda offset, member, first, end, span: False)
+def spans_half(offset, member, first, end, span):
+    """Whether grains member[first … end − 1], at vectors (3, N) [m], extend over half of the box along an axis."""
+    low = high = load(offset, member[first])
+    for k in range(first, end):
+        x = load(offset, member[k])
+        low = min(low[0], x[0]), min(low[1], x[1]), min(low[2], x[2])
+        high = max(high[0], x[0]), max(high[1], x[1]), max(high[2], x[2])
+    return extends_over_half(low, high, span)
 
 
 @unless_still(lambda built, span: 0.0)
@@ -114,6 +165,22 @@ def after_step(dt, span):
         span.rate_x / x, span.rate_y / y, span.rate_z / z,
         x * span.tilt + dt * span.rate_xz * span.z, span.rate_xz / (x * z),
     )  # fmt: skip
+
+
+@unless_still(lambda dt, span: span)
+def box_after(dt, span):
+    """`after_step`; a box that keeps its shape is the same."""
+    return after_step(dt, span)
+
+
+@unless_still(lambda velocity, separation, span: velocity)
+def less_flow(velocity, separation, span):
+    """v − A s [m/s], the velocity relative to the flow of a point at s [m] from one at which it is given by v."""
+    return (
+        velocity[0] - span.rate_x * separation[0] - sheared(separation[2], span),
+        velocity[1] - span.rate_y * separation[1],
+        velocity[2] - span.rate_z * separation[2],
+    )
 
 
 @formula

@@ -16,10 +16,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...basics.arrays import CellArrays
 from ...basics.state import CONTACTS, OUTSIDE, SLIPPED, STEP, STEPS, State
 from ...compiler.table import Table
 from ...integrate.hooks import Hook
-from ...integrate.parts import Stop
+from ...integrate.parts import DT, Stop
 from ...integrate.rigid.awake_clusters import (
     ClusterMeasures,
     cluster_measures,
@@ -98,15 +99,22 @@ class AwakeSteps:
     def take_with_loads(self, engine: Engine, state: State) -> State:
         """The state of the awake grains, with all loads that their engine sums."""
         own = self.take(engine, state)
+        self._sum_loads(own)
+        return own
+
+    def _sum_loads(self, own: State) -> None:
         own.begin_empty_step()
         self.part.engine.drive(-math.inf, 1)
         own.count[STEPS] = 0
-        return own
 
     def take_contact_steps(self, engine: Engine) -> Stop:
         """Contact steps of the awake grains for one step of the bodies; returns why they failed."""
         state = engine.regular_state
-        own, inner = self.take_with_loads(engine, state), self.part.engine
+        own, inner = self.take(engine, state), self.part.engine
+        if own.cell is not None:
+            _begin_in_box(own.cell)
+        self._sum_loads(own)
+        far_before = None if own.cell is None else own.cell.far_virial.copy()
         before, end = state.time, state.time + float(state.clock[STEP])
         if engine.parameters.external_work.time_dependent:
             # the driver of bodies has booked the change of their energies at rest; the inner engine books it as well
@@ -121,8 +129,14 @@ class AwakeSteps:
                 return stop
             if k < pieces:
                 self.measure()
+        if own.cell is not None:
+            inner.table["scratch"][DT] = 0.0  # the work up to now is added up
         for stage, numbers in inner.content.of_components.get(Hook.END_OF_BODIES, ()):
             stage.run(inner.table, numbers, Hook.END_OF_BODIES)
+        if own.cell is not None and state.cell is not None:
+            # that of the pairs of the part is not counted again with that of all pairs
+            state.cell.work[:] = own.cell.work
+            state.cell.work[:3] += 0.5 * state.cell.strain[:3] * (far_before + own.cell.far_virial)
         self.measures.slipped[:] = self._slips(state, own) if own.count[SLIPPED] else 0.0
         self._have_changed = self.part.give_back(engine)
         self.columns = self.part.columns
@@ -204,6 +218,12 @@ class AwakeSteps:
             if before.get(frozenset(self.grains[pair].tolist())) != now.tobytes():
                 slipped[pair] = True
         return slipped
+
+
+def _begin_in_box(cell: CellArrays) -> None:
+    """Let a box change linearly from that at the start of a step of bodies to that at its end."""
+    cell.span[:], cell.start[:], cell.rate[:3] = cell.begun, cell.begun[:3], cell.begun[6:9]
+    cell.strain[:] = 0.0
 
 
 def mark_near(engine: Engine, table: Table) -> None:

@@ -291,4 +291,5 @@ class BodySteps(GrainSteps):
 
 def _moving_arrays(state: State) -> list[np.ndarray]:
     """Arrays that change in a step of bodies."""
-    return [*OF_GRAINS(state.grains.arrays), *OF_BODIES(state.bodies), state.clock, state.count, state.lost]
+    own = *OF_GRAINS(state.grains.arrays), *OF_BODIES(state.bodies), *(state.cell or ())
+    return [*own, state.clock, state.count, state.lost]

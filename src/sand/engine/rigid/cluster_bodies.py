@@ -124,14 +124,17 @@ def rest_cluster(state: State, index: np.ndarray) -> float:
     v, w = grains.velocity[:, index], grains.spin[:, index]
     s = turn @ bodies.offset[:, index]
     momentum = (m * v).sum(axis=1)
-    u = v - (momentum / m.sum())[:, None]
+    u, flow = v - (momentum / m.sum())[:, None], 0.0
+    if state.cell is not None and state.cell.span[6:9].any():  # A s, relative to which they have the velocities
+        flow = state.cell.span[6:9, None] * s
+        u = u + flow
     angular = turn.T @ (m * _cross(s, u) + inertia * w).sum(axis=1)
     bodies.momentum[:, first], bodies.angular_momentum[:, first] = momentum, angular
     inverse = np.array([-1.0, -1.0, -1.0, 1.0]) * q
     for i in index:
         bodies.turn[:, i] = product(tuple(inverse), tuple(grains.orientation[:, i]))
     spin = (turn @ (angular / bodies.inertia[:, first]))[:, None]
-    new_v = (momentum / m.sum())[:, None] + _cross(spin, s)
+    new_v = (momentum / m.sum())[:, None] + _cross(spin, s) - flow
     removed = 0.5 * float((m * (v - new_v) * (v + new_v)).sum())
     removed += 0.5 * float((inertia * (w - spin) * (w + spin)).sum())
     grains.velocity[:, index], grains.spin[:, index] = new_v, spin

@@ -11,8 +11,9 @@ import numpy as np
 
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
+from ...numerics.flow import add_virial, with_pair
 from ...numerics.simd import round_up_to_simd_width
-from ...numerics.vec import accrue, add, cross, load, nearest_image, put, sub
+from ...numerics.vec import accrue, add, cross, load, nearest_image, put, scale, sub
 from .dipole_formulas import pair_load, pair_load_cut
 from .dipole_rates import pair_rates
 from .long_range_loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks, virial_of_pairs
@@ -158,7 +159,7 @@ def listed_block_of(pair_loads: Callable) -> Callable:
         for k in range(last - first):
             s = first + k
             position, moment = load(long_range.packed_position, s), load(long_range.packed_moment, s)
-            force = field = (0.0, 0.0, 0.0)
+            force = field = virial = (0.0, 0.0, 0.0)
             begin = np.uint64(long_range.start[s])
             pairs = np.uint64(long_range.start[s + np.uint64(1)]) - begin
             for m in range(round_up_to_simd_width(pairs, remainder)):
@@ -173,9 +174,12 @@ def listed_block_of(pair_loads: Callable) -> Callable:
                     m < pairs,
                 )
                 force, field = add(force, f), add(field, b)
+                apart = nearest_image(sub(position, load(long_range.packed_position, t)), span)
+                virial = with_pair(virial, apart, f, span)
             i = long_range.order[s]
             accrue(long_range.force, i, force)
             put(grains.field, i, field)
+            add_virial(long_range.virial, i, scale(0.5, virial), span)
 
     @loop
     def block(grains, long_range, span, parameters, b):
@@ -199,7 +203,7 @@ def rows_of(pair_loads: Callable) -> Callable:
         for k in range(last - first):
             i = first + k
             position, moment = load(long_range.packed_position, i), load(long_range.packed_moment, i)
-            force_i = field_i = (0.0, 0.0, 0.0)
+            force_i = field_i = virial = (0.0, 0.0, 0.0)
             for j in range(round_up_to_simd_width(i, remainder)):
                 f, b1, b2, _ = pair_loads(
                     position,
@@ -211,10 +215,13 @@ def rows_of(pair_loads: Callable) -> Callable:
                     j < i,
                 )
                 force_i, field_i = add(force_i, f), add(field_i, b1)
+                apart = nearest_image(sub(position, load(long_range.packed_position, j)), span)
+                virial = with_pair(virial, apart, f, span)
                 accrue(force, j, (-f[0], -f[1], -f[2]))
                 accrue(field, j, b2)
             accrue(force, i, force_i)
             accrue(field, i, field_i)
+            add_virial(long_range.virial, i, virial, span)
 
     return add_rows
 

@@ -191,7 +191,8 @@ class Dipoles(EwaldForce):
             tree = self.tree(grains)
             return tree_parameters(len(grains), tree.degree, tree.opening)
         if self.periodic == "ewald":
-            return ewald_parameters(self.ewald(grains, box), box, len(grains), self.boundary == "vacuum")
+            choice, moves = self.ewald(grains, box), self.chosen is not None
+            return ewald_parameters(choice, box, len(grains), self.boundary == "vacuum", follows_box=moves)
         return self.numbers_at(self.choose(grains, box).radius)
 
     def numbers_at(self, radius: float | None) -> DipoleParameters:

@@ -25,7 +25,7 @@ from ...basics.box import Box
 from ...basics.errors import BadInput
 from .ewald_fit import DIPOLES, Sources, erfc, fitted
 from .ewald_loops import UNUSED, Buffers, EwaldParameters, MeshEwaldParameters, Waves
-from .long_range_loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
+from .long_range_loops import blocks_for
 from .mesh import MOST_NODES, mesh_errors, mesh_sums, new_mesh, nodes_for, widest_cells
 from .mesh_loops import ORDERS
 
@@ -45,6 +45,8 @@ LIST_FROM, LIST_REACH, LIST_UP_TO = 64, 1.1, 0.38
 """Conditions for a Verlet list, as in `neighbours.search`: grains, reach in units of r_c, fraction within reach."""
 LARGEST_SPACING = 0.8
 """Upper limit of a in units of half the shortest side, for few grains and long boxes."""
+WIDER, OTHER_PRODUCT = 1.3, 0.25
+"""Largest ratio of r_c, and difference of α r_c, to those of a choice that the next one shall be like."""
 MOST_WAVES = 1_000_000
 """Largest number of wave vectors, half of all."""
 
@@ -160,6 +162,7 @@ def choose_ewald(
     least: float,
     sources: Sources = DIPOLES,
     reciprocal: str = "auto",
+    like: EwaldChoice | None = None,
 ) -> EwaldChoice:
     """The cheapest parameters for an accuracy.
 
@@ -179,6 +182,9 @@ def choose_ewald(
         `ewald_fit.CHARGES` or `DIPOLES`.
     reciprocal : str, optional
         How the reciprocal part is summed: "direct", over wave vectors; "mesh"; or "auto", the cheaper of both.
+    like : EwaldChoice, optional
+        A choice for almost the same box: as this one, over wave vectors or with splines of the same order, and with
+        similar r_c and α.
 
     Raises
     ------
@@ -190,8 +196,12 @@ def choose_ewald(
     problem = _Problem(lengths, volume, spacing, accuracy, degree, count, sources)
     direct, meshes = [], []
     for radius in sorted({max(min(least, half), fraction * half) for fraction in RADII}):
+        if like is not None and not radius < WIDER * like.radius < WIDER**2 * radius:
+            continue
         pairs = sources.pair_cost * _cost_of_pairs(count, radius, volume)
         for product in PRODUCTS:
+            if like is not None and abs(product - like.product) > OTHER_PRODUCT:
+                continue
             force, field = real_errors(product, degree, radius, spacing, sources)
             if max(force, field) >= accuracy:
                 continue
@@ -200,7 +210,8 @@ def choose_ewald(
                 waves = _waves_needed(product / radius, spacing, volume, limits, sources)
                 direct.append((pairs + sources.wave_cost * count * waves, -radius, product, waves))
             if reciprocal != "direct":
-                meshes += _meshes(problem, pairs, radius, product, limits)
+                found = _meshes(problem, pairs, radius, product, limits)
+                meshes += [each for each in found if like is None or each[-1] == like.order]
     if not direct and not meshes:
         instead = "" if reciprocal != "mesh" else ", or leave reciprocal = 'mesh' out"
         raise BadInput(
@@ -243,8 +254,9 @@ def _meshes(
 
 
 def _cost_of_mesh(count: int, nodes: tuple[int, int, int], order: int) -> float:
-    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
-    return blocks * TRANSFORMS_COST + NODE_COST * math.prod(nodes) + count * (GRAIN_COST + ROW_COST * order**2)
+    return (
+        blocks_for(count) * TRANSFORMS_COST + NODE_COST * math.prod(nodes) + count * (GRAIN_COST + ROW_COST * order**2)
+    )
 
 
 def _with_mesh(
@@ -326,9 +338,9 @@ def mean_field(alpha: float, volume: float, vacuum: bool, sources: Sources = DIP
 
 
 def ewald_parameters(
-    choice: EwaldChoice, box: Box, count: int, vacuum: bool, sources: Sources = DIPOLES
+    choice: EwaldChoice, box: Box, count: int, vacuum: bool, sources: Sources = DIPOLES, *, follows_box: bool = False
 ) -> EwaldParameters | MeshEwaldParameters:
-    """Parameters of the loops, with buffers for `count` grains."""
+    """Parameters of the loops, with buffers for `count` grains; `follows_box`: in a box that may be deformed."""
     lengths, volume = sides(box), box.volume
     radius, alpha, order = choice.radius, choice.alpha, sources.order
     found = fitted(choice.product, choice.degree, order)
@@ -341,17 +353,15 @@ def ewald_parameters(
         if order == 0:
             smeared = 2.0 * alpha * sources.k / math.sqrt(math.pi)
         own = smeared + sources.k / volume * sums.self_mean
-        return MeshEwaldParameters(
-            *of_pairs, own, mean, alpha, lengths[0], new_mesh(sums, choice.nodes, volume, count, sources)
-        )
-    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
-    size = padded_size(count)
+        mesh = new_mesh(sums, choice.nodes, lengths, count, sources, follows_box=follows_box)
+        return MeshEwaldParameters(*of_pairs, own, mean, alpha, volume, mesh)
+    blocks, size = blocks_for(count), padded_size(count)
     return EwaldParameters(
         *of_pairs,
         own_field(alpha, choice.waves, volume, sources),
         mean,
         alpha,
-        lengths[0],
+        volume,
         _waves(lengths, choice, count, blocks, sources),
         Buffers(*(np.zeros((blocks, 0 if name in UNUSED[order] else size)) for name in Buffers._fields)),
     )
@@ -389,4 +399,5 @@ def _waves(
         cosine.copy(),
         sine.copy(),
         np.zeros((2 * sources.order + 1, padded_size(count))),
+        np.zeros((3, blocks)),
     )

@@ -15,19 +15,22 @@ from collections.abc import Callable
 
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
-from ...numerics.vec import accrue, dot
+from ...numerics.flow import add_virial, compression
+from ...numerics.vec import accrue, dot, load
 from .ewald_formulas import real_part_of_charges
 from .ewald_loops import with_waves
 from .ewald_virial import direct_virial, mesh_virial
 from .generic_loops import ZERO, sums_of
 from .long_range_loops import LongRangeSums, all_blocks
-from .mesh_loops import MESH_CHARGES, add_mesh_forces, mesh_rounds, remove_self_waves
+from .mesh_loops import MESH_CHARGES, add_mesh_forces, add_mesh_virial, mesh_rounds, remove_self_waves
 
 
 @loop
-def add_wave_forces(grains, long_range, sums):
+def add_wave_forces(grains, long_range, span, parameters):
     """Add the forces of all blocks of wave vectors."""
+    sums = parameters.buffers
     for b in range(sums.wave.shape[0]):
+        add_virial(long_range.virial, 0, load(parameters.waves.virial, b), span)
         for i in range(grains.mass.size):
             accrue(long_range.force, i, (sums.force_x[b, i], sums.force_y[b, i], sums.force_z[b, i]))
 
@@ -47,17 +50,27 @@ def with_mesh_potential(potential, parameters, i):
     return potential - parameters.mesh.field[0, i]
 
 
+@loop
+def add_virial_of_background(grains, long_range, span, parameters):
+    """Add the virial ½ Q φ of the background, whose energy is proportional to 1/V."""
+    total = 0.0
+    for i in range(grains.mass.size):
+        total += grains.charge[i]
+    energy = 0.5 * parameters.mean_field * compression(parameters.volume, span) * total * total
+    add_virial(long_range.virial, 0, (energy, energy, energy), span)
+
+
 @factory
 def add_energies_of(with_reciprocal: Callable) -> Callable:
     """The loop that adds ½ q (reciprocal part of φ, less that of the own charge, with that of the background) [J]."""
 
     @loop
-    def add_energies(grains, parameters, shares):
-        total = 0.0
+    def add_energies(grains, span, parameters, shares):
+        total, mean_field = 0.0, parameters.mean_field * compression(parameters.volume, span)
         for i in range(grains.mass.size):
             total += grains.charge[i]
         for i in range(grains.mass.size):
-            potential = parameters.mean_field * total - parameters.self_field * grains.charge[i]
+            potential = mean_field * total - parameters.self_field * grains.charge[i]
             shares[i] += 0.5 * grains.charge[i] * with_reciprocal(potential, parameters, i)
 
     return add_energies
@@ -94,6 +107,8 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0)
         @loop
         def end_with_mesh(grains, long_range, span, parameters):
             end_pairs(grains, long_range, span, parameters)
+            add_mesh_virial(long_range, parameters.mesh, span)
+            add_virial_of_background(grains, long_range, span, parameters)
             remove_waves(grains, span, parameters.mesh)
             add_mesh_forces(grains, long_range, parameters.mesh)
 
@@ -101,7 +116,7 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0)
         def mesh_energies(grains, long_range, span, parameters, shares):
             pair_energies(grains, long_range, span, parameters, shares)
             remove_waves(grains, span, parameters.mesh)
-            add_mesh_energies(grains, parameters, shares)
+            add_mesh_energies(grains, span, parameters, shares)
 
         rounds = mesh_rounds(order, MESH_CHARGES)
         return pairs._replace(
@@ -118,7 +133,8 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0)
     @loop
     def end(grains, long_range, span, parameters):
         end_pairs(grains, long_range, span, parameters)
-        add_wave_forces(grains, long_range, parameters.buffers)
+        add_wave_forces(grains, long_range, span, parameters)
+        add_virial_of_background(grains, long_range, span, parameters)
 
     @loop
     def energies(grains, long_range, span, parameters, shares):
@@ -126,7 +142,7 @@ def ewald_charge_sums(degree: int, listed: bool, bare: Callable, order: int = 0)
         begin(grains, long_range, span, parameters)
         for b in range(all_blocks(grains)):  # those of the waves
             block(grains, long_range, span, parameters, b)
-        add_wave_energies(grains, parameters, shares)
+        add_wave_energies(grains, span, parameters, shares)
 
     return pairs._replace(
         begin=begin, block=block, end=end, blocks=blocks, energies=energies, reciprocal_virial=direct_virial(False)

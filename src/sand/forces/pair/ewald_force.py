@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Set
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
 
 from ...basics.box import Box
 from ...basics.errors import BadInput, ErrorCollector, shown
 from ...basics.grains import Grains
 from ...basics.settings import Number, Word
 from .cutoff import CutoffChoice, CutoffForce
-from .ewald import EwaldChoice, choose_ewald, sides
+from .ewald import EwaldChoice, choose_ewald, half_of_vectors, sides
 from .ewald_fit import Sources
 from .tree import ACCURACIES as TREE_ACCURACIES
 
@@ -25,6 +28,10 @@ Reciprocal = Annotated[str, Word("auto", "direct", "mesh")]
 DEFAULT_ACCURACY = 1e-3
 SMALLEST_RADIUS = 6.0
 """Smallest radius of the real part of an Ewald sum, in radii of the largest grain, if the box allows it."""
+
+
+MOST_STRAIN = 2e-3
+"""Change of a side of a box after which the parameters of an Ewald sum are chosen anew: errors grow by up to 6 %."""
 
 
 class EwaldForce(CutoffForce):
@@ -45,6 +52,7 @@ class EwaldForce(CutoffForce):
     open: str = "pairs"
 
     sources: ClassVar[Sources]
+    chosen: ClassVar[EwaldChoice | None] = None  # of a force in a box that may be deformed, see `with_choice`
 
     def contradictions(self, wrong: Set[str]) -> list[str]:
         """Settings that cannot be given together, or are not used; a misspelt word is not judged."""
@@ -160,14 +168,42 @@ class EwaldForce(CutoffForce):
         BadInput
             If the box is open along an axis, or needs too many wave vectors and nodes.
         """
+        if self.chosen is not None:
+            return self.chosen
         if any(side is None for side in box.lengths):
             raise BadInput(
                 f"{self.name}: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is "
                 f"{box.describe()}; give three lengths, or leave periodic out"
             )
-        least = SMALLEST_RADIUS * float(grains.radius.max())
-        carriers = max(self.carriers(grains), 1)
-        return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources, self.reciprocal)
+        return self._chosen_for(sides(box), grains, self.reciprocal)
+
+    def _chosen_for(
+        self, lengths: tuple[float, float, float], grains: Grains, reciprocal: str, like: EwaldChoice | None = None
+    ) -> EwaldChoice:
+        """The parameters for a box; see `choose_ewald`."""
+        least, carriers = SMALLEST_RADIUS * float(grains.radius.max()), max(self.carriers(grains), 1)
+        return choose_ewald(lengths, len(grains), carriers, self.accuracy, least, self.sources, reciprocal, like)
+
+    def with_choice(self, choice: EwaldChoice) -> Self:
+        """The same force, which keeps this choice in all boxes."""
+        found = copy.copy(self)
+        object.__setattr__(found, "chosen", choice)
+        return found
+
+    def for_moving_box(self, grains: Grains, lengths: np.ndarray) -> Self:
+        """The same force with parameters that stay valid while the sides of a box [m] change by up to MOST_STRAIN.
+
+        After the first choice, the loops stay the same: over wave vectors, or with splines of the same order.
+        """
+        x, y, z = (float(side) * (1.0 - MOST_STRAIN) for side in lengths)
+        like, reciprocal = self.chosen, self.reciprocal
+        if like is not None:
+            reciprocal = "mesh" if like.order else "direct"
+        choice = self._chosen_for((x, y, z), grains, reciprocal, like)
+        if not choice.order:
+            vectors = half_of_vectors((float(lengths[0]), float(lengths[1]), float(lengths[2])), choice.largest)
+            choice = choice._replace(waves=len(vectors))
+        return self.with_choice(choice)
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box.

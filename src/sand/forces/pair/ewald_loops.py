@@ -15,8 +15,8 @@ G = (8πk/V) exp(−q²/4α²)/q², a = μ_x q_x + μ_y q_y and b = μ_z, or a =
 Each column needs no other one, so that columns are shared among threads in blocks, each with sums of its own.  The real
 part of dipoles is summed by the pair loops of `dipole_loops`, that of charges in `ewald_charges`.
 
-In a box that keeps the ratios of its sides, α L and r_c/L stay as they were at a length L₀: with λ = L₀/L the loads
-of dipoles are those at λ x in the box of L₀, times λ⁴ for forces and λ³ for flux densities and energies.
+In a box that is deformed, α, r_c and the integers n stay as they were chosen; q, V and with them G are those of the
+present box.  So the virial of `ewald_virial` is the derivative of the energy that is summed.
 """
 
 import math
@@ -27,9 +27,10 @@ import numpy as np
 
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
-from ...numerics.flow import shrinkage
+from ...numerics.flow import add_virial, add_virial_of_moment, compression, with_wave
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.turns import cosine_and_sine
-from ...numerics.vec import accrue, add, cross, load, nearest_image, put, scale, sub
+from ...numerics.vec import accrue, add, cross, dot, load, nearest_image, put, scale, sub
 from .dipole_formulas import pair_load
 from .dipole_loops import (
     COPIES,
@@ -45,7 +46,15 @@ from .dipole_loops import (
 from .ewald_formulas import real_part
 from .ewald_virial import direct_virial, mesh_virial
 from .long_range_loops import LongRangeSums, all_blocks, listed_blocks, virial_of_pairs
-from .mesh_loops import MESH_DIPOLES, Mesh, add_mesh_field, add_mesh_forces, mesh_rounds, remove_self_waves
+from .mesh_loops import (
+    MESH_DIPOLES,
+    Mesh,
+    add_mesh_field,
+    add_mesh_forces,
+    add_mesh_virial,
+    mesh_rounds,
+    remove_self_waves,
+)
 
 
 class Buffers(NamedTuple):
@@ -88,6 +97,7 @@ class Waves(NamedTuple):
     cosine: np.ndarray  # (3, M+1, V): cos(2π m x/L) of each axis
     sine: np.ndarray  # (3, M+1, V)
     source: np.ndarray  # (3, V) moments [A m²] or (1, V) charges [C], padded with zeros
+    virial: np.ndarray  # (3, B): Σ U_q [1 − 2 q_a² (1/q² + 1/4α²)] [J] of each block, in a box that is deformed
 
 
 class EwaldParameters(NamedTuple):
@@ -100,7 +110,7 @@ class EwaldParameters(NamedTuple):
     self_field: float  # about 4α³k/(3√π) [T/(A m²)] or 2αk/√π [V/C]: of a grain's own smeared dipole or charge, removed
     mean_field: float  # per total moment −4πk/(3V) in vacuum, 0 for tin foil [T/(A m²)]; per net charge −πk/(Vα²) [V/C]
     alpha: float  # α [1/m]
-    length: float  # side of the box along x [m], to which these belong
+    volume: float  # of the box for which they were chosen [m³]
     waves: Waves
     buffers: Buffers
 
@@ -115,8 +125,22 @@ class MeshEwaldParameters(NamedTuple):
     self_field: float
     mean_field: float
     alpha: float
-    length: float
+    volume: float
     mesh: Mesh
+
+
+@unless_still(lambda parameters, span: None)
+def weigh_waves(parameters, span):
+    """Set the weights G of all wave vectors to those of the present box."""
+    waves, turn, quarter = parameters.waves, 2.0 * math.pi, 0.25 / parameters.alpha**2
+    size = 8.0 * math.pi * parameters.k * span.inverse_x * span.inverse_y * span.inverse_z
+    for column in range(waves.column.shape[1]):
+        n_x, n_y, first = waves.column[0, column], waves.column[1, column], waves.column[3, column]
+        across = (turn * n_x * span.inverse_x) ** 2 + (turn * n_y * span.inverse_y) ** 2
+        share = size if n_x != 0 or n_y != 0 else 0.5 * size
+        for m in range(waves.column[2, column]):
+            square = across + (turn * m * span.inverse_z) ** 2
+            waves.weight[first + m] = share * math.exp(-quarter * square) / square if square > 0.0 else 0.0
 
 
 @loop
@@ -244,7 +268,8 @@ def wave_block_of(dipoles: bool) -> Callable:
                 buffers.v2[b, i] = buffers.v2_i[b, i] = 0.0
 
     @loop
-    def wave_block(span, waves, buffers, b, shrink):
+    def wave_block(span, waves, buffers, b, quarter):
+        virial = (0.0, 0.0, 0.0)
         for i in range(buffers.wave.shape[1]):
             buffers.force_x[b, i] = buffers.force_y[b, i] = buffers.force_z[b, i] = 0.0
             if dipoles:
@@ -257,14 +282,19 @@ def wave_block_of(dipoles: bool) -> Callable:
             q_x, q_y = turn * n_x * span.inverse_x, turn * n_y * span.inverse_y
             factor, factor_i = begin_column(waves, buffers, b, n_x, n_y, q_x, q_y)
             first = waves.column[3, column]
-            start_potentials(
-                buffers, b, shrink * waves.weight[first] * factor, -shrink * waves.weight[first] * factor_i
-            )
+            weight = waves.weight[first]
+            start_potentials(buffers, b, weight * factor, -weight * factor_i)
+            energy = 0.5 * weight * (factor * factor + factor_i * factor_i)
+            virial = with_wave(virial, energy, (q_x, q_y, 0.0), quarter, span)
             for m in range(1, waves.column[2, column]):
                 q = turn * m * span.inverse_z
-                factors = structure_factors(waves, buffers, b, m, q)
-                add_wave_pair(waves, buffers, b, m, q, shrink * waves.weight[first + m], factors)
+                factors, weight = structure_factors(waves, buffers, b, m, q), waves.weight[first + m]
+                add_wave_pair(waves, buffers, b, m, q, weight, factors)
+                energy = 0.5 * weight * (dot(factors[:3], factors[:3]) + factors[3] * factors[3])
+                virial = with_wave(virial, energy, (q_x, q_y, q), quarter, span)
             end_column(waves, buffers, b, q_x, q_y)
+        waves.virial[0, b] = waves.virial[1, b] = waves.virial[2, b] = 0.0
+        add_virial(waves.virial, b, virial, span)
 
     return wave_block
 
@@ -278,6 +308,7 @@ def with_waves(begin_pairs: Callable, pair_block: Callable, blocks_of_pairs: Cal
     def begin(grains, long_range, span, parameters):
         begin_pairs(grains, long_range, span, parameters)
         waves = parameters.waves
+        weigh_waves(parameters, span)
         prepare_phases(grains, span, waves)
         for i in range(grains.mass.size):
             if dipoles:
@@ -293,7 +324,7 @@ def with_waves(begin_pairs: Callable, pair_block: Callable, blocks_of_pairs: Cal
     def block(grains, long_range, span, parameters, b):
         waves = all_blocks(grains)
         if b < waves:
-            wave_block(span, parameters.waves, parameters.buffers, b, shrinkage(parameters.length, span))
+            wave_block(span, parameters.waves, parameters.buffers, b, 0.25 / parameters.alpha**2)
         else:
             pair_block(grains, long_range, span, parameters, b - waves)
 
@@ -301,23 +332,33 @@ def with_waves(begin_pairs: Callable, pair_block: Callable, blocks_of_pairs: Cal
 
 
 @loop
-def add_waves(grains, long_range, sums):
+def add_waves(grains, long_range, span, parameters):
     """Add the reciprocal part of all blocks."""
+    sums = parameters.buffers
     for b in range(sums.wave.shape[0]):
+        add_virial(long_range.virial, 0, load(parameters.waves.virial, b), span)
         for i in range(grains.mass.size):
+            field = sums.field_x[b, i], sums.field_y[b, i], sums.field_z[b, i]
             accrue(long_range.force, i, (sums.force_x[b, i], sums.force_y[b, i], sums.force_z[b, i]))
-            accrue(grains.field, i, (sums.field_x[b, i], sums.field_y[b, i], sums.field_z[b, i]))
+            accrue(grains.field, i, field)
+            add_virial_of_moment(long_range.virial, i, load(grains.moment, i), field, span)
 
 
 @loop
-def add_own_and_mean_field(grains, self_field, mean_field):
-    """Add the fields that remove those of a grain's own smeared dipole, and the mean field."""
+def add_own_and_mean_field(grains, long_range, span, parameters):
+    """Add the fields that remove those of a grain's own smeared dipole, and the mean field B_m.
+
+    The energy −½ μ·B_m of the mean field is proportional to 1/V: W_aa = −½ μ·B_m.
+    """
+    self_field, mean_field = parameters.self_field, parameters.mean_field * compression(parameters.volume, span)
     total = (0.0, 0.0, 0.0)
     for i in range(grains.mass.size):
         total = add(total, load(grains.moment, i))
     mean = scale(mean_field, total)
     for i in range(grains.mass.size):
         accrue(grains.field, i, add(mean, scale(self_field, load(grains.moment, i))))
+    energy = -0.5 * dot(mean, total)
+    add_virial(long_range.virial, 0, (energy, energy, energy), span)
 
 
 @loop
@@ -343,13 +384,10 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
 
     @formula
     def pair_loads(position1, position2, span, moment1, moment2, parameters, real):
-        shrink = shrinkage(parameters.length, span)
-        apart = scale(shrink, separation_if(real, nearest_image(sub(position1, position2), span)))
+        apart = separation_if(real, nearest_image(sub(position1, position2), span))
         inside = real and apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2] < parameters.cutoff_square
         k = parameters.k if inside else 0.0
-        found = loads(apart, moment1, moment2, k, parameters.stretch, parameters.coefficients)
-        cube = shrink * shrink * shrink
-        return scale(cube * shrink, found[0]), scale(cube, found[1]), scale(cube, found[2]), cube * found[3]
+        return loads(apart, moment1, moment2, k, parameters.stretch, parameters.coefficients)
 
     @loop
     def real_pair(grains, span, parameters, i, j):
@@ -370,10 +408,14 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
         def end_with_mesh(grains, long_range, span, parameters):
             if not listed:
                 add_blocks(grains, long_range, span, parameters)
+            add_mesh_virial(long_range, parameters.mesh, span)
+            for i in range(grains.mass.size):
+                moment, field = load(grains.moment, i), load(parameters.mesh.field, i)
+                add_virial_of_moment(long_range.virial, i, moment, field, span)
             remove_waves(grains, span, parameters.mesh)
             add_mesh_forces(grains, long_range, parameters.mesh)
             add_mesh_field(grains, parameters.mesh)
-            add_own_and_mean_field(grains, parameters.self_field, parameters.mean_field)
+            add_own_and_mean_field(grains, long_range, span, parameters)
             add_torques(grains, long_range, span, parameters)
 
         return LongRangeSums(
@@ -396,9 +438,8 @@ def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
     def end(grains, long_range, span, parameters):
         if not listed:
             add_blocks(grains, long_range, span, parameters)
-        add_waves(grains, long_range, parameters.buffers)
-        cube = shrinkage(parameters.length, span) ** 3
-        add_own_and_mean_field(grains, cube * parameters.self_field, cube * parameters.mean_field)
+        add_waves(grains, long_range, span, parameters)
+        add_own_and_mean_field(grains, long_range, span, parameters)
         add_torques(grains, long_range, span, parameters)
 
     return LongRangeSums(

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...basics.alignment import SIMD_WIDTH
 from ...compiler.recipes import factory
-from ...numerics.flow import shrinkage
+from ...numerics.flow import compression
 
 NEGLIGIBLE = 1e-15
 """Waves of a mesh with an influence below this fraction of the largest one are left out: their φ̂ is noise."""
@@ -34,10 +34,11 @@ def _tensor(energy: np.ndarray, q: np.ndarray, alpha: float) -> np.ndarray:
     return np.asarray(energy.sum() * np.eye(3) - (q.T * weight) @ q)
 
 
-def _of_mean(grains: Any, parameters: Any, *, dipoles: bool) -> np.ndarray:
+def _of_mean(grains: Any, parameters: Any, span: Any, *, dipoles: bool) -> np.ndarray:
     """δ_ab U_mean [J]."""
+    mean_field = parameters.mean_field * compression(parameters.volume, span)
     total = grains.moment.sum(axis=1) if dipoles else grains.charge.sum()
-    return np.asarray((-0.5 if dipoles else 0.5) * parameters.mean_field * (total**2).sum() * np.eye(3))
+    return np.asarray((-0.5 if dipoles else 0.5) * mean_field * (total**2).sum() * np.eye(3))
 
 
 def _own_waves(grains: Any, vectors: np.ndarray, span: Any, parameters: Any, *, dipoles: bool) -> np.ndarray:
@@ -72,12 +73,10 @@ def direct_virial(dipoles: bool) -> Callable:
     """`LongRangeSums.reciprocal_virial` of a sum over wave vectors, of dipoles or of charges."""
 
     def virial(grains: Any, span: Any, parameters: Any) -> np.ndarray:
-        shrink = shrinkage(parameters.length, span)  # 1, but for dipoles in a box that is deformed
-        parameters = parameters._replace(alpha=shrink * parameters.alpha, mean_field=shrink**3 * parameters.mean_field)
         vectors, weights = _vectors(parameters.waves, span)
-        found = _of_mean(grains, parameters, dipoles=dipoles)
+        found = _of_mean(grains, parameters, span, dipoles=dipoles)
         parts = max(1, len(vectors) * grains.mass.size // AT_ONCE)
-        for q, weight in zip(np.array_split(vectors, parts), np.array_split(shrink * weights, parts), strict=True):
+        for q, weight in zip(np.array_split(vectors, parts), np.array_split(weights, parts), strict=True):
             wave = np.exp(1j * (q @ grains.position))
             if dipoles:
                 moments = wave @ grains.moment.T
@@ -102,7 +101,7 @@ def mesh_virial(dipoles: bool) -> Callable:
     def virial(grains: Any, span: Any, parameters: Any) -> np.ndarray:
         from scipy.fft import rfftn  # slow import
 
-        mesh, found = parameters.mesh, _of_mean(grains, parameters, dipoles=dipoles)
+        mesh, found = parameters.mesh, _of_mean(grains, parameters, span, dipoles=dipoles)
         potential = mesh.density[..., : mesh.density.shape[2] - (SIMD_WIDTH - 1)]
         spectrum, size = np.abs(rfftn(potential)) ** 2, potential.shape
         numbers = [np.fft.fftfreq(size[0], 1.0 / size[0]), np.fft.fftfreq(size[1], 1.0 / size[1])]

@@ -19,6 +19,7 @@ import numpy as np
 
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
+from ...numerics.flow import add_virial, with_pair
 from ...numerics.vec import accrue, axpy, dot, load, nearest_image, put, scale, sub
 from .dipole_formulas import cut_weight
 from .dipole_rates import cut_curvature
@@ -173,19 +174,21 @@ def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) ->
     """
 
     @loop
-    def add_rows(grains, force, torque, span, parameters, first, last):
+    def add_rows(grains, long_range, force, torque, span, parameters, first, last):
         for i in range(first, last):
             position, a = load(grains.position, i), pair_grain(grains, i)
-            force_i = torque_i = (0.0, 0.0, 0.0)
+            force_i = torque_i = virial = (0.0, 0.0, 0.0)
             for j in range(i):
                 apart = nearest_image(sub(position, load(grains.position, j)), span)
                 f, torque_a, torque_b, _ = of_pair(apart, a, pair_grain(grains, j), parameters)
                 force_i = axpy(1.0, f, force_i)
                 accrue(force, j, scale(-1.0, f))
+                virial = with_pair(virial, apart, f, span)
                 if torques:
                     torque_i = axpy(1.0, torque_a, torque_i)
                     accrue(torque, j, torque_b)
             accrue(force, i, force_i)
+            add_virial(long_range.virial, i, virial, span)
             if torques:
                 accrue(torque, i, torque_i)
 
@@ -203,7 +206,7 @@ def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) ->
             put(force, i, (0.0, 0.0, 0.0))
             if torques:
                 put(torque, i, (0.0, 0.0, 0.0))
-        add_rows(grains, force, torque, span, parameters, first, last)
+        add_rows(grains, long_range, force, torque, span, parameters, first, last)
 
     @loop
     def end(grains, long_range, span, parameters):
@@ -236,15 +239,17 @@ def _listed_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tu
         for s in range(first, last):
             i = long_range.order[s]
             position, a = load(packed, s), packed_grain(packed, s)
-            force = torque = (0.0, 0.0, 0.0)
+            force = torque = virial = (0.0, 0.0, 0.0)
             for m in range(long_range.start[s], long_range.start[s + 1]):
                 t = long_range.neighbour[m]
                 apart = nearest_image(sub(position, load(packed, t)), span)
                 f, torque_a, _, _ = of_pair(apart, a, packed_grain(packed, t), parameters)
                 force = axpy(1.0, f, force)
+                virial = with_pair(virial, apart, f, span)
                 if torques:
                     torque = axpy(1.0, torque_a, torque)
             accrue(long_range.force, i, force)
+            add_virial(long_range.virial, i, scale(0.5, virial), span)
             if torques:
                 accrue(long_range.torque, i, torque)
 

@@ -183,7 +183,8 @@ class Charges(EwaldForce, InverseSquare):
     def numbers(self, grains: Grains, box: Box) -> Any:
         """Parameters of the loops."""
         if self.uses_ewald(grains, box):
-            return ewald_parameters(self.ewald(grains, box), box, len(grains), False, CHARGES)
+            choice, moves = self.ewald(grains, box), self.chosen is not None
+            return ewald_parameters(choice, box, len(grains), False, CHARGES, follows_box=moves)
         return super().numbers(grains, box)
 
     def check(self, grains: Grains, box: Box) -> list[str]:

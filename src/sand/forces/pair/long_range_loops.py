@@ -19,6 +19,11 @@ ROWS_PER_BLOCK = 256
 """Rows of the Verlet list in a block."""
 
 
+def blocks_for(count: int) -> int:
+    """Number of blocks of a sum over all pairs, or waves, for a number of grains, as `all_blocks`."""
+    return ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
+
+
 @loop
 def all_blocks(grains):
     """Number of blocks of a sum over all pairs."""

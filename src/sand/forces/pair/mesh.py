@@ -24,6 +24,7 @@ import numpy as np
 
 from ...basics.alignment import SIMD_WIDTH
 from .ewald_fit import DIPOLES, Sources
+from .long_range_loops import blocks_for
 from .mesh_loops import ORDERS, Mesh
 
 ALIASES = 3
@@ -95,13 +96,16 @@ def _moments(x: tuple, y: tuple, z: tuple, power: int) -> np.ndarray:
     return found + 2.0 * (_product(x[1], y[1], z[0]) + _product(x[1], y[0], z[1]) + _product(x[0], y[1], z[1]))
 
 
+_legendre = functools.cache(np.polynomial.legendre.leggauss)
+
+
 def lattice_sum(lengths: tuple[float, float, float], alpha: float) -> float:
     """Σ R over all wave vectors q ≠ 0 [m²].
 
     4π ∫ (Π_a Σ_n exp(−q_a² t) − 1) dt from 1/4α², over ln t.
     """
     start, end = 1.0 / (4.0 * alpha**2), NEGLIGIBLE * (max(lengths) / (2.0 * math.pi)) ** 2
-    x, weight = np.polynomial.legendre.leggauss(QUADRATURE)
+    x, weight = _legendre(QUADRATURE)
     t = start * (end / start) ** (0.5 * (x + 1.0))
     product = np.ones_like(t)
     for side in lengths:
@@ -239,15 +243,23 @@ def nodes_for(lengths: tuple[float, float, float], spacing: float, order: int) -
 
 
 def new_mesh(
-    sums: MeshSums, nodes: tuple[int, int, int], volume: float, count: int, sources: Sources = DIPOLES
+    sums: MeshSums,
+    nodes: tuple[int, int, int],
+    lengths: tuple[float, float, float],
+    count: int,
+    sources: Sources = DIPOLES,
+    *,
+    follows_box: bool = False,
 ) -> Mesh:
-    """The mesh of the loops for a number of grains."""
-    scale = sources.k / volume
+    """The mesh of the loops for a number of grains; `follows_box`: in a box that may be deformed."""
+    scale = sources.k / math.prod(lengths)
     rows, columns = nodes[:2], nodes[2] // 2 + 1
+    of_moving, most = (1, max(nodes)) if follows_box else (0, 0)
+    influence = scale * math.prod(nodes) * sums.influence
     return Mesh(
         np.zeros((*rows, nodes[2] + SIMD_WIDTH - 1)),
         np.zeros((*rows, columns, 2)),
-        scale * math.prod(nodes) * sums.influence,
+        influence,
         np.zeros((count, 9, SIMD_WIDTH)),
         np.zeros((3, count), np.int64),
         np.zeros(nodes[0] + 1, np.int64),
@@ -255,6 +267,12 @@ def new_mesh(
         np.zeros((3, count)),
         np.zeros((3, count)),
         scale * sums.self_wave,
+        influence[: of_moving * nodes[0]].copy(),
+        np.zeros((of_moving * nodes[0], *influence.shape[1:])),
+        np.array(lengths[: 3 * of_moving]),
+        np.zeros((3, most)),
+        np.zeros((2, 3, most)),
+        np.zeros((3, of_moving * blocks_for(count))),
     )
 
 

@@ -27,6 +27,8 @@ import numpy as np
 from ...basics.alignment import SIMD_WIDTH
 from ...compiler.jit import formula, loop
 from ...compiler.recipes import factory
+from ...numerics.flow import add_virial, compression
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
 from .long_range_loops import Round
@@ -48,6 +50,13 @@ class Mesh(NamedTuple):
     force: np.ndarray  # (3, N) [N]
     field: np.ndarray  # (3, N), −∂U/∂s: B [T] of dipoles; (−ψ, 0, 0) [V] of charges
     self_wave: np.ndarray  # (3, 3): amplitude T_ab of the self-interaction, see `remove_self_waves`
+    # in a box that is deformed; no elements in other boxes
+    chosen: np.ndarray  # (K_x, K_y, K_z/2 + 1): G of the box for which the mesh was chosen
+    slope: np.ndarray  # (K_x, K_y, K_z/2 + 1): 2 (1/q² + 1/4α²) [m²] of the present box
+    lengths: np.ndarray  # (3,): sides of the first box [m]
+    square: np.ndarray  # (3, K): q² along each axis, of the present box
+    ratio: np.ndarray  # (2, 3, K): q² of the first box, exp(−(q² of the present one − that)/4α²)
+    virial: np.ndarray  # (3, blocks): Σ U_q [1 − q_a² slope] [J]
 
 
 class MeshSource(NamedTuple):
@@ -114,6 +123,46 @@ def sort_by_plane(mesh, count):
     for k in range(planes):
         start[planes - k] = start[planes - k - 1]
     start[0] = 0
+
+
+@unless_still(lambda parameters, span: None)
+def follow_box(parameters, span):
+    """Set G, which is the mean of exp(−q²/4α²)/q² over aliases, to that of the present box, and the slopes.
+
+    It changes by the factor exp(−(q² − q₀²)/4α²) q₀²/q² V₀/V of the wave itself from q₀ and V₀ of the first box.
+    """
+    mesh, quarter = parameters.mesh, 0.25 / parameters.alpha**2
+    shape, ratio, square = mesh.influence.shape, mesh.ratio, mesh.square
+    change, inverse = compression(parameters.volume, span), (span.inverse_x, span.inverse_y, span.inverse_z)
+    for a in range(3):
+        for n in range(shape[a]):
+            turn = 2.0 * math.pi * (n if a == 2 or 2 * n < shape[a] else n - shape[a])
+            square[a, n], ratio[0, a, n] = (turn * inverse[a]) ** 2, (turn / mesh.lengths[a]) ** 2
+            ratio[1, a, n] = math.exp(-quarter * (square[a, n] - ratio[0, a, n]))
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            across, before = square[0, i] + square[1, j], ratio[0, 0, i] + ratio[0, 1, j]
+            factor = change * ratio[1, 0, i] * ratio[1, 1, j]
+            for k in range(shape[2]):
+                inverse_square = 1.0 / max(across + square[2, k], 1e-300)
+                mesh.influence[i, j, k] = (
+                    mesh.chosen[i, j, k] * factor * ratio[1, 2, k] * (before + ratio[0, 2, k]) * inverse_square
+                )
+                mesh.slope[i, j, k] = 2.0 * (inverse_square + quarter)
+    mesh.influence[0, 0, 0] = mesh.slope[0, 0, 0] = 0.0
+
+
+@loop
+def begin_mesh(grains, span, parameters):
+    """Before the first round."""
+    follow_box(parameters, span)
+
+
+@loop
+def add_mesh_virial(long_range, mesh, span):
+    """Add the virial of all waves of the mesh."""
+    for b in range(mesh.virial.shape[1]):
+        add_virial(long_range.virial, 0, load(mesh.virial, b), span)
 
 
 @formula
@@ -207,8 +256,22 @@ def convolve_lines(parameters: object, b: int, blocks: int) -> None:
     first, last = block_limits(b, blocks, mesh.density.shape[1])
     spectrum = _complex(mesh.spectrum)
     lines = fft(spectrum[:, first:last], axis=0, workers=1)
+    if mesh.slope.size:
+        mesh.virial[:, b] = _virial_of_lines(mesh, lines, first, last)
     lines *= mesh.influence[:, first:last]
     spectrum[:, first:last] = ifft(lines, axis=0, overwrite_x=True, workers=1)
+
+
+def _virial_of_lines(mesh: Mesh, lines: np.ndarray, first: int, last: int) -> np.ndarray:
+    """Σ U_q [1 − q_a² slope] (3,) [J] of the transforms ρ̂ of a block of lines, U_q = G |ρ̂|²/2N for N nodes."""
+    columns, nodes = mesh.influence.shape[2], len(mesh.density) * mesh.density.shape[1] * _columns(mesh)
+    energy = (lines.real**2 + lines.imag**2) * mesh.influence[:, first:last]
+    energy[..., 1 : columns - 1] *= 2.0  # q_z and −q_z
+    weighted = energy * mesh.slope[:, first:last]
+    parts = (weighted.sum(axis=(1, 2)), weighted.sum(axis=(0, 2)), weighted.sum(axis=(0, 1)))
+    squares = mesh.square[0, : len(lines)], mesh.square[1, first:last], mesh.square[2, :columns]
+    along = np.array([float(part @ square) for part, square in zip(parts, squares, strict=True)])
+    return np.asarray((energy.sum() - along) / (2.0 * nodes))
 
 
 def transform_back(parameters: object, b: int, blocks: int) -> None:
@@ -326,7 +389,7 @@ def mesh_rounds(order: int, source: MeshSource) -> tuple[Round, ...]:
             put(mesh.field, i, field)
 
     return (
-        Round(fill_splines),
+        Round(fill_splines, begin_mesh),
         Round(fill_planes, prepare_planes),
         Round(transform_planes, compiled=False),
         Round(convolve_lines, compiled=False),

@@ -18,6 +18,7 @@ from ...contact.mechanics import displacements_of
 from ...contact.poses import pose_at
 from ...contact.settling import list_cluster, rigid_motion, solve_symmetric, with_grain
 from ...forces.pair.dipole_formulas import pair_load
+from ...numerics.flow import with_flow
 from ...numerics.quaternion import turned_back
 from ...numerics.vec import accrue, across, add, cross, dot, load, load4, nearest_image, norm, put, put4, scale, sub
 from ..parts import DT
@@ -72,7 +73,7 @@ def kick_clusters(grains, contacts, clusters, long_range, span, scratch, paramet
         if clusters.listed[first] == 1:
             continue
         size = list_cluster(grains, contacts, clusters, span, first, math.inf)
-        rigid_motion(grains, clusters, size)
+        rigid_motion(grains, clusters, size, span)
         mass, force, torque = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         tensor = (0.0,) * 6
         for k in range(size):
@@ -140,13 +141,13 @@ def measure_clusters_stage(law: ContactLaw) -> Stage:
             if clusters.listed[first] == 1:
                 continue
             size = list_cluster(grains, contacts, clusters, span, first, math.inf)
-            velocity, rotation = rigid_motion(grains, clusters, size)
+            velocity, rotation = rigid_motion(grains, clusters, size, span)
             energy = 0.0
             for k in range(size):
                 i = clusters.member[k]
                 parameters.first[i] = first
                 s = load(clusters.offset, i)
-                v = sub(sub(load(grains.velocity, i), velocity), cross(rotation, s))
+                v = sub(with_flow(sub(load(grains.velocity, i), velocity), s, span), cross(rotation, s))
                 w = sub(load(grains.spin, i), rotation)
                 energy += 0.5 * (grains.mass[i] * dot(v, v) + grains.inertia[i] * dot(w, w))
             parameters.size[first], parameters.vibration[first] = size, energy

@@ -2,6 +2,7 @@
 
 from ...basics.state import LATE, PAIRS
 from ...compiler.jit import formula, loop
+from ...numerics.flow import relative_velocity
 from ...numerics.vec import dot, load, nearest_image, norm, sub
 from .body_friction import gas_displacement
 
@@ -25,13 +26,14 @@ def _approach(grains, bodies, i, h):
 
 
 @formula
-def reach_of_pair(grains, bodies, i, j, apart, gas, friction_rate, h):
-    """Distance [m] by which the gap of grains i and j may close in a step of h [s]; `apart` is x_i − x_j.
+def reach_of_pair(grains, bodies, pair, apart, gas, span, limits):
+    """Distance [m] by which the gap of a pair of grains may close in a step; `apart` is x_i − x_j.
 
-    By the closing speed, a fifth more of it, the curvature of the paths, accelerations, and what a gas adds.
+    By the closing speed, a fifth more of it, the curvature of the paths, accelerations, and what a gas adds; `limits`
+    are the rate of friction [1/s] and the step [s].
     """
-    distance = norm(apart)
-    v = sub(load(grains.velocity, i), load(grains.velocity, j))
+    (i, j), (friction_rate, h), distance = pair, limits, norm(apart)
+    v = relative_velocity(grains, i, j, apart, span)
     closing = max(-dot(v, apart) / distance, 0.0)
     across = max(dot(v, v) - closing * closing, 0.0)
     reach = TOUCH_SPEED * closing * h + 0.5 * across / distance * h * h
@@ -59,7 +61,7 @@ def find_near_bodies(grains, bodies, pair_list, count, span, gas, friction_rate,
             continue
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         gap = norm(apart) - grains.radius[i] - grains.radius[j]
-        reach = reach_of_pair(grains, bodies, i, j, apart, gas, friction_rate, h)
+        reach = reach_of_pair(grains, bodies, (i, j), apart, gas, span, (friction_rate, h))
         if gap > 2.0 * reach:
             continue
         both_awake = bodies.asleep[i] + bodies.asleep[j] == 0

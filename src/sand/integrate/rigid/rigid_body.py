@@ -20,6 +20,8 @@ import math
 
 from ...basics.state import BODIES
 from ...compiler.jit import formula, loop
+from ...numerics.flow import after_step, box_after, drifted_with_flow, less_flow, slowed
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.quaternion import normalised, turned, turned_back
 from ...numerics.vec import accrue, add, axpy, cross, dot, load, load4, nearest_image, norm, put, put4, scale, sub
 from ..motion import count_crossings
@@ -150,15 +152,34 @@ def spin_of(bodies, first):
 
 
 @loop
-def place_velocities(grains, bodies, b):
-    """Velocities and spins of the grains of body b from those of the body."""
+def place_velocities(grains, bodies, b, span):
+    """Velocities and spins of the grains of body b from those of the body.
+
+    In a box that is deformed, u_i = U + ω×s − A s, with U relative to the flow at the centre of mass.
+    """
     first = bodies.member[bodies.start[b]]
     q, spin = load4(bodies.orientation, first), spin_of(bodies, first)
     velocity = scale(1.0 / bodies.mass[first], load(bodies.momentum, first))
     for k in range(bodies.start[b], bodies.start[b + 1]):
         i = bodies.member[k]
         put(grains.spin, i, spin)
-        put(grains.velocity, i, add(velocity, cross(spin, turned(q, load(bodies.offset, i)))))
+        s = turned(q, load(bodies.offset, i))
+        put(grains.velocity, i, less_flow(add(velocity, cross(spin, s)), s, span))
+
+
+@unless_still(
+    lambda bodies, first, dt, span: nearest_image(
+        axpy(dt / bodies.mass[first], load(bodies.momentum, first), load(bodies.centre, first)), span
+    )
+)
+def moved_centre(bodies, first, dt, span):
+    """Centre of mass [m] of a body after a drift of dt [s], in the box then.
+
+    In a box that is deformed, the momentum becomes that relative to the flow at the end.
+    """
+    velocity = scale(1.0 / bodies.mass[first], load(bodies.momentum, first))
+    put(bodies.momentum, first, slowed(load(bodies.momentum, first), span, dt))
+    return nearest_image(drifted_with_flow(load(bodies.centre, first), velocity, span, dt), after_step(dt, span))
 
 
 @loop
@@ -168,8 +189,7 @@ def move_body(bodies, b, span, dt, piece):
     Pieces of the rotation are at most `piece`, in units of the time in which motions about the second axis part.
     """
     first = bodies.member[bodies.start[b]]
-    momentum, mass = load(bodies.momentum, first), bodies.mass[first]
-    centre = nearest_image(axpy(dt / mass, momentum, load(bodies.centre, first)), span)
+    centre = moved_centre(bodies, first, dt, span)
     q, angular, inertia = (
         load4(bodies.orientation, first),
         load(bodies.angular_momentum, first),
@@ -224,15 +244,15 @@ def drift_bodies(grains, bodies, count, span, dt, is_wrapped, piece):
     for b in range(count[BODIES]):
         if takes_one_step(bodies, bodies.member[bodies.start[b]]):
             move_body(bodies, b, span, dt, piece)
-            place_grains(grains, bodies, b, span, is_wrapped)
+            place_grains(grains, bodies, b, box_after(dt, span), is_wrapped)
 
 
 @loop
-def move_velocities(grains, bodies, count):
+def move_velocities(grains, bodies, count, span):
     """`place_velocities` of all bodies asleep."""
     for b in range(count[BODIES]):
         if bodies.asleep[bodies.member[bodies.start[b]]] == 1:
-            place_velocities(grains, bodies, b)
+            place_velocities(grains, bodies, b, span)
 
 
 @formula

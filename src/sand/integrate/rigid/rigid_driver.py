@@ -29,22 +29,24 @@ from ...basics.state import (
     TIME,
 )
 from ...compiler.jit import caller, formula, loop
-from ...compiler.program import call_stage
+from ...compiler.program import call_stage, has_stage
 from ...compiler.stage import stage
 from ...neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stale
+from ...numerics.flow import extends_over_half, relative_velocity
+from ...numerics.kinds_of_box import unless_still
 from ...numerics.quaternion import turned
 from ...numerics.vec import accrue, dot, load, load4, nearest_image, norm, put, sub
 from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
 from ..hooks import Hook, call_hook
 from ..motion import wrap_all
-from ..parts import DRIVER_PARTS, Stop
+from ..parts import DRIVER_PARTS, DT, LIMIT, Stop
 from ..respa import add_long_range_loads
 from ..stages import StageNumber
 from ..step_control import has_arrived, is_past
 from ..task_queue import join_workers
 from .body_friction import drift_bodies_in_gas
-from .body_touches import CLEAR, LOADED, find_near_bodies
+from .body_touches import CLEAR, LOADED, TOUCHING, find_near_bodies
 from .rigid_body import (
     LARGEST_PIECE,
     contact_loads_bound,
@@ -113,7 +115,7 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
         i, j = pair_list.pair[0, p], pair_list.pair[1, p]
         if bodies.first[i] != bodies.first[j] and bodies.asleep[i] + bodies.asleep[j] > 0:
             apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-            v = sub(load(grains.velocity, i), load(grains.velocity, j))
+            v = relative_velocity(grains, i, j, apart, span)
             rate = dot(v, v) / dot(apart, apart)
             one, other = bodies.first[i], bodies.first[j]
             square = max(square, rate)
@@ -125,12 +127,26 @@ def longest_step(grains, bodies, pair_list, count, span, criteria, limits, some_
     return within_rate(longest, max(rate, 1.0 / limits.longest_awake) if some_awake else rate), longest
 
 
+@unless_still(lambda bodies, b, span: False)
+def has_outgrown_box(bodies, b, span):
+    """Whether body b extends over half of a box that is deformed along an axis."""
+    q = load4(bodies.orientation, bodies.member[bodies.start[b]])
+    low, high = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(bodies.start[b], bodies.start[b + 1]):
+        s = turned(q, load(bodies.offset, bodies.member[k]))
+        low = min(low[0], s[0]), min(low[1], s[1]), min(low[2], s[2])
+        high = max(high[0], s[0]), max(high[1], s[1]), max(high[2], s[2])
+    return extends_over_half(low, high, span)
+
+
 @loop
-def find_loaded_bodies(grains, bodies, clock, count):
-    """Mark bodies the loads of whose contacts may have changed by more than their reserve."""
+def find_loaded_bodies(grains, bodies, clock, count, span):
+    """Mark bodies the loads of whose contacts may have changed by more than their reserve, or that no longer fit."""
     for b in range(count[BODIES]):
         first = bodies.member[bodies.start[b]]
         if bodies.asleep[first] == 1 and bodies.start[b + 1] - bodies.start[b] > 1:
+            if has_outgrown_box(bodies, b, span):
+                bodies.near[first] = TOUCHING
             bound = contact_loads_bound(grains, bodies, b)
             if bound > bodies.reserve[first]:
                 bodies.near[first] = max(bodies.near[first], LOADED)
@@ -225,6 +241,13 @@ def first_half(s, some_awake):
     if not h > 0.0:
         call_stage(s, StageNumber.EXPLAIN, Stop.NOT_FINITE.value)
         return Stop.NOT_FINITE.value
+    if has_stage(s, Hook.LIMIT_STEP):
+        s.scratch[LIMIT] = h
+        stop = call_hook(s, Hook.LIMIT_STEP)
+        if stop != Stop.NONE.value:
+            call_stage(s, StageNumber.EXPLAIN, stop)
+            return stop
+        h = within_rate(h, 1.0 / s.scratch[LIMIT])
     if s.clock[TIME] + h == s.clock[TIME]:
         return Stop.NO_STEP.value
     takes_substeps = False
@@ -236,18 +259,20 @@ def first_half(s, some_awake):
             s.bodies.quick[:] = 0
             return Stop.TIME_REACHED.value
         h = s.until - s.clock[TIME]
-    s.clock[STEP] = h
+    s.clock[STEP] = s.scratch[DT] = h
     if not takes_substeps:
         find_near_bodies(s.grains, s.bodies, s.pair_list, s.count, s.span, s.gas, s.flight_limits.friction_rate, h)
         call_hook(s, Hook.NEAR_BODIES)
-    find_loaded_bodies(s.grains, s.bodies, s.clock, s.count)
+    find_loaded_bodies(s.grains, s.bodies, s.clock, s.count, s.span)
     if any_has_to_wake(s.bodies, s.count):
         s.bodies.quick[:] = 0
         return Stop.HAS_TO_WAKE.value
     if takes_substeps:
         return Stop.SUBSTEPS.value
+    call_hook(s, Hook.BEFORE_BODIES)
     kick_bodies(s.bodies, s.count, 0.5 * h)
     drift_with_work(s, h)
+    call_hook(s, Hook.AFTER_BODIES)
     if not some_awake:
         call_hook(s, Hook.NONE_AWAKE)
     s.count[PHASE] = 1
@@ -263,7 +288,9 @@ def second_half(s, awake, had_substeps):
     sum_loads(s, s.flight_limits.excludes_loads)
     sum_body_loads(s.grains, s.bodies, s.count, s.flight_limits.excludes_loads)
     kick_bodies(s.bodies, s.count, 0.5 * s.clock[STEP])
-    move_velocities(s.grains, s.bodies, s.count)
+    s.scratch[DT] = s.clock[STEP]
+    call_hook(s, Hook.KICKED_BODIES)
+    move_velocities(s.grains, s.bodies, s.count, s.span)
     s.bodies.quick[:] = 0
     s.clock[TIME] += s.clock[STEP]
     if s.gas.gas.on:

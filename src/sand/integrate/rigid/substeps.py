@@ -68,7 +68,7 @@ def mark_quick_bodies(grains, bodies, pair_list, count, span, gas, limits, h):
         elif bodies.near[one] + bodies.near[other] < 2:
             apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             gap = norm(apart) - grains.radius[i] - grains.radius[j]
-            if gap <= 2.0 * reach_of_pair(grains, bodies, i, j, apart, gas, limits.friction_rate, h):
+            if gap <= 2.0 * reach_of_pair(grains, bodies, (i, j), apart, gas, span, (limits.friction_rate, h)):
                 bodies.near[one] = bodies.near[other] = 1
     number = 0
     for b in range(count[BODIES]):
@@ -112,9 +112,9 @@ def kick_by_slow_loads(grains, bodies, clock, count):
 
 
 @stage("the velocities of grains of bodies at rest")
-def place_all_velocities(grains, bodies, count):
+def place_all_velocities(grains, bodies, count, span):
     """Velocities and spins of the grains of all bodies at rest, from momentum and angular momentum of these."""
-    move_velocities(grains, bodies, count)
+    move_velocities(grains, bodies, count, span)
     return 0
 
 
