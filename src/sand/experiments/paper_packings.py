@@ -163,8 +163,9 @@ def compare_strengths(rows: Sequence[Row]) -> list[Compared]:
         reason = f"still rising at the end of {rising} of {len(some)} runs" if rising else _reason(fast)
         what = f"tensile strength/(6e5 Pa φ^1.8) at φ = {filling:g}"
         compared.append(_compared(what, ratio, reason, 0.3))
-    values = np.array([(row["filling_at_start"], row["strength"], row["seed"]) for row in found]).T
-    if len({row["aggregate.filling"] for row in found}) > 2 and (values[1] > 0.0).all():
+    ended = [row for row in found if not row["at_end"]]
+    values = np.array([(row["filling_at_start"], row["strength"], row["seed"]) for row in ended]).T
+    if len({row["aggregate.filling"] for row in ended}) > 2 and (values[1] > 0.0).all():
         fit = power_law(*values)
         slope = Interval(fit.exponent, fit.low, fit.high)
         verdict = slope.verdict(1.8, "no reason is known", within=0.1)

@@ -238,6 +238,7 @@ def test_strengths_are_compared():
     *ratios, slope = compare_strengths(rows)
     assert [one.ours.split()[0] for one in ratios] == ["1"] * 4 and all(one.verdict == "agrees" for one in ratios)
     assert slope.ours.startswith("1.8 (") and slope.verdict == "agrees"
+    assert compare_strengths(rows + stretched(0.02, 1, 9e5, 5.0))[-1].ours == slope.ours  # no strength, and not fitted
     rising = compare_strengths(stretched(0.1, 1, 9e3, 5.0))
     assert rising[0].verdict.endswith("still rising at the end of 1 of 1 runs")
 
