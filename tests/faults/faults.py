@@ -64,7 +64,7 @@ FAULTS = (
           "components/deformation_stage.py", "pair_list.built[3] -= turns", "pair_list.built[3] -= 0.0 * turns",
           "physics/test_shear.py::test_wrapping_the_tilt_changes_nothing"),
     Fault("the work of shear with the other stress", "off by one", "loop", "components/deformation_stage.py",
-          "found[8] + of_dipoles, found[6])", "found[8] + of_dipoles, found[2])",
+          "found[8] + far[2], found[6])", "found[8] + far[2], found[2])",
           "physics/test_shear.py::test_the_work_of_shear_closes_the_ledger"),
     Fault("cells beyond a tilted face without the tilt", "forgotten image", "loop", "neighbours/cell_list.py",
           "along = position[0] - steps", "along = position[0] - 0.0 * steps",

@@ -8,6 +8,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 import sand
+from sand.basics.box import Span
 from sand.basics.constants import COULOMB, MAGNETIC
 from sand.compiler.program import Program
 from sand.compiler.stage import PythonStage, stage
@@ -284,10 +285,10 @@ def test_charges_on_the_same_mesh():
     ratio = [each[:, 3] / each.sum(axis=1) ** 2 for each in w]
     influence = real * ratio[0][:, None, None] * ratio[1][:, None] * ratio[2]
     sums = MeshSums(influence[:, :, : nodes[2] // 2 + 1], 0, 0, 0, np.zeros((3, 3)))
-    mesh = new_mesh(sums, nodes, volume, count, CHARGES)
+    mesh = new_mesh(sums, nodes, tuple(sides), count, CHARGES)
     mesh.influence[...] /= COULOMB
     grains = SimpleNamespace(mass=np.ones(count), position=position.T.copy(), charge=charge)
-    span = SimpleNamespace(**{f"inverse_{a}": 1 / side for a, side in zip("xyz", sides, strict=True)})
+    span = Span(*sides, *(1.0 / sides))
     parameters = SimpleNamespace(mesh=mesh)
     for each in mesh_rounds(order, MESH_CHARGES):
         if each.compiled:
