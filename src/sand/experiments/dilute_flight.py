@@ -30,7 +30,9 @@ class Flown(NamedTuple):
     steps: int
     gap: float
     kinetic: float
+    potential: float
     energy: float
+    potential_start: float
     energy_start: float
     revolutions: float
     state: np.ndarray  # (20,)

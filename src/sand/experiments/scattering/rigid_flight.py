@@ -51,9 +51,13 @@ GROUP_SIZE = 0.25
 """Largest radius of a group, in units of the gap of the bounding spheres."""
 MOST_REVOLUTIONS = 100.0
 """Revolutions of the line of centres after which a pair is bound."""
-RESULTS = ("end", "impact_parameter", "time", "steps", "gap", "kinetic", "energy", "energy_start", "revolutions")
-"""Results of a flight: impact parameter and last gap [m], time [s], kinetic energy of the relative motion at the end,
-and the energy of both bodies at the end and at the start [J]: relative motion, rotation, all pairs, and the field."""
+RESULTS = (
+    *("end", "impact_parameter", "time", "steps", "gap", "kinetic", "potential", "energy"),
+    *("potential_start", "energy_start", "revolutions"),
+)
+"""Results of a flight: impact parameter and last gap [m], time [s]; energies [J] at the end: ½m̄u² of the relative motion,
+of all pairs and of the external field, and both of these with the rotation; the last two at the start, too; revolutions
+of the line of centres."""
 
 
 class Groups(NamedTuple):
@@ -261,14 +265,14 @@ def flight_of(charged: bool = False) -> Callable:
         # angular momenta in the frames of the bodies
         angular1, angular2 = turned_back(q1, vector_at(y, ANGULAR1)), turned_back(q2, vector_at(y, ANGULAR2))
         escape = pair.escape if pair.escape > 0.0 else norm(r)
-        time, steps, end, swept, start, kinetic, energy = 0.0, 0, BOUND, 0.0, 0.0, 0.0, 0.0
+        time, steps, end, swept, potential, start, kinetic, energy = 0.0, 0, BOUND, 0.0, 0.0, 0.0, 0.0, 0.0
         loads = loads_at(r, q1, q2, pair, now)
         while True:
             kinetic = 0.5 * pair.reduced * dot(u, u)
             energy = kinetic + rotational(angular1, first.inertia) + rotational(angular2, second.inertia)
             energy += loads.energy
             if steps == 0:
-                start = energy
+                potential, start = loads.energy, energy
             distance = norm(r)
             radial = dot(r, u) / distance
             if not energy - energy == 0.0:
@@ -302,7 +306,7 @@ def flight_of(charged: bool = False) -> Callable:
         set_quaternion(y, TURN2, q2)
         set_vector(y, ANGULAR1, turned(q1, angular1))
         set_vector(y, ANGULAR2, turned(q2, angular2))
-        return end, time, steps, loads.gap, kinetic, energy, start, swept / (2.0 * math.pi)
+        return end, time, steps, loads.gap, kinetic, loads.energy, energy, potential, start, swept / (2.0 * math.pi)
 
     return fly
 
@@ -323,8 +327,8 @@ def flights_of(charged: bool = False) -> Callable:
                 flight_id = (seed, flights.strata[flight], flights.numbers[flight])
                 b = draw_path(y, flight_id, flights.low[flight], flights.high[flight], start)
                 draw_rigid_pose(y, flight_id, start, pair)
-            end, time, steps, gap, kinetic, energy, begun, swept = fly(y, pair, now)
-            values = (float(end), b, time, float(steps), gap, kinetic, energy, begun, swept)
+            end, time, steps, gap, kinetic, potential, energy, before, begun, swept = fly(y, pair, now)
+            values = (float(end), b, time, float(steps), gap, kinetic, potential, energy, before, begun, swept)
             for column in range(len(values)):
                 flights.results[flight, column] = values[column]
 
