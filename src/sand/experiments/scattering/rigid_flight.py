@@ -103,7 +103,7 @@ class FlyingPair(NamedTuple):
     attraction: float  # 2k Σ|μ| Σ|μ′| [J m³]
     attraction_of_charges: float  # Σ|q| Σ|q′|/4πε₀ [J m]
     field: tuple  # external flux density [T]
-    escape: float  # distance beyond which a receding body has escaped [m]; 0: that of the start
+    escape: float  # distance beyond which a receding body has escaped [m]; 0: that of the start, or less if it cannot return
     step_fraction: float  # η
     group_size: float  # `GROUP_SIZE`; 0: all pairs of grains
     most_steps: int
@@ -281,7 +281,9 @@ def flight_of(charged: bool = False) -> Callable:
             if loads.gap <= TOUCH * pair.smallest:
                 end = HIT
                 break
-            is_far = distance >= escape or escapes(radial, distance - first.extent - second.extent, pair)
+            is_far = distance >= escape
+            if pair.escape == 0.0:  # what happens after an escape does not matter
+                is_far = is_far or escapes(radial, distance - first.extent - second.extent, pair)
             if radial > 0.0 and is_far:
                 end = MISS
                 break
