@@ -35,10 +35,10 @@ class Body:
         What flights need: groups of grains, moments of inertia, extent.
     mass, strength, charge : float
         M [kg], Σ|μ| [A m²] and Σ|q| [C].
-    born : int
-        Event in which it formed; 0 for those of the start.
     number : int
-        Number of the body that formed; equal for copies.
+        Number of the body, in the order in which bodies formed; equal for copies.
+    born : int
+        Number of draws when it formed; 0 for those of the start.
     copy : int
         0, or the number of the doubling in which it was copied.
     """
@@ -67,26 +67,31 @@ def body_of(grains: GrainArrays, contacts: StrainedContacts, number: int = 0, bo
     mass = grains.mass
     offset = grains.position - ((grains.position @ mass) / mass.sum())[:, None]
     inertia, axes = principal_frame(mass, grains.inertia, offset)
-    moment, zeros = axes.T @ grains.moment, np.zeros_like(offset)
-    x = axes.T @ offset
-    pose = np.zeros((4, mass.size))
+    turned = contacts._replace(slide=contacts.slide @ axes, roll=contacts.roll @ axes)
+    own = grains._replace(position=axes.T @ offset, moment=axes.T @ grains.moment)
+    return body_at_rest(own, turned, inertia, (number, born, 0)), axes
+
+
+def body_at_rest(
+    grains: GrainArrays, contacts: StrainedContacts, inertia: np.ndarray, identity: tuple[int, int, int]
+) -> Body:
+    """A body of grains in their principal frame, with its moments of inertia, and (number, born, copy)."""
+    zeros, pose = np.zeros_like(grains.position), np.zeros((4, grains.mass.size))
     pose[3] = 1.0
     own = grains._replace(
-        position=x, velocity=zeros, spin=zeros, moment=moment, body_moment=moment, orientation=pose,
-        force=zeros, torque=zeros, field=zeros,
-    )  # fmt: skip
-    strength = np.linalg.norm(moment, axis=0)
+        velocity=zeros, spin=zeros, body_moment=grains.moment, orientation=pose, force=zeros, torque=zeros, field=zeros
+    )
+    x, moment, strength = own.position, own.moment, np.linalg.norm(own.moment, axis=0)
     flying = FlyingBody(
         groups_of(x.T, moment.T),
-        grains.radius,
-        grains.charge,
-        tuple(inertia.tolist()),
+        own.radius,
+        own.charge,
+        (float(inertia[0]), float(inertia[1]), float(inertia[2])),
         (0.0, 0.0, 0.0, 1.0),
-        float((np.linalg.norm(x, axis=0) + grains.radius).max()),
+        float((np.linalg.norm(x, axis=0) + own.radius).max()),
     )
-    turned = contacts._replace(slide=contacts.slide @ axes, roll=contacts.roll @ axes)
-    total = float(mass.sum()), float(strength.sum()), float(np.abs(grains.charge).sum())
-    return Body(own, turned, flying, *total, number, born), axes
+    total = float(own.mass.sum()), float(strength.sum()), float(np.abs(own.charge).sum())
+    return Body(own, contacts, flying, *total, *identity)
 
 
 def in_space(a: Body, b: Body, y: np.ndarray) -> tuple[GrainArrays, StrainedContacts]:

@@ -24,6 +24,10 @@ BOOKED = tuple(name for name in BOOKS if name not in ("lost_gas", "lost_outside"
 """Changes of energies [J] over a hit that can occur."""
 
 
+RECENT = 100
+"""Hits over which `Encounters.recent_others` is the mean."""
+
+
 class Encounter(NamedTuple):
     """One draw; a row of encounters.csv."""
 
@@ -92,14 +96,18 @@ class Encounters:
         [s]
     event, flights, hits_seen : int
         Draws, flights and hits so far.
-    others : float
-        Sum of `Encounter.others` over hits.
+    others, recent_others : float
+        Sum of `Encounter.others` over hits, and its mean over the last hundred or so.
+    longest_flight : float
+        [s]
+    numbers : int
+        Number of the next body that forms.
     """
 
     def __init__(self, population: Population, pilot: Pilot, hits: HitRule, seed: int):
         self.population, self.pilot, self.rule, self.seed = population, pilot, hits, seed
         self.time, self.event, self.flights, self.hits_seen, self.others = 0.0, 0, 0, 0, 0.0
-        self.longest_flight = 0.0
+        self.longest_flight = self.recent_others = 0.0
         self.numbers = 1 + max(body.number for body in population.bodies)
 
     def step(self) -> Encounter:
@@ -131,6 +139,7 @@ class Encounters:
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[MISS])
         self._replace(i, j, hit)
         self.hits_seen, self.others = self.hits_seen + 1, self.others + met
+        self.recent_others += (met - self.recent_others) / min(self.hits_seen, RECENT)
         return Encounter(**drawn, **own, **_hit(hit), end=ENDS[HIT])
 
     def _fly(self, a: Body, b: Body, approach: Approach) -> Flown:
