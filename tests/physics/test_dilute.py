@@ -141,7 +141,10 @@ def test_hard_spheres_hit_if_and_only_if_they_are_in_the_way():
     plain = sand.Grains([[0.0, 0.0, 0.0]], RADIUS, "iron")
     body, _ = body_of(plain.arrays, NO_CONTACTS)
     pilot = Pilot(HEAT)
-    ends = [pilot.thermal(body, body, 3.0, b * RADIUS, 6e-8, (1, k)).end for k, b in enumerate([0.0, 1.0, 1.999, 2.002, 3.0])]
+    ends = [
+        pilot.thermal(body, body, 3.0, b * RADIUS, 6e-8, (1, k)).end
+        for k, b in enumerate([0.0, 1.0, 1.999, 2.002, 3.0])
+    ]
     assert ends == [HIT, HIT, HIT, MISS, MISS]
 
 
@@ -206,7 +209,9 @@ def test_a_population_repeats_its_bits_and_keeps_its_mass():
 RING = aggregate(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.array([[1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0]]) / 2**0.5
 )
-HAIRPIN = aggregate([[i, j, 0] for j in range(2) for i in range(8)], [[1 - 2 * j, 0, 0] for j in range(2) for i in range(8)])
+HAIRPIN = aggregate(
+    [[i, j, 0] for j in range(2) for i in range(8)], [[1 - 2 * j, 0, 0] for j in range(2) for i in range(8)]
+)
 AWKWARD = {
     "grains": (GRAIN, GRAIN, 51.6, 0.6, 20_000),
     "dimer": (GRAIN, DIMER, 83.9, 1.1, 12_000),

@@ -155,7 +155,9 @@ class Part:
 
     def _new_engine(self, state: State, index: np.ndarray, contacts: int) -> Engine:
         """An engine for these grains, which is kept for others of the same number; there are at most `MOST_ENGINES`."""
-        engine = engine_of_part(self.prototype, subset(state.grains, index), state, contacts, has_bodies=self.has_bodies)
+        engine = engine_of_part(
+            self.prototype, subset(state.grains, index), state, contacts, has_bodies=self.has_bodies
+        )
         if len(self._engines) == MOST_ENGINES:
             self._engines.clear()
             self._pairs.clear()

@@ -54,7 +54,9 @@ def check_forces(forces: Sequence[Force], grains: Grains, hits: str) -> tuple[Co
             own.append(force)
         elif isinstance(force, Dipoles):
             if force.cutoff not in (None, "auto"):
-                problems.append("dipoles: a cut-off is not for encounters, which are flown from far away; leave cutoff out")
+                problems.append(
+                    "dipoles: a cut-off is not for encounters, which are flown from far away; leave cutoff out"
+                )
             own.append(Dipoles(cutoff=None))
         else:
             problems.append(f"{force.name}: this force is not for encounters; leave it out, or grow boxes")
@@ -173,5 +175,3 @@ def _flight_time(body: Body, majorant: Majorant) -> float:
     """Time [s] of a typical flight of two such bodies."""
     size, speed = sizes_of(body), math.sqrt(2.0 * majorant.heat / body.mass)
     return 2.0 * start_distance(body, body, float(majorant.bound(size, size, speed))) / speed
-
-

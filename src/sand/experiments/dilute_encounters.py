@@ -187,5 +187,3 @@ def _hit(hit: Hit) -> dict[str, Any]:
         "made": hit.made, "slipped": hit.slipped, "broken": hit.broken, "pieces": len(hit.pieces), "rest_time": hit.time,
         "contact_steps": hit.steps, "energies": hit.energies,
     }  # fmt: skip
-
-

@@ -15,6 +15,7 @@ from ..basics.grains import Grains
 from ..basics.schema import MODES
 from ..basics.version import __version__
 from ..io import run_folder as files
+from ..io.damage import sealed
 from ..io.checkpoint import newest_checkpoint, read_archive, write_checkpoint
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import LedgerFile
@@ -158,7 +159,7 @@ class PopulationFiles:
         self.ledger.close()
         write_table(self.folder / files.AGGREGATES, aggregate_rows(self.folder / files.TRAJECTORY, now))
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
-        files.write_json(self.folder / files.SUMMARY, summary)
+        files.write_json(self.folder / files.SUMMARY, sealed(files.plain(summary)))
         return summary
 
 
@@ -182,12 +183,11 @@ def aggregate_rows(path: Path, now: Encounters) -> list[dict[str, Any]]:
     bodies = [body for body in order if len(body) > 1]
     rows = [{name: column[k].item() for name, column in found.items()} for k in range(len(bodies))]
     return [
-        {"body": body.number, "born": body.born, "copy": body.copy, **row} for body, row in zip(bodies, rows, strict=True)
+        {"body": body.number, "born": body.born, "copy": body.copy, **row}
+        for body, row in zip(bodies, rows, strict=True)
     ]
 
 
 def kept_population(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]] | None:
     """Arrays and metadata of the newest checkpoint of a folder; None without one.  Raises BadInput."""
     return newest_checkpoint(folder, read=read_archive) if checkpoint_files(folder) else None
-
-

@@ -75,7 +75,9 @@ class Pilot:
             np.zeros((1, len(RESULTS))), np.zeros((1, AGGREGATES)),
         )  # fmt: skip
 
-    def thermal(self, a: Body, b: Body, speed: float, impact_parameter: float, distance: float, event: tuple[int, int]) -> Flown:
+    def thermal(
+        self, a: Body, b: Body, speed: float, impact_parameter: float, distance: float, event: tuple[int, int]
+    ) -> Flown:
         """Flight from a plane at a distance [m], with random orientations and thermal spins of an event (seed, number)."""
         flights = self._flights
         flights.numbers[0], flights.low[0], flights.high[0] = event[1], impact_parameter**2, impact_parameter**2
@@ -115,7 +117,7 @@ class Pilot:
             0.0 if charged else self.group_size,  # a group has no charge
             MOST_FLIGHT_STEPS,
         )
-        flights_of(charged)(seed, self._flights, start, pair, self._now)
+        flights_of(charged)(np.uint64(seed), self._flights, start, pair, self._now)
         found = self._flights.results[0].tolist()
         return Flown(int(found[0]), *found[1:3], int(found[3]), *found[4:], self._flights.ends[0].copy())
 
@@ -132,5 +134,3 @@ def reversed_state(state: np.ndarray) -> np.ndarray:
     for part in (slice(3, 6), slice(14, 20)):
         other[part] *= -1.0
     return other
-
-

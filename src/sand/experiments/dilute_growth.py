@@ -21,6 +21,7 @@ from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.units import si
+from ..compiler.progress import announce
 from ..forces.base import Force
 from ..io import run_folder as files
 from ..io.lock import writing
@@ -76,7 +77,7 @@ class Grown:
         """Columns of the aggregates at the end, see `analysis.frame_statistics`; `body` is equal for copies."""
         head, *lines = files.read_text(self.folder / files.AGGREGATES).split("\n")[:-1]
         rows = [[float(text) for text in line.split(",")] for line in lines]
-        names = head.split(",")
+        names = head.split(",") if head else ["grains"]
         return dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
 
     def kernel(self, edges: Sequence[int] | None = None) -> Kernel:
@@ -171,10 +172,28 @@ def grow(
         record.begin(now, start)
         outcome = _advance(now, record, settings, start, observers)
         record.finish(now, outcome)
-    return Grown(folder, outcome)
+        found = Grown(folder, outcome)
+        _draw(found, settings)
+    return found
 
 
-def _advance(now: Encounters, record: PopulationFiles, settings: Settings, start: float, observers: Sequence[Any]) -> str:
+def _draw(found: Grown, settings: Settings) -> None:
+    """The figure of a population, if it has aggregates."""
+    from ..plotting.run_figure import save
+    from .dilute_figure import dilute_figure
+
+    if not len(found.aggregates["grains"]):
+        return
+    announce("drawing the figure")
+    grains = settings.grains
+    moments = np.linalg.norm(grains.moment, axis=1)
+    unit = float(grains.mass.mean()), float(grains.radius.mean()), float(moments.mean()), settings.temperature
+    save(dilute_figure(found.ledger, found.aggregates, found.encounters, unit), found.folder / files.FIGURE)
+
+
+def _advance(
+    now: Encounters, record: PopulationFiles, settings: Settings, start: float, observers: Sequence[Any]
+) -> str:
     """Encounters until the end; returns the outcome.  The end is looked at after hits."""
     while True:
         row = record.rows[-1]
@@ -236,7 +255,9 @@ def _checked(
 ) -> Settings:
     """Arguments of `grow`.  Raises BadInput."""
     if hits not in HITS:
-        raise BadInput(f"hits = {shown(hits)} must be 'resolve' (contacts until at rest) or 'stick' (joined at the touch)")
+        raise BadInput(
+            f"hits = {shown(hits)} must be 'resolve' (contacts until at rest) or 'stick' (joined at the touch)"
+        )
     stop, until = ends
     if stop is None and until is None:
         raise BadInput("stop is missing; give one, such as stop='mean_cluster_size >= 30', or until='10 d'")

@@ -98,7 +98,9 @@ class Resolve:
             time, steps = time + end.time, steps + end.steps
             for name in BOOKS:
                 energies[name] += end.energies[name]
-            pieces = [part_of(end.grains, end.contacts, np.flatnonzero(end.label == k)) for k in range(end.label.max() + 1)]
+            pieces = [
+                part_of(end.grains, end.contacts, np.flatnonzero(end.label == k)) for k in range(end.label.max() + 1)
+            ]
             if len(pieces) != 2:
                 break
             one, two, y = moving_pair(pieces)
@@ -132,4 +134,3 @@ def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple
 
 HitRule = Callable[[Body, Body, np.ndarray], Hit]
 """`Stick` or `Resolve`."""
-

@@ -52,7 +52,9 @@ def arrays_of(now: Encounters) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
 
 def population_from(arrays: dict[str, np.ndarray], meta: dict[str, Any], majorant: Majorant) -> Population:
     """The population of `arrays_of`, with the same bits."""
-    rest = {name: np.zeros((4 if name == "orientation" else 3, arrays["grains/mass"].size)) for name in GrainArrays._fields}
+    rest = {
+        name: np.zeros((4 if name == "orientation" else 3, arrays["grains/mass"].size)) for name in GrainArrays._fields
+    }
     grains = GrainArrays(**rest | {name: arrays[f"grains/{name}"] for name in STORED})
     contacts = StrainedContacts(*(arrays[f"contacts/{name}"] for name in StrainedContacts._fields))
     ends, joints = np.cumsum(arrays["bodies/grains"]), np.cumsum(arrays["bodies/contacts"])

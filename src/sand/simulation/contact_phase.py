@@ -98,7 +98,9 @@ class ContactPhase:
         while True:
             stop = engine.advance(math.inf, every)
             if stop is not Stop.NONE:
-                raise BadInput(f"the contact phase of an encounter stopped after {state.time:.3g} s: {stop.name.lower()}")
+                raise BadInput(
+                    f"the contact phase of an encounter stopped after {state.time:.3g} s: {stop.name.lower()}"
+                )
             label, vibration, limit, longest = _clusters(engine)
             now = tuple(int(state.count[each]) for each in (MADE, SLIPPED, BROKEN))
             strain = sum(contact_energies(engine)[1:])
@@ -113,7 +115,9 @@ class ContactPhase:
             elif quiet == 2 or state.time - since > wait:
                 break
             if state.time > LONGEST * min(period, 1e-6):
-                raise BadInput(f"an encounter has not come to rest after {state.time:.3g} s; give sand.Contact a damping")
+                raise BadInput(
+                    f"an encounter has not come to rest after {state.time:.3g} s; give sand.Contact a damping"
+                )
         after = ledger.row_of(engine)
         return Settled(
             GrainArrays(*map(np.copy, state.grains.arrays))._replace(id=grains.id),
@@ -129,7 +133,9 @@ class ContactPhase:
 def _apart(grains: Grains) -> Grains:
     """One grain of each kind, at least two, on a line, apart from each other."""
     arrays = grains.arrays
-    kinds = np.vstack([arrays.radius, arrays.mass, arrays.material, arrays.charge, np.linalg.norm(arrays.moment, axis=0)])
+    kinds = np.vstack(
+        [arrays.radius, arrays.mass, arrays.material, arrays.charge, np.linalg.norm(arrays.moment, axis=0)]
+    )
     first = np.unique(kinds, axis=1, return_index=True)[1]
     chosen = grains[first if len(first) > 1 else np.array([0, 0])]
     position = np.zeros((3, len(chosen)))
@@ -175,5 +181,3 @@ def _books(before: dict[str, float], after: dict[str, float], forces: Sequence[s
     found = {"kinetic": change(*KINETIC) - after[INTERNAL], "contacts": change(*ENERGIES), "distant": change(*forces)}
     found |= {name: change(name) for name in LOSSES}
     return found | {"lost_quieting": found["lost_quieting"] + after[INTERNAL]}
-
-

@@ -173,7 +173,13 @@ class ConstantBound:
 def constant_growth(bodies, times, seed):
     """S at given times of a population of equal bodies with the kernel 1 m³/s, by thinning of the bound."""
     count = len(bodies)
-    population, time, sizes, found, event = Population(bodies, float(count), ConstantBound()), 0.0, np.ones(count), [], 0
+    population, time, sizes, found, event = (
+        Population(bodies, float(count), ConstantBound()),
+        0.0,
+        np.ones(count),
+        [],
+        0,
+    )
     while len(found) < len(times):
         uniforms = event_uniforms(seed, event)
         event += 1
@@ -214,13 +220,19 @@ def test_a_constant_kernel_gives_the_exact_mean_size():
 @pytest.mark.validate
 def test_a_constant_kernel_gives_the_exact_mean_size_of_many(record_bound):
     """As above with 200 populations of 200 bodies; 3 standard errors at each time."""
-    record_bound("constant kernel: largest deviation of S [standard errors]", np.abs(check_constant_kernel(200, 200, 4.0)).max(), most=3.0)
+    record_bound(
+        "constant kernel: largest deviation of S [standard errors]",
+        np.abs(check_constant_kernel(200, 200, 4.0)).max(),
+        most=3.0,
+    )
 
 
 def state_of(distance, angle=0.3):
     """A state of a pair: apart along x, the second body turned about y, both with spins."""
     turn = [0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle)]
-    return np.array([distance, 1e-9, 0.0, -3.0, 0.5, 0.1, 0.0, 0.0, 0.0, 1.0, *turn, 1e-27, 2e-27, 0.0, 0.0, 1e-27, -2e-27])
+    return np.array(
+        [distance, 1e-9, 0.0, -3.0, 0.5, 0.1, 0.0, 0.0, 0.0, 1.0, *turn, 1e-27, 2e-27, 0.0, 0.0, 1e-27, -2e-27]
+    )
 
 
 def test_grains_in_space_have_the_momenta_of_their_bodies():
@@ -255,6 +267,10 @@ def test_bodies_that_stick_touch_as_at_rest():
     assert body.mass == pytest.approx(a.mass + b.mass, rel=1e-15, abs=0.0)
     i, j = contacts.pair[-1]
     overlap = 2.0 * RADIUS - np.linalg.norm(grains.position[:, i] - grains.position[:, j])
-    rest = sand.Contact().contact_law.normal_mode(*sand.Contact().pairing(sand.IRON, sand.IRON)[:2], 0.5 * RADIUS).rest_overlap
+    rest = (
+        sand.Contact()
+        .contact_law.normal_mode(*sand.Contact().pairing(sand.IRON, sand.IRON)[:2], 0.5 * RADIUS)
+        .rest_overlap
+    )
     assert overlap == pytest.approx(rest, rel=1e-6, abs=0.0)
     assert len(contacts.pair) == len(a.contacts.pair) + len(b.contacts.pair) + 1

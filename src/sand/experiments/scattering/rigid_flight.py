@@ -226,7 +226,6 @@ def longest_step(pair, loads, speed, angular1, angular2):
     return min(h, 0.5 * loads.gap / closing)
 
 
-
 @functools.cache
 def flight_of(charged: bool = False) -> Callable:
     """Compile one flight from the state y (20,) of `two_aggregates` to its end; returns `RESULTS` but the second."""

@@ -1,0 +1,174 @@
+"""Case files of `sand grow` with [method] kind = "encounters": checks, and one population of a seed."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from ..basics.constants import MAGNETIC
+from ..basics.errors import BadInput, ErrorCollector
+from ..basics.settings import For, Number, Word
+from ..basics.units import format_quantity
+from ..config.build import start_of
+from ..config.case import Case, check_case
+from ..config.key_errors import validate
+from ..config.sections import Section
+from ..forces.pair.dipole_formulas import contact_energy
+from ..io import run_folder as files
+from .dilute_body import NO_CONTACTS
+from .dilute_conditions import check_forces, check_gas, check_moments
+from .dilute_growth import HITS, Grown, bodies_of, grow
+from .dilute_majorant import Majorant
+from .dilute_population import Population
+
+METHOD = "method"
+"""The table of the method."""
+NOT_FOR = {
+    "box": "encounters have no box, but a number density: number_density in [grains]",
+    "walls": "encounters are in open space",
+    "driven": "grains of encounters are free",
+    "deformation": "encounters have no box",
+    "neighbours": "all pairs of grains count",
+    "stepping": "flights and contact steps choose their own steps",
+}
+"""Tables of `sand run` that encounters do not have, and why."""
+NOT_OF_RUN = ("steps", "frame_every", "row_every", "checkpoint_every", "stress", "out")
+NOT_OF_GRAINS = ("extent", "spins", "exact_temperature")
+
+
+class MethodSection(Section):
+    """Section [method] of `sand grow`: N-body boxes, or encounters of two bodies in thin dust."""
+
+    kind: Annotated[str, Word("boxes", "encounters")] = "boxes"
+    """`boxes`: N-body simulations of boxes; `encounters`: a Monte Carlo of encounters of two bodies, whose cost does not
+    depend on the density; see docs/physics/dilute-growth.md."""
+    between: Annotated[str, Word("thermal"), For("kind", "encounters")] = "thermal"
+    """What happens between encounters. `thermal`: the gas thermalises speed, spin and orientation of all bodies."""
+    hits: Annotated[str, Word(*HITS), For("kind", "encounters")] = "resolve"
+    """What becomes of two bodies that touch. `resolve`: contacts are computed until they are at rest; `stick`: the bodies
+    join at the first touch."""
+
+
+class DensitySection(Section):
+    """Keys of [grains] that only encounters have."""
+
+    number_density: Annotated[Any, Number("1/m^3", above=0.0)] = None
+    """Number density of bodies at the start [1/m^3], with [method] kind = "encounters"."""
+
+    def contradictions(self) -> Iterator[str]:
+        """It is required."""
+        if self.number_density is None:
+            yield "number_density is missing; add it, for example number_density = '3e8 /m^3'"
+
+
+class DiluteCase(NamedTuple):
+    """A checked case."""
+
+    case: Case  # of its grains and forces
+    density: float  # [1/m³]
+    method: MethodSection
+
+
+def is_dilute(content: dict[str, Any]) -> bool:
+    """Whether a case of `sand grow` is one of encounters."""
+    table = content.get(METHOD)
+    return isinstance(table, dict) and table.get("kind") == "encounters"
+
+
+def check_dilute(content: dict[str, Any], name: str) -> DiluteCase:
+    """Validate the content of a case of encounters; `name` begins each message.
+
+    Raises BadInput, one line for each mistake.
+    """
+    own, errors = copy.deepcopy(content), ErrorCollector()
+    method = errors.take(validate, MethodSection, own.pop(METHOD), name, table=METHOD)
+    grains = own.get("grains") if isinstance(own.get("grains"), dict) else {}
+    density = {"number_density": grains.pop("number_density")} if "number_density" in grains else {}
+    section = errors.take(validate, DensitySection, density, name, table="grains")
+    for table, reason in NOT_FOR.items():
+        if own.pop(table, None) is not None:
+            errors.problems.append(f"{name}: [{table}] is not for encounters: {reason}; leave it out")
+    for table, keys in (("run", NOT_OF_RUN), ("grains", NOT_OF_GRAINS)):
+        given = own.get(table) if isinstance(own.get(table), dict) else {}
+        for key in keys:
+            if given.pop(key, None) is not None:
+                errors.problems.append(f"{name}: {table}.{key} is not for encounters; leave it out")
+    if isinstance(grains, dict) and grains.get("kind", "gas") == "gas":
+        grains |= {"extent": 1.0, "spins": "equipartition"}  # positions of bodies do not matter
+    case = errors.take(check_case, own, name)
+    if case is not None and not case.grains.temperature:
+        errors.problems.append(f"{name}: grains.temperature is missing; add it, for example temperature = '100 K'")
+    errors.done()
+    return DiluteCase(case, section.number_density, method)
+
+
+def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[str, str]], dict[str, Any]]:
+    """What `sand info` says of a case: rows for people, and numbers; nothing is compiled."""
+    checked = check_dilute(content, "case")
+    checked.case.run.seed = seed
+    start, temperature = start_of(checked.case), float(checked.case.grains.temperature)
+    contact, _, gas = check_forces(checked.case.forces.build(), start.grains, checked.method.hits)
+    majorant, density = Majorant(temperature), checked.density
+    bodies = bodies_of(start.grains, start.contacts or NO_CONTACTS)
+    population = Population(bodies, len(bodies) / density, majorant)
+    check_gas(gas, start.grains, population)
+    check_moments(start.grains, temperature, population)
+    strongest = float(population.sizes.strength.max())
+    capture = math.sqrt(3.0) * (contact_energy(strongest, strongest, 1.0, MAGNETIC) / majorant.heat) ** (1.0 / 3.0)
+    between = len(bodies) / (2.0 * population.rate)
+    numbers = {"bodies": len(bodies), "number_density": density, "capture_length": capture, "between": between}
+    rows = [
+        ("bodies", f"{len(bodies)} bodies, {len(start.grains)} grains, {density:.3g} /m^3"),
+        (
+            "encounters",
+            f"a body has one within the bound of b about every {format_quantity(between, 's')} at the start",
+        ),
+    ]
+    if capture > 0.0:
+        text = f"{format_quantity(capture, 'm')} at {temperature:g} K; n b^3 = {density * capture**3:.2g}"
+        rows.append(("thermal capture", text))
+    hits = "computed grain by grain until at rest" if checked.method.hits == "resolve" else "joined at the touch"
+    return [*rows, ("hits", hits)], numbers
+
+
+def run_population(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> str:
+    """Grow the population of a seed to its end, from its checkpoint if there is one; returns its outcome.
+
+    Raises
+    ------
+    BadInput
+        If the case has errors, the dust is too dense, or the folder holds something else.
+    """
+    return population_of(content, seed, folder, observers).outcome
+
+
+def population_of(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> Grown:
+    """As `run_population`, but returns the population."""
+    if content.get("grains", {}).get("kind") == "given":
+        raise BadInput("these grains came from a script: call dilute_growth.grow again with the same arguments")
+    checked = check_dilute(content, "case")
+    checked.case.run.seed = seed
+    start, run = start_of(checked.case), checked.case.run
+    forces = checked.case.forces.build()
+    check_forces(forces, start.grains, checked.method.hits)
+    described = content | {"run": content.get("run", {}) | {"seed": seed}}
+    described.pop("grow", None)
+    if not (Path(folder) / files.CASE).exists() and Path(folder).is_dir() and files.is_used(Path(folder)):
+        raise BadInput(f"{folder} is not empty, and holds no population; give another folder")
+    return grow(
+        start.grains,
+        forces,
+        number_density=checked.density,
+        temperature=checked.case.grains.temperature,
+        out=folder,
+        stop=run.stop,
+        until=run.until,
+        seed=seed,
+        hits=checked.method.hits,
+        contacts=start.contacts,
+        observers=observers,
+        case=described,
+    )
