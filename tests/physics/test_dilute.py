@@ -195,7 +195,7 @@ def grown(number, until, seed, rule=None, **options):
 
 
 def test_a_population_repeats_its_bits_and_keeps_its_mass():
-    """The same seed gives equal rows; the density of grains stays that of the start, to rounding, over two doublings."""
+    """The same seed gives equal rows; the density of grains stays that of the start, to rounding, over doublings."""
     (one, rows), (_, others) = grown(60, 9.0, 4), grown(60, 9.0, 4)
     assert [each.row() for each in rows] == [each.row() for each in others]
     assert one.population.doublings == 2

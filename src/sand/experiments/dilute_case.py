@@ -43,13 +43,13 @@ class MethodSection(Section):
     """Section [method] of `sand grow`: N-body boxes, or encounters of two bodies in thin dust."""
 
     kind: Annotated[str, Word("boxes", "encounters")] = "boxes"
-    """`boxes`: N-body simulations of boxes; `encounters`: a Monte Carlo of encounters of two bodies, whose cost does not
-    depend on the density; see docs/physics/dilute-growth.md."""
+    """`boxes`: N-body simulations of boxes; `encounters`: a Monte Carlo of encounters of two bodies in thin dust, whose
+    cost does not depend on the density."""
     between: Annotated[str, Word("thermal"), For("kind", "encounters")] = "thermal"
     """What happens between encounters. `thermal`: the gas thermalises speed, spin and orientation of all bodies."""
     hits: Annotated[str, Word(*HITS), For("kind", "encounters")] = "resolve"
-    """What becomes of two bodies that touch. `resolve`: contacts are computed until they are at rest; `stick`: the bodies
-    join at the first touch."""
+    """What becomes of two bodies that touch. `resolve`: contacts are computed until they are at rest; `stick`: the
+    bodies join at the first touch."""
 
 
 class DensitySection(Section):
@@ -85,18 +85,18 @@ def check_dilute(content: dict[str, Any], name: str) -> DiluteCase:
     """
     own, errors = copy.deepcopy(content), ErrorCollector()
     method = errors.take(validate, MethodSection, own.pop(METHOD), name, table=METHOD)
-    grains = own.get("grains") if isinstance(own.get("grains"), dict) else {}
+    grains = _table(own, "grains")
     density = {"number_density": grains.pop("number_density")} if "number_density" in grains else {}
     section = errors.take(validate, DensitySection, density, name, table="grains")
     for table, reason in NOT_FOR.items():
         if own.pop(table, None) is not None:
             errors.problems.append(f"{name}: [{table}] is not for encounters: {reason}; leave it out")
     for table, keys in (("run", NOT_OF_RUN), ("grains", NOT_OF_GRAINS)):
-        given = own.get(table) if isinstance(own.get(table), dict) else {}
+        given = _table(own, table)
         for key in keys:
             if given.pop(key, None) is not None:
                 errors.problems.append(f"{name}: {table}.{key} is not for encounters; leave it out")
-    if isinstance(grains, dict) and grains.get("kind", "gas") == "gas":
+    if grains.get("kind", "gas") == "gas":
         grains |= {"extent": 1.0, "spins": "equipartition"}  # positions of bodies do not matter
     case = errors.take(check_case, own, name)
     if case is not None and not case.grains.temperature:
@@ -105,12 +105,18 @@ def check_dilute(content: dict[str, Any], name: str) -> DiluteCase:
     return DiluteCase(case, section.number_density, method)
 
 
+def _table(content: dict[str, Any], name: str) -> dict[str, Any]:
+    """A table of a case; an empty one if it has none, which the check of the case reports."""
+    found = content.get(name)
+    return found if isinstance(found, dict) else {}
+
+
 def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[str, str]], dict[str, Any]]:
     """What `sand info` says of a case: rows for people, and numbers; nothing is compiled."""
     checked = check_dilute(content, "case")
     checked.case.run.seed = seed
     start, temperature = start_of(checked.case), float(checked.case.grains.temperature)
-    contact, _, gas = check_forces(checked.case.forces.build(), start.grains, checked.method.hits)
+    _, _, gas = check_forces(checked.case.forces.build(), start.grains, checked.method.hits)
     majorant, density = Majorant(temperature), checked.density
     bodies = bodies_of(start.grains, start.contacts or NO_CONTACTS)
     population = Population(bodies, len(bodies) / density, majorant)

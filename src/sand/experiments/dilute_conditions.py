@@ -25,8 +25,8 @@ from .scattering.flight_driver import HIT
 FEWEST = 100
 """Fewest bodies of a population."""
 MOST_OTHERS, NOTED_OTHERS = 0.1, 0.03
-"""Mean number of encounters with others during a flight that ends in a hit, from which encounters are not binary: an error,
-and a note."""
+"""Mean number of encounters with others during a flight that ends in a hit, from which encounters are not binary: an
+error, and a note."""
 PROBES = 256
 """Encounters by which this number is estimated at the start."""
 PROBE_SEED = 2**63
@@ -45,7 +45,10 @@ def check_forces(forces: Sequence[Force], grains: Grains, hits: str) -> tuple[Co
     BadInput
         For forces that encounters do not have, a missing or undamped contact model, cut-offs and Ewald sums.
     """
-    problems, own, contact, gas = [], [], None, None
+    problems: list[str] = []
+    own: list[Force] = []
+    contact: Contact | None = None
+    gas: Gas | None = None
     for force in forces:
         if isinstance(force, Gas):
             gas = force  # between encounters; `check_gas` says whether it may be left out within them
@@ -131,8 +134,8 @@ def check_gas(gas: Gas | None, grains: Grains, population: Population) -> None:
     if length < BALLISTIC * reach:
         problems.append(
             f"gas: the stopping length of grains, {format_quantity(length, 'm')}, is less than {BALLISTIC:g} times "
-            f"{format_quantity(reach, 'm')}, the distance of an encounter: flights would feel the gas; grow boxes (kind = "
-            "'boxes'), or give a thinner gas"
+            f"{format_quantity(reach, 'm')}, the distance of an encounter: flights would feel the gas; grow boxes "
+            "(kind = 'boxes'), or give a thinner gas"
         )
     if between < THERMALISED * time:
         problems.append(
@@ -158,7 +161,8 @@ def check_moments(grains: Grains, temperature: float, population: Population) ->
         radius = float(grains.radius[(grains.material == k) & (moments > 0.0)].min())
         time = magnetic_limits(material, radius, temperature).relaxation_time
         flight = _flight_time(population.bodies[0], population.majorant)
-        flips = f"moments of {material.name} grains of {format_quantity(radius, 'm')} flip after {format_quantity(time, 's')}"
+        grain = f"{material.name} grains of {format_quantity(radius, 'm')}"
+        flips = f"moments of {grain} flip after {format_quantity(time, 's')}"
         if time < flight:
             raise BadInput(
                 f"{flips} at {temperature:g} K, within a flight of {format_quantity(flight, 's')}: they are "
@@ -166,8 +170,9 @@ def check_moments(grains: Grains, temperature: float, population: Population) ->
             )
         if time < between:
             warn(
-                f"{flips} at {temperature:g} K, and a body meets another one only after {format_quantity(between, 's')}: "
-                "they are superparamagnetic; their directions in a grain are not those of the encounter before"
+                f"{flips} at {temperature:g} K, and a body meets another one only after "
+                f"{format_quantity(between, 's')}: they are superparamagnetic, and turn within their grains between "
+                "encounters, which this method does not know"
             )
 
 

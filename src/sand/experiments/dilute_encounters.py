@@ -1,4 +1,4 @@
-"""Encounters of dilute dust, one after the other: pairs by thinning of a majorant, flights, and what becomes of hits."""
+"""Encounters of dilute dust, one after the other: pairs by thinning of a bound, flights, and what becomes of hits."""
 
 from __future__ import annotations
 
@@ -184,6 +184,6 @@ def _flown(flown: Flown) -> dict[str, Any]:
 
 def _hit(hit: Hit) -> dict[str, Any]:
     return {
-        "made": hit.made, "slipped": hit.slipped, "broken": hit.broken, "pieces": len(hit.pieces), "rest_time": hit.time,
-        "contact_steps": hit.steps, "energies": hit.energies,
+        "made": hit.made, "slipped": hit.slipped, "broken": hit.broken, "pieces": len(hit.pieces),
+        "rest_time": hit.time, "contact_steps": hit.steps, "energies": hit.energies,
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Figure of a population of dilute dust: sizes over time, moments and radii over sizes, kernel over the law of capture."""
+"""Figure of a population of dilute dust: sizes over time, moments and radii over sizes, kernel over that of Eq. 14."""
 
 from __future__ import annotations
 

@@ -15,9 +15,9 @@ from ..basics.grains import Grains
 from ..basics.schema import MODES
 from ..basics.version import __version__
 from ..io import run_folder as files
-from ..io.damage import sealed
 from ..io.checkpoint import newest_checkpoint, read_archive, write_checkpoint
 from ..io.checkpoint_files import checkpoint_files
+from ..io.damage import sealed
 from ..io.ledger_table import LedgerFile
 from ..io.table import GrowingTable, write_table
 from ..io.trajectory import Frames, TrajectoryWriter
@@ -36,8 +36,9 @@ LEDGER_COLUMNS = (
     *("flights", "hits", "others", "to_gas", "flight_error", "touch_energy", *BOOKED),
 )
 """Columns of the ledger, a row after each hit: draws so far, time [s], S, bodies, grains of the largest and of all, V
-[m³], n/n₀, flights, hits, mean number of encounters with others during flights that hit; then sums over all hits [J]: kinetic
-energy that bodies leave to the gas, error of flights, energy at the touch, and changes in contact phases by channel."""
+[m³], n/n₀, flights, hits, mean number of encounters with others during flights that hit; then sums over all hits [J]:
+kinetic energy that bodies leave to the gas, error of flights, energy at the touch, and changes in contact phases by
+channel."""
 
 
 def ledger_row(now: Encounters, start: float, before: dict[str, Any], hit: Encounter | None) -> dict[str, Any]:
@@ -115,7 +116,7 @@ class PopulationFiles:
         self.ledger.append(row)
 
     def add(self, now: Encounters, encounter: Encounter, start: float) -> None:
-        """A draw; after a hit a row of the ledger, a frame at ten values of S per decade, and a checkpoint if it is due."""
+        """A draw; after a hit a row of the ledger, a frame at ten values of S per decade, a checkpoint if it is due."""
         self.waiting.append(encounter_row(encounter))
         if encounter.end != "hit":
             return

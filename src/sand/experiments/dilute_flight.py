@@ -78,7 +78,7 @@ class Pilot:
     def thermal(
         self, a: Body, b: Body, speed: float, impact_parameter: float, distance: float, event: tuple[int, int]
     ) -> Flown:
-        """Flight from a plane at a distance [m], with random orientations and thermal spins of an event (seed, number)."""
+        """Flight from a plane at a distance [m], with the orientations and thermal spins of an event (seed, number)."""
         flights = self._flights
         flights.numbers[0], flights.low[0], flights.high[0] = event[1], impact_parameter**2, impact_parameter**2
         return self._fly(a, b, self._start(speed, distance), event[0], 0.0)
@@ -119,7 +119,8 @@ class Pilot:
         )
         flights_of(charged)(np.uint64(seed), self._flights, start, pair, self._now)
         found = self._flights.results[0].tolist()
-        return Flown(int(found[0]), *found[1:3], int(found[3]), *found[4:], self._flights.ends[0].copy())
+        values = dict(zip(RESULTS, found, strict=True)) | {"end": int(found[0]), "steps": int(found[3])}
+        return Flown(**values, state=self._flights.ends[0].copy())
 
 
 def start_distance(a: Body, b: Body, bound: float) -> float:

@@ -68,7 +68,7 @@ class Grown:
 
     @cached_property
     def encounters(self) -> dict[str, np.ndarray]:
-        """Columns of all draws by name (K,), see `dilute_encounters.Encounter`; `end` is 0 hit, 1 miss, 2 bound, 3 beyond."""
+        """Columns of all draws by name (K,), as `dilute_encounters.Encounter`; `end`: 0 hit, 1 miss, 2 bound, 3 beyond."""
         table = GrowingTable(self.folder / files.ENCOUNTERS, ENCOUNTER_COLUMNS, resume=True)
         return dict(zip(ENCOUNTER_COLUMNS, np.array(table.rows).reshape(-1, len(ENCOUNTER_COLUMNS)).T, strict=True))
 

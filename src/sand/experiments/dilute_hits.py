@@ -111,7 +111,8 @@ class Resolve:
             if flown.end != HIT:
                 break
             grains, contacts = in_space(one, two, flown.state)
-        return Hit(pieces, *counts.tolist(), time, steps, energies)
+        made, slipped, broken = counts.tolist()
+        return Hit(pieces, made, slipped, broken, time, steps, energies)
 
 
 def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple[Body, Body, np.ndarray]:

@@ -57,8 +57,8 @@ class Settled(NamedTuple):
 
 
 BOOKS = ("kinetic", "contacts", "distant", *LOSSES)
-"""Changes of energies [J] over a contact phase: of motion, as rigid bodies; stored in contacts; of forces at a distance;
-and losses by channel. `lost_quieting` is the vibration that is left, which rigid bodies do not have. The sum is 0 but
+"""Changes of energies [J] over a contact phase: of motion, as rigid bodies; stored in contacts; of forces at a
+distance; and losses by channel. `lost_quieting` is the vibration that is left, which rigid bodies do not have. The sum is 0 but
 for errors of the integration."""
 
 
@@ -102,7 +102,7 @@ class ContactPhase:
                     f"the contact phase of an encounter stopped after {state.time:.3g} s: {stop.name.lower()}"
                 )
             label, vibration, limit, longest = _clusters(engine)
-            now = tuple(int(state.count[each]) for each in (MADE, SLIPPED, BROKEN))
+            now = int(state.count[MADE]), int(state.count[SLIPPED]), int(state.count[BROKEN])
             strain = sum(contact_energies(engine)[1:])
             if now != counts or vibration > AT_REST * limit:
                 since = state.time

@@ -15,7 +15,7 @@ from sand.experiments.dilute_hits import Stick, moving_pair
 from sand.experiments.dilute_majorant import Majorant, Sizes
 from sand.experiments.dilute_population import Population, sizes_of
 from sand.experiments.scattering.event_draws import event_uniforms
-from sand.experiments.scattering.groups import GROUP, groups_of
+from sand.experiments.scattering.groups import GROUP
 
 RADIUS, MOMENT, T = 1e-8, 6.6e-18, 100.0
 
@@ -107,7 +107,7 @@ def test_the_bound_uses_all_moments_not_the_net_one():
 
 
 def test_speeds_and_impact_parameters_are_those_of_the_bound():
-    """b²/(β² v^(−4/3) + e²) is uniform, and speeds of the far part have ∫ v^(−1/3) f(v); Kolmogorov's test, p > 1e-3."""
+    """b²/(β² v^(−4/3) + e²) is uniform, and speeds have the density (…) v f(v); Kolmogorov's test, p > 1e-3."""
     majorant, size = Majorant(T), sizes_of(GRAIN)
     reduced, far, near, _ = majorant.squares(size, size)
     drawn = [majorant.draw(size, size, event_uniforms(3, k)[:3]) for k in range(2000)]
@@ -149,7 +149,7 @@ def test_sums_of_the_bound_follow_encounters():
 
 
 def test_pairs_are_drawn_in_proportion_to_the_bound():
-    """Of 600 pairs of four bodies each of the six has its share within 4 standard deviations, and none is a body itself."""
+    """Of 600 pairs of four bodies each of the six has its share within 4 standard deviations; none is a body itself."""
     population = Population([tree(n, n) for n in (1, 2, 4, 9)], 1.0, Majorant(T))
     count, number = np.zeros((4, 4)), 600
     for event in range(number):

@@ -28,7 +28,7 @@ from ...forces.pair.inverse_square import inverse_square
 from ...numerics.quaternion import turned, turned_back
 from ...numerics.rotor import LARGEST_PIECE, free_rotation, free_sphere
 from ...numerics.simd import float_bits, float_from_bits
-from ...numerics.vec import add, axpy, cross, dot, load, norm, put, scale, sub
+from ...numerics.vec import add, axpy, cross, dot, load, norm, put, sub
 from .flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
 from .initial_conditions import R, U, draw_path, set_vector, vector_at
 from .two_aggregates import (
@@ -55,9 +55,9 @@ RESULTS = (
     *("end", "impact_parameter", "time", "steps", "gap", "kinetic", "potential", "energy"),
     *("potential_start", "energy_start", "revolutions"),
 )
-"""Results of a flight: impact parameter and last gap [m], time [s]; energies [J] at the end: ½m̄u² of the relative motion,
-of all pairs and of the external field, and both of these with the rotation; the last two at the start, too; revolutions
-of the line of centres."""
+"""Results of a flight: impact parameter and last gap [m], time [s]; energies [J] at the end: ½m̄u² of the relative
+motion, of all pairs and of the external field, and both of these with the rotation; the last two at the start, too;
+revolutions of the line of centres."""
 
 
 class Groups(NamedTuple):
@@ -103,7 +103,8 @@ class FlyingPair(NamedTuple):
     attraction: float  # 2k Σ|μ| Σ|μ′| [J m³]
     attraction_of_charges: float  # Σ|q| Σ|q′|/4πε₀ [J m]
     field: tuple  # external flux density [T]
-    escape: float  # distance beyond which a receding body has escaped [m]; 0: that of the start, or less if it cannot return
+    # distance beyond which a receding body has escaped [m]; 0: that of the start, or less if it cannot return
+    escape: float
     step_fraction: float  # η
     group_size: float  # `GROUP_SIZE`; 0: all pairs of grains
     most_steps: int
@@ -274,7 +275,7 @@ def flight_of(charged: bool = False) -> Callable:
                 potential, start = loads.energy, energy
             distance = norm(r)
             radial = dot(r, u) / distance
-            if not energy - energy == 0.0:
+            if not abs(energy) < math.inf:
                 end = FLIGHT_FAILED
                 break
             if loads.gap <= TOUCH * pair.smallest:
@@ -316,8 +317,8 @@ def flight_of(charged: bool = False) -> Callable:
 def flights_of(charged: bool = False) -> Callable:
     """Compile flights, as `flight_driver.flights_of`: each is a function of (seed, stratum, number) alone.
 
-    Its arguments are the seed, the `flight_driver.Flights`, the `InitialConditions`, the `FlyingPair` and `Now`.  Without
-    initial conditions of its own (`start.speed` = 0) a flight begins at the state in `Flights.ends`.
+    Its arguments are the seed, the `flight_driver.Flights`, the `InitialConditions`, the `FlyingPair` and `Now`.
+    Without initial conditions of its own (`start.speed` = 0) a flight begins at the state in `Flights.ends`.
     """
     fly = flight_of(charged)
 

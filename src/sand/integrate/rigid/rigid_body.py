@@ -1,4 +1,6 @@
-"""Motion of rigid bodies: the loops over the bodies of a state.  One step of a body is kick, drift, kick:
+"""Motion of rigid bodies: the loops over the bodies of a state.
+
+One step of a body is kick, drift, kick:
 
     P += ½h F, L += ½h RᵀT;   X += h P/M, rotor(h);   new F and T;   P += ½h F, L += ½h RᵀT
 
