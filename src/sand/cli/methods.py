@@ -169,9 +169,9 @@ def _of_growth(folder: Path, path: Path) -> Sentences:
     if is_dilute(content):
         checked = check_dilute(content, str(path))
         yield (
-            "Growth was followed by a Monte Carlo of encounters of two bodies with thermal speeds, spins and "
-            f"orientations, at {checked.density:.3g} bodies per m³, in populations that differ by the seed alone: seeds "
-            f"{_seeds(seeds or DEFAULT_SEEDS)}. Each encounter was flown with all dipoles"
+            "Growth was followed by a Monte Carlo of encounters of two bodies with thermal speeds, spins "
+            f"and orientations, at {checked.density:.3g} bodies per m³, in populations that differ by the seed "
+            f"alone: seeds {_seeds(seeds or DEFAULT_SEEDS)}. Each encounter was flown with all dipoles"
             + (", and each contact computed grain by grain." if checked.method.hits == "resolve" else ".")
         )
         checked.case.grains.extent = None  # positions do not matter

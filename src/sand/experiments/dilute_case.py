@@ -16,13 +16,13 @@ from ..config.build import start_of
 from ..config.case import Case, check_case
 from ..config.key_errors import validate
 from ..config.sections import Section
-from ..forces.pair.dipole_formulas import contact_energy
 from ..io import run_folder as files
 from .dilute_body import NO_CONTACTS
 from .dilute_conditions import check_forces, check_gas, check_moments
 from .dilute_growth import HITS, Grown, bodies_of, grow
 from .dilute_majorant import Majorant
 from .dilute_population import Population
+from .scattering.rigid_flight import contact_energy
 
 METHOD = "method"
 """The table of the method."""

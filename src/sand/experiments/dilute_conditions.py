@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,6 @@ from ..basics.units import format_quantity
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.gas import Gas
-from ..forces.pair.dipoles import Dipoles
 from ..theory.magnetic_limits import magnetic_limits
 from .dilute_body import Body
 from .dilute_flight import Pilot, start_distance
@@ -37,7 +38,7 @@ THERMALISED = 3.0
 """Least time between two encounters of a body, in stopping times."""
 
 
-def check_forces(forces: Sequence[Force], grains: Grains, hits: str) -> tuple[Contact, list[Force], Gas | None]:
+def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Contact, list[Force], Gas | None]:
     """The contact model, the forces of contact phases, and the gas.
 
     Raises
@@ -55,12 +56,12 @@ def check_forces(forces: Sequence[Force], grains: Grains, hits: str) -> tuple[Co
         elif isinstance(force, Contact):
             contact = force
             own.append(force)
-        elif isinstance(force, Dipoles):
+        elif force.name == "dipoles":
             if force.cutoff not in (None, "auto"):
                 problems.append(
                     "dipoles: a cut-off is not for encounters, which are flown from far away; leave cutoff out"
                 )
-            own.append(Dipoles(cutoff=None))
+            own.append(dataclasses.replace(force, cutoff=None))
         else:
             problems.append(f"{force.name}: this force is not for encounters; leave it out, or grow boxes")
     if contact is None:

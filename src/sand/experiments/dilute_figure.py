@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..basics.constants import BOLTZMANN, MAGNETIC
-from ..forces.pair.dipole_formulas import contact_energy
 from ..plotting.papers import Curve, Guide, Panel, panels_figure
 from .dilute_kernel import CLASSES
 from .dilute_majorant import mean_power
+from .scattering.rigid_flight import contact_energy
 
 LEAST_HITS = 10
 """Fewest hits of a class in the figure."""

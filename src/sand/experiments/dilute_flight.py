@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.constants import COULOMB, MAGNETIC
-from ..forces.pair.dipole_formulas import contact_energy
 from .dilute_body import Body
 from .scattering.encounters import MOST_FLIGHT_STEPS
 from .scattering.flight_driver import Flights
 from .scattering.initial_conditions import RANDOM, InitialConditions
-from .scattering.rigid_flight import GROUP_SIZE, RESULTS, STEP_FRACTION, FlyingPair, Now, flights_of
+from .scattering.rigid_flight import GROUP_SIZE, RESULTS, STEP_FRACTION, FlyingPair, Now, contact_energy, flights_of
 from .scattering.two_aggregates import AGGREGATES
 
 START = 2.0

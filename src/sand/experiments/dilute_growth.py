@@ -25,14 +25,13 @@ from ..compiler.progress import announce
 from ..forces.base import Force
 from ..io import run_folder as files
 from ..io.lock import writing
-from ..io.table import GrowingTable
 from ..results import Run
 from ..simulation.condition import Condition, read_condition
 from ..simulation.contact_phase import ContactPhase
 from .dilute_body import NO_CONTACTS, Body, body_of, part_of
 from .dilute_conditions import MOST_OTHERS, check_forces, check_gas, check_moments, check_population
 from .dilute_encounters import Encounters
-from .dilute_files import ENCOUNTER_COLUMNS, LEDGER_COLUMNS, PopulationFiles, kept_population
+from .dilute_files import LEDGER_COLUMNS, PopulationFiles, kept_population
 from .dilute_flight import Pilot
 from .dilute_hits import HitRule, Resolve, Stick
 from .dilute_kernel import Kernel, kernel_of
@@ -68,21 +67,25 @@ class Grown:
 
     @cached_property
     def encounters(self) -> dict[str, np.ndarray]:
-        """Columns of all draws by name (K,), as `dilute_encounters.Encounter`; `end`: 0 hit, 1 miss, 2 bound, 3 beyond."""
-        table = GrowingTable(self.folder / files.ENCOUNTERS, ENCOUNTER_COLUMNS, resume=True)
-        return dict(zip(ENCOUNTER_COLUMNS, np.array(table.rows).reshape(-1, len(ENCOUNTER_COLUMNS)).T, strict=True))
+        """Columns of all draws by name (K,), see `dilute_encounters.Encounter`; `end` as in `dilute_files`."""
+        return _columns_of(self.folder / files.ENCOUNTERS)
 
     @cached_property
     def aggregates(self) -> dict[str, np.ndarray]:
         """Columns of the aggregates at the end, see `analysis.frame_statistics`; `body` is equal for copies."""
-        head, *lines = files.read_text(self.folder / files.AGGREGATES).split("\n")[:-1]
-        rows = [[float(text) for text in line.split(",")] for line in lines]
-        names = head.split(",") if head else ["grains"]
-        return dict(zip(names, np.array(rows).reshape(-1, len(names)).T, strict=True))
+        return _columns_of(self.folder / files.AGGREGATES)
 
     def kernel(self, edges: Sequence[int] | None = None) -> Kernel:
         """K by classes of sizes, see `dilute_kernel.kernel_of`."""
         return kernel_of([self.encounters], edges)
+
+
+def _columns_of(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a table of numbers by name."""
+    head, *lines = files.read_text(path).split("\n")[:-1]
+    names = head.split(",")
+    rows = np.array([[float(text) for text in line.split(",")] for line in lines])
+    return dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
 
 
 class Settings(NamedTuple):
@@ -165,9 +168,10 @@ def grow(
     if kept is not None and _without_end(kept[1].get("case", {})) != _without_end(files.plain(described)):
         raise BadInput(f"{folder} holds a population with other settings; give another folder, or overwrite=True")
     if kept is None:
+        begun = _begin(settings, None)  # which refuses what does not fit, before anything is written
         files.make_folder(folder, overwrite=overwrite)
     with writing(folder):
-        now, start = _begin(settings, kept)
+        now, start = begun if kept is None else _begin(settings, kept)
         record = PopulationFiles(folder, files.plain(described), settings.grains, kept)
         record.begin(now, start)
         outcome = _advance(now, record, settings, start, observers)
@@ -182,7 +186,7 @@ def _draw(found: Grown, settings: Settings) -> None:
     from ..plotting.run_figure import save
     from .dilute_figure import dilute_figure
 
-    if not len(found.aggregates["grains"]):
+    if not len(found.aggregates.get("grains", ())):
         return
     announce("drawing the figure")
     grains = settings.grains

@@ -5,8 +5,8 @@ No impact parameter above b̂(v) = max(e, β v^(−2/3)) leads to a hit, with th
     β² = 3 (2k Σ|μ| Σ|μ′|/m̄)^(2/3),
 
 the largest b of capture (Eqs. 12, 13 of Dominik & Nübold 2002) for the sum of all |μ|: the net moment misses the hits
-of bodies whose moments cancel.  With charges b̂² is larger by e² 2Q/m̄v²e, Q = Σ|q| Σ|q′|/4πε₀, the focusing of paths that
-touch.  Speeds have Maxwell's distribution with s² = k_BT/m̄, so that the rate of encounters in a volume V is K̂/V,
+of bodies whose moments cancel.  With charges b̂² is larger by 2Qe/m̄v², Q = Σ|q| Σ|q′|/4πε₀, the focusing of paths
+that touch.  Speeds have Maxwell's distribution with s² = k_BT/m̄, so that the rate of encounters in a volume V is K̂/V,
 
     K̂ = π ⟨b̂² v⟩ ≤ π [β² ⟨v^(−1/3)⟩ + e² ⟨v⟩ + 2eQ/m̄ ⟨v^(−1)⟩],  ⟨v^p⟩ = s^p 2^(p/2) Γ((3+p)/2)/Γ(3/2)
 """
@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from ..basics.constants import BOLTZMANN, COULOMB, MAGNETIC
-from ..forces.pair.dipole_formulas import contact_energy
+from .scattering.rigid_flight import contact_energy
 
 POWERS = (-1.0 / 3.0, 1.0, -1.0)
 """p of the three parts of K̂."""

@@ -58,8 +58,8 @@ class Settled(NamedTuple):
 
 BOOKS = ("kinetic", "contacts", "distant", *LOSSES)
 """Changes of energies [J] over a contact phase: of motion, as rigid bodies; stored in contacts; of forces at a
-distance; and losses by channel. `lost_quieting` is the vibration that is left, which rigid bodies do not have. The sum is 0 but
-for errors of the integration."""
+distance; and losses by channel. `lost_quieting` is the vibration that is left, which rigid bodies do not have. The sum
+is 0 but for errors of the integration."""
 
 
 class ContactPhase:
