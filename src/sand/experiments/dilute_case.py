@@ -17,6 +17,7 @@ from ..config.case import Case, check_case
 from ..config.key_errors import validate
 from ..config.sections import Section
 from ..io import run_folder as files
+from ..simulation.condition import read_condition
 from .dilute_body import NO_CONTACTS
 from .dilute_conditions import check_forces, check_gas, check_moments
 from .dilute_growth import HITS, Grown, bodies_of, grow
@@ -111,6 +112,22 @@ def _table(content: dict[str, Any], name: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
+COST = {"resolve": 0.7e-3, "stick": 0.2e-3}
+"""Processor time [s] of a population per grain and unit of S at its end, measured for magnetic iron grains to S = 30."""
+
+
+def expected_cost(checked: DiluteCase, grains: int) -> float:
+    """Rough processor time [s] of a population until its condition on S holds; NaN without one."""
+    stop = checked.case.run.stop
+    if stop is None:
+        return math.nan
+    condition = read_condition(stop)
+    sizes = [10.0 ** (0.05 * k) for k in range(81)]
+    rows = (dict.fromkeys(condition.names, 0.0) | {"mean_cluster_size": size} for size in sizes)
+    reached = next((row["mean_cluster_size"] for row in rows if condition.holds(row)), math.nan)
+    return COST[checked.method.hits] * grains * reached
+
+
 def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[str, str]], dict[str, Any]]:
     """What `sand info` says of a case: rows for people, and numbers; nothing is compiled."""
     checked = check_dilute(content, "case")
@@ -137,7 +154,10 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
         text = f"{format_quantity(capture, 'm')} at {temperature:g} K; n b^3 = {density * capture**3:.2g}"
         rows.append(("thermal capture", text))
     hits = "computed grain by grain until at rest" if checked.method.hits == "resolve" else "joined at the touch"
-    return [*rows, ("hits", hits)], numbers
+    cost = expected_cost(checked, len(start.grains))
+    if cost > 0.0:
+        rows.append(("wall time", f"about {format_quantity(float(f'{cost:.2g}'), 's')} a population, a rough estimate"))
+    return [*rows, ("hits", hits)], numbers | {"cost": cost}
 
 
 def run_population(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> str:

@@ -17,7 +17,7 @@ from ..forces.base import Force
 from ..forces.gas import Gas
 from ..theory.magnetic_limits import magnetic_limits
 from .dilute_body import Body
-from .dilute_flight import Pilot, start_distance
+from .dilute_flight import Pilot, kepler_start, start_distance
 from .dilute_majorant import Majorant
 from .dilute_population import Population, sizes_of
 from .scattering.event_draws import event_uniforms
@@ -56,10 +56,10 @@ def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Cont
         elif isinstance(force, Contact):
             contact = force
             own.append(force)
-        elif force.name == "dipoles":
+        elif force.name in ("dipoles", "charges"):
             if force.cutoff not in (None, "auto"):
                 problems.append(
-                    "dipoles: a cut-off is not for encounters, which are flown from far away; leave cutoff out"
+                    f"{force.name}: a cut-off is not for encounters, which are flown from far away; leave cutoff out"
                 )
             own.append(dataclasses.replace(force, cutoff=None))
         else:
@@ -71,8 +71,8 @@ def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Cont
             "contact: hits = 'resolve' computes contacts until they are at rest, which undamped ones never are; give "
             "damping = 'critical', settling_time, or hits = 'stick'"
         )
-    if grains.charge.any():
-        problems.append("charge: charged grains are not for encounters yet; leave charges out, or grow boxes")
+    if grains.charge.any() != any(force.name == "charges" for force in own):
+        problems.append("charges: charged grains need sand.Charges() among the forces, and this needs charged grains")
     if problems or contact is None:
         raise BadInput(problems)
     return contact, own, gas
@@ -87,9 +87,9 @@ def others_meanwhile(population: Population, pilot: Pilot, draws: int = PROBES) 
         a, b = population.bodies[i], population.bodies[j]
         approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
         if approach.impact_parameter <= approach.bound:
-            far = start_distance(a, b, approach.bound)
-            flown = pilot.thermal(a, b, approach.speed, approach.impact_parameter, far, (PROBE_SEED, event))
-            if flown.end == HIT:
+            start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+            flown = start and pilot.thermal(a, b, *start, (PROBE_SEED, event))
+            if flown and flown.end == HIT:
                 sums = float(population.sums[i] + population.sums[j])
                 found.append((sums - 2.0 * kernel) / population.volume * flown.time)
     return float(np.mean(found)) if found else 0.0

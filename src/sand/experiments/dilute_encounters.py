@@ -10,7 +10,7 @@ import numpy as np
 from ..basics.errors import BadInput
 from ..simulation.contact_phase import BOOKS
 from .dilute_body import Body, body_of
-from .dilute_flight import Flown, Pilot, start_distance
+from .dilute_flight import Flown, Pilot, kepler_start, start_distance
 from .dilute_hits import Hit, HitRule
 from .dilute_majorant import Approach
 from .dilute_population import Population, sizes_of
@@ -128,6 +128,8 @@ class Encounters:
         if approach.impact_parameter > approach.bound:
             return Encounter(**drawn, **NOT_FLOWN, **NO_HIT, end=BEYOND)
         flown = self._fly(a, b, approach)
+        if flown is None:
+            return Encounter(**drawn, **NOT_FLOWN, **NO_HIT, end=ENDS[MISS])
         met = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume * flown.time
         own = _flown(flown) | {"others": met}
         if flown.end == FLIGHT_FAILED:
@@ -142,10 +144,11 @@ class Encounters:
         self.recent_others += (met - self.recent_others) / min(self.hits_seen, RECENT)
         return Encounter(**drawn, **own, **_hit(hit), end=ENDS[HIT])
 
-    def _fly(self, a: Body, b: Body, approach: Approach) -> Flown:
-        distance = start_distance(a, b, approach.bound)
-        event = self.seed, self.event - 1
-        flown = self.pilot.thermal(a, b, approach.speed, approach.impact_parameter, distance, event)
+    def _fly(self, a: Body, b: Body, approach: Approach) -> Flown | None:
+        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+        if start is None:
+            return None
+        flown = self.pilot.thermal(a, b, *start, (self.seed, self.event - 1))
         self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flown.time)
         return flown
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -120,6 +121,31 @@ class Pilot:
         found = self._flights.results[0].tolist()
         values = dict(zip(RESULTS, found, strict=True)) | {"end": int(found[0]), "steps": int(found[3])}
         return Flown(**values, state=self._flights.ends[0].copy())
+
+
+def charge_of(body: Body) -> float:
+    """Net charge [C]."""
+    return float(body.grains.charge.sum())
+
+
+def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: float) -> tuple[float, float, float] | None:
+    """Speed [m/s], impact parameter [m] and distance of the plane [m] of a start on the orbit of two charges.
+
+    With Q = q q′/4πε₀ of the net charges, v and b at infinity, and r² = distance² + b²: v′² = v² − 2Q/m̄r, b′v′ = b v, and
+    the plane is at √(r² − b′²).  The direction of the orbit does not matter, as orientations are random.  None if the
+    charges repel the bodies before they come so near.
+    """
+    speed, b_far = approach
+    product = COULOMB * charge_of(a) * charge_of(b)
+    if product == 0.0:
+        return speed, b_far, distance
+    radius, reduced = math.hypot(distance, b_far), a.mass * b.mass / (a.mass + b.mass)
+    square = speed**2 - 2.0 * product / (reduced * radius)
+    if not square * radius**2 > (b_far * speed) ** 2:
+        return None
+    near = math.sqrt(square)
+    offset = b_far * speed / near
+    return near, offset, math.sqrt(radius**2 - offset**2)
 
 
 def start_distance(a: Body, b: Body, bound: float) -> float:

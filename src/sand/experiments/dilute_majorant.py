@@ -85,7 +85,9 @@ class Majorant:
     def bound(self, a: Sizes, b: Sizes, speed: Any) -> Any:
         """b̂ [m] at a speed [m/s]."""
         _, far, near, focusing = self.squares(a, b)
-        return np.sqrt(np.maximum(far * speed ** (-4.0 / 3.0), near + focusing / speed**2))
+        captured, grazing = far * speed ** (-4.0 / 3.0), near + focusing / speed**2
+        # charges and moments together attract from farther than either
+        return np.sqrt(np.where(focusing > 0.0, captured + grazing, np.maximum(captured, grazing)))
 
     def draw(self, a: Sizes, b: Sizes, uniforms: tuple[float, ...]) -> Approach:
         """Speed and impact parameter of an encounter, from three uniform deviates.
