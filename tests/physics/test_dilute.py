@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.basics.constants import BOLTZMANN, MAGNETIC
+from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
 from sand.experiments.dilute_encounters import Encounters
-from sand.experiments.dilute_flight import Pilot, reversed_state, start_distance
+from sand.experiments.dilute_flight import RigidFlights, kepler_start, reversed_state, start_distance
 from sand.experiments.dilute_hits import Hit, Resolve, Stick
 from sand.experiments.dilute_majorant import Majorant
 from sand.experiments.dilute_population import Population, sizes_of
@@ -70,69 +70,69 @@ def test_a_flight_follows_the_equations_of_motion_to_second_order(field):
     y = start_state(DIMER, DIMER, 3.0, 2.2e-7, 5e-7)
     errors = []
     for eta in (0.1, 0.05, 0.025):
-        flown = Pilot(HEAT, field=field, step_fraction=eta, group_size=0.0).onward(DIMER, DIMER, y, 5e-7)
-        assert flown.end == MISS
-        exact, energy = reference(DIMER, DIMER, y, flown.time, field)
-        errors.append(np.linalg.norm(flown.state[3:6] - exact[3:6]) / np.linalg.norm(exact[3:6] - y[3:6]))
-        assert np.linalg.norm(flown.state[14:20] - exact[14:20]) < 60.0 * eta**2 * np.linalg.norm(exact[14:20])
-        assert flown.energy == pytest.approx(energy, abs=1e3 * eta**2 * HEAT)
+        flight = RigidFlights(HEAT, field=field, step_fraction=eta, group_size=0.0).onward(DIMER, DIMER, y, 5e-7)
+        assert flight.end == MISS
+        exact, energy = reference(DIMER, DIMER, y, flight.time, field)
+        errors.append(np.linalg.norm(flight.state[3:6] - exact[3:6]) / np.linalg.norm(exact[3:6] - y[3:6]))
+        assert np.linalg.norm(flight.state[14:20] - exact[14:20]) < 60.0 * eta**2 * np.linalg.norm(exact[14:20])
+        assert flight.energy == pytest.approx(energy, abs=1e3 * eta**2 * HEAT)
     assert errors[-1] < 1e-3 and errors[0] / errors[2] > 4.0
 
 
 def test_a_reversed_flight_returns_to_its_start():
     """After a miss all motion is reversed: r, u come back to those of the start to the error of the flights, 1e-2."""
     y = start_state(DIMER, GRAIN, 2.5, 1.6e-7, 5e-7, seed=3)
-    pilot = Pilot(HEAT, step_fraction=0.05)
-    there = pilot.onward(DIMER, GRAIN, y, 5e-7)
+    rigid_flights = RigidFlights(HEAT, step_fraction=0.05)
+    there = rigid_flights.onward(DIMER, GRAIN, y, 5e-7)
     assert there.end == MISS and np.linalg.norm(there.state[3:6] - y[3:6]) > 0.1
-    back = reversed_state(pilot.onward(DIMER, GRAIN, reversed_state(there.state), 5e-7).state)
+    back = reversed_state(rigid_flights.onward(DIMER, GRAIN, reversed_state(there.state), 5e-7).state)
     moved = back[:3] - y[:3] - y[3:6] * ((back[:3] - y[:3]) @ y[3:6]) / (y[3:6] @ y[3:6])
     assert np.linalg.norm(moved) < 1e-2 * 5e-7 and np.linalg.norm(back[3:6] - y[3:6]) < 1e-2 * 2.5
 
 
 def flights_of_pair(a, b, number, seed=1, **options):
     """Draws of the bound: b/b̂ and flight of each, None beyond b̂; and K̂."""
-    majorant, pilot, found = Majorant(T), Pilot(HEAT, **options), []
+    majorant, rigid_flights, found = Majorant(T), RigidFlights(HEAT, **options), []
     sizes = sizes_of(a), sizes_of(b)
     for event in range(number):
         approach = majorant.draw(*sizes, event_uniforms(seed, event)[3:6])
-        ratio, flown = approach.impact_parameter / approach.bound, None
+        ratio, flight = approach.impact_parameter / approach.bound, None
         if ratio <= 1.0:
             distance = start_distance(a, b, approach.bound)
-            flown = pilot.thermal(a, b, approach.speed, approach.impact_parameter, distance, (seed, event))
-        found.append((ratio, flown))
+            flight = rigid_flights.thermal(a, b, approach.speed, approach.impact_parameter, distance, (seed, event))
+        found.append((ratio, flight))
     return found, majorant.kernel(*sizes)
 
 
 def rate_coefficient(a, b, number, seed=1, **options):
     """⟨σv⟩ [m³/s], its standard error, the largest b/b̂ of a hit, and the energy errors of hits [kT]."""
     found, bound = flights_of_pair(a, b, number, seed, **options)
-    hits = [(ratio, flown) for ratio, flown in found if flown is not None and flown.end == HIT]
+    hits = [(ratio, flight) for ratio, flight in found if flight is not None and flight.end == HIT]
     share = len(hits) / number
-    errors = np.array([flown.drift for _, flown in hits]) / HEAT
+    errors = np.array([flight.drift for _, flight in hits]) / HEAT
     return share * bound, bound * math.sqrt(share * (1.0 - share) / number), max(r for r, _ in hits), errors
 
 
 def test_flights_stop_just_before_a_touch_and_keep_their_energy():
     """No step passes a touch: gaps of hits are in (0, 1e-3 r]; energies keep to 3 kT rms; b stays below b̂."""
     found, _ = flights_of_pair(DIMER, GRAIN, 300)
-    hits = [(ratio, flown) for ratio, flown in found if flown is not None and flown.end == HIT]
-    gaps = np.array([flown.gap for _, flown in hits])
+    hits = [(ratio, flight) for ratio, flight in found if flight is not None and flight.end == HIT]
+    gaps = np.array([flight.gap for _, flight in hits])
     assert len(hits) > 60 and gaps.min() > 0.0 and gaps.max() <= TOUCH * RADIUS
-    for _, flown in hits[:20]:
-        grains, _ = in_space(DIMER, GRAIN, flown.state)
+    for _, flight in hits[:20]:
+        grains, _ = in_space(DIMER, GRAIN, flight.state)
         apart = np.linalg.norm(grains.position[:, :2] - grains.position[:, 2:], axis=0) - 2.0 * RADIUS
-        assert apart.min() == pytest.approx(flown.gap, rel=1e-4, abs=1e-9 * RADIUS)
+        assert apart.min() == pytest.approx(flight.gap, rel=1e-4, abs=1e-9 * RADIUS)
     assert max(ratio for ratio, _ in hits) < 1.0
-    assert np.sqrt(np.mean([flown.drift**2 for _, flown in hits])) < 3.0 * HEAT
+    assert np.sqrt(np.mean([flight.drift**2 for _, flight in hits])) < 3.0 * HEAT
 
 
 def test_the_random_numbers_of_a_flight_are_those_of_its_event():
     """A flight has the same bits alone, after others, and with larger work arrays."""
-    one = Pilot(HEAT).thermal(DIMER, GRAIN, 5.0, 1e-7, 1e-6, (1, 17))
-    pilot = Pilot(HEAT)
-    pilot.thermal(tree(9), tree(12), 5.0, 1e-7, 1e-6, (1, 3))
-    other = pilot.thermal(DIMER, GRAIN, 5.0, 1e-7, 1e-6, (1, 17))
+    one = RigidFlights(HEAT).thermal(DIMER, GRAIN, 5.0, 1e-7, 1e-6, (1, 17))
+    rigid_flights = RigidFlights(HEAT)
+    rigid_flights.thermal(tree(9), tree(12), 5.0, 1e-7, 1e-6, (1, 3))
+    other = rigid_flights.thermal(DIMER, GRAIN, 5.0, 1e-7, 1e-6, (1, 17))
     assert one.state.tobytes() == other.state.tobytes() and one[:-1] == other[:-1]
 
 
@@ -140,9 +140,9 @@ def test_hard_spheres_hit_if_and_only_if_they_are_in_the_way():
     """Without moments a flight is straight: a hit for every b < R₁ + R₂, whatever the spins."""
     plain = sand.Grains([[0.0, 0.0, 0.0]], RADIUS, "iron")
     body, _ = body_of(plain.arrays, NO_CONTACTS)
-    pilot = Pilot(HEAT)
+    rigid_flights = RigidFlights(HEAT)
     ends = [
-        pilot.thermal(body, body, 3.0, b * RADIUS, 6e-8, (1, k)).end
+        rigid_flights.thermal(body, body, 3.0, b * RADIUS, 6e-8, (1, k)).end
         for k, b in enumerate([0.0, 1.0, 1.999, 2.002, 3.0])
     ]
     assert ends == [HIT, HIT, HIT, MISS, MISS]
@@ -160,12 +160,12 @@ def test_the_energy_of_a_hit_is_accounted_for(phase):
     The error is that of Verlet steps, 25 a period of the contact: second order, 7e-4. Mass is exact; one contact forms,
     one body is left; its net moment, extent and moments of inertia are those of bodies that stick, to 1e-2.
     """
-    rule, stick = Resolve(phase, Pilot(HEAT)), Stick(CONTACT, IRON.materials)
+    rule, stick = Resolve(phase, RigidFlights(HEAT)), Stick(CONTACT, IRON.materials)
     touching = start_state(GRAIN, GRAIN, 1.0, 0.0, (2.0 + TOUCH) * RADIUS)
     dimer, _ = body_of(*stick(GRAIN, GRAIN, touching).pieces[0])
     found, _ = flights_of_pair(dimer, GRAIN, 60)
-    flown = [f for _, f in found if f is not None and f.end == HIT][:3]
-    for each in flown:
+    flight = [f for _, f in found if f is not None and f.end == HIT][:3]
+    for each in flight:
         hit, plain = rule(dimer, GRAIN, each.state), stick(dimer, GRAIN, each.state)
         released = -hit.energies["contacts"]
         assert released > 1e4 * HEAT and abs(sum(hit.energies.values())) < 1e-3 * released
@@ -186,8 +186,8 @@ def population(number, density=3e8, majorant=None, body=GRAIN):
 
 def grown(number, until, seed, rule=None, **options):
     """Encounters of a population until S, with its times of n/n₀, and all rows."""
-    pilot = Pilot(HEAT, **options)
-    now = Encounters(population(number), pilot, rule or Stick(CONTACT, IRON.materials), seed)
+    rigid_flights = RigidFlights(HEAT, **options)
+    now = Encounters(population(number), rigid_flights, rule or Stick(CONTACT, IRON.materials), seed)
     rows = []
     while now.population.mean_size < until:
         rows.append(now.step())
@@ -245,12 +245,12 @@ def test_the_cross_section_of_two_grains_at_thermal_speed(record_bound):
 
     b² is uniform up to b_max: 200,000 flights have a standard error of 0.3 %.
     """
-    speed, pilot = math.sqrt(HEAT / GRAIN.mass), Pilot(HEAT, spin=0.5)
+    speed, rigid_flights = math.sqrt(HEAT / GRAIN.mass), RigidFlights(HEAT, spin=0.5)
     widest = math.sqrt(3.0) * (2.0 * MAGNETIC * MOMENT**2 / (0.5 * GRAIN.mass * speed**2)) ** (1.0 / 3.0)
     number, hits = 200_000, 0
     for k in range(number):
         b = widest * math.sqrt(event_uniforms(7, k)[0])
-        hits += pilot.thermal(GRAIN, GRAIN, speed, b, 3.0 * widest, (7, k)).end == HIT
+        hits += rigid_flights.thermal(GRAIN, GRAIN, speed, b, 3.0 * widest, (7, k)).end == HIT
     ratio = hits / number * widest**2 / (2.0 * RADIUS) ** 2
     record_bound("cross-section of two grains at thermal speed over 134.2 π(2R)²", ratio / 134.2, least=0.99, most=1.01)
 
@@ -258,13 +258,15 @@ def test_the_cross_section_of_two_grains_at_thermal_speed(record_bound):
 @pytest.mark.validate
 def test_results_do_not_depend_on_bound_and_start(record_bound):
     """K(1,1) with b̂ 1.5 times as wide is the same, within 3 standard errors: thinning is exact."""
-    wide, pilot, number, hits = Majorant(T, widening=1.5), Pilot(HEAT), 12_000, 0
+    wide, rigid_flights, number, hits = Majorant(T, widening=1.5), RigidFlights(HEAT), 12_000, 0
     size = sizes_of(GRAIN)
     for k in range(number):
         approach = wide.draw(size, size, event_uniforms(9, k)[3:6])
         if approach.impact_parameter <= approach.bound:
             far = start_distance(GRAIN, GRAIN, approach.bound)
-            hits += pilot.thermal(GRAIN, GRAIN, approach.speed, approach.impact_parameter, far, (9, k)).end == HIT
+            hits += (
+                rigid_flights.thermal(GRAIN, GRAIN, approach.speed, approach.impact_parameter, far, (9, k)).end == HIT
+            )
     share, bound = hits / number, wide.kernel(size, size)
     other, error, _, _ = rate_coefficient(GRAIN, GRAIN, 12_000, seed=10)
     off = (share * bound - other) / math.hypot(error, bound * math.sqrt(share * (1.0 - share) / number))
@@ -293,7 +295,7 @@ def test_merging_spheres_follow_the_coagulation_equation(record_bound):
     exact = smoluchowski.coagulate(kernel, sizes, density, unit * np.geomspace(0.01, 100.0, 400), mass=plain.mass)
     goals, found = [0.5, 0.2, 0.1], []
     for seed in range(16):
-        now, times = Encounters(population(1000, density, body=plain), Pilot(HEAT), merged, seed), []
+        now, times = Encounters(population(1000, density, body=plain), RigidFlights(HEAT), merged, seed), []
         while len(times) < len(goals):
             row = now.step()
             assert row.end == "hit"
@@ -303,3 +305,47 @@ def test_merging_spheres_follow_the_coagulation_equation(record_bound):
     known = np.exp(np.interp(-np.log(goals), -np.log(exact.numbers.sum(axis=1) / density), np.log(exact.times)))
     for goal, ratio in zip(goals, np.mean(found, axis=0) / known, strict=True):
         record_bound(f"time of merging spheres at n/n0 = {goal} over Smoluchowski's", ratio, least=0.97, most=1.03)
+
+
+def charged(number):
+    """A grain without a moment with so many elementary charges."""
+    grains = sand.Grains([[0.0, 0.0, 0.0]], RADIUS, "iron", charge=number * 1.602176634e-19)
+    return body_of(grains.arrays, NO_CONTACTS)[0]
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_charged_grains_touch_where_their_orbits_do(sign):
+    """Kepler's orbit of two charges: a hit if and only if b² < e² (1 − 2Q/m̄v²e), Q = q q′/4πε₀, e = 2r; to 1 % of b.
+
+    So ⟨σv⟩ = π e² ⟨v⟩ (1 + |Q|/k_BT e) = 9.355 π (2r)² ⟨v⟩ of ± e at 100 K, which K̂ is exactly: each draw hits.
+    """
+    a, b, rigid_flights = charged(1), charged(sign), RigidFlights(HEAT)
+    reduced, product = 0.5 * a.mass, sign * COULOMB * 1.602176634e-19**2
+    for event, speed in enumerate([1.0, 1.5, 3.0]):
+        square = (2.0 * RADIUS) ** 2 * (1.0 - 2.0 * product / (reduced * speed**2 * 2.0 * RADIUS))
+        for factor in (0.99, 1.01):
+            b_far = factor * math.sqrt(max(square, 0.0))
+            start = kepler_start(a, b, (speed, b_far), 3e-7)
+            hit = start is not None and rigid_flights.thermal(a, b, *start, (1, event)).end == HIT
+            assert hit == (factor < 1.0 and square > 0.0)
+    unit = math.pi * (2.0 * RADIUS) ** 2 * math.sqrt(8.0 * HEAT / (math.pi * reduced))
+    assert Majorant(T).kernel(sizes_of(a), sizes_of(b)) == pytest.approx(9.355 * unit, rel=1e-3, abs=0.0)
+
+
+def test_half_magnetic_grains_stick_and_resolve(phase_of_two):
+    """A magnetic grain hits one without a moment: the engine for both kinds accounts for the energy to 1e-3."""
+    plain = body_of(sand.Grains([[0.0, 0.0, 0.0]], "8 nm", "iron").arrays, NO_CONTACTS)[0]
+    state = start_state(GRAIN, plain, 2.0, 1e-9, 1.8e-8 * (1.0 + TOUCH))
+    hit = Resolve(phase_of_two, RigidFlights(HEAT))(GRAIN, plain, state)
+    body, _ = body_of(*hit.pieces[0])
+    assert hit.made == 1 and body.mass == pytest.approx(GRAIN.mass + plain.mass, rel=1e-14, abs=0.0)
+    assert abs(sum(hit.energies.values())) < 1e-3 * -hit.energies["contacts"]
+    assert np.linalg.norm(body.grains.moment.sum(axis=1)) == pytest.approx(MOMENT, rel=1e-9, abs=0.0)
+
+
+@pytest.fixture(scope="module")
+def phase_of_two():
+    """Contact phases of magnetic grains of 10 nm and others of 8 nm without a moment."""
+    moments = [[0.0, 0.0, MOMENT], [0.0, 0.0, 0.0]]
+    grains = sand.Grains([[0.0, 0.0, 0.0], [1e-7, 0.0, 0.0]], [RADIUS, 8e-9], "iron", moment=moments)
+    return ContactPhase(grains, [CONTACT, sand.Dipoles(cutoff=None)])

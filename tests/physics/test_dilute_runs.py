@@ -52,7 +52,9 @@ class Stopper:
 @pytest.fixture(scope="module")
 def population(tmp_path_factory):
     """A finished population, resolved."""
-    return dilute_growth.grow(grains(), FORCES, **NUMBERS, stop=STOP, seed=3, out=tmp_path_factory.mktemp("dilute") / "one")
+    return dilute_growth.grow(
+        grains(), FORCES, **NUMBERS, stop=STOP, seed=3, out=tmp_path_factory.mktemp("dilute") / "one"
+    )
 
 
 @pytest.mark.parametrize("checkpoint_every", [0.0, 1e9])
@@ -78,7 +80,7 @@ def test_the_ledger_and_the_table_of_encounters_agree(population):
     assert ledger["flights"][-1] == (found["end"] != 3).sum()
     assert (np.diff(ledger["mean_cluster_size"]) > 0.0).all() and ledger["mean_cluster_size"][-1] >= 3.0
     assert found["event"].tolist() == list(range(len(found["event"])))
-    books = math.fsum(float(ledger[name][-1]) for name in dilute_files.BOOKED)
+    books = math.fsum(float(ledger[name][-1]) for name in dilute_files.HIT_CHANGES)
     released = -float(ledger["contacts"][-1])
     assert released > 0.0 and abs(books) < 1e-3 * released
     kinetic = found["touch_kinetic"] + found["touch_rotation"] + found["kinetic"]
@@ -125,7 +127,7 @@ def small_case(tmp_path, **changes):
 
 
 def test_the_command_grows_a_population_for_each_seed(tmp_path, capsys):
-    """`sand grow`: folders of seeds, the same bits as alone; called again with a later end it goes on, as from the start."""
+    """`sand grow`: folders of seeds, the same bits as alone; with a later end it goes on, as from the start."""
     case, place = small_case(tmp_path), tmp_path / "grown"
     assert main(["grow", str(case), "--out", str(place), "--workers", "1", "--quiet"]) in (0, None)
     assert read_json(place / "growth.json")["seeds"] == [1, 2]
@@ -176,7 +178,9 @@ def test_few_grains_undamped_contacts_and_other_forces_are_refused(tmp_path):
 def test_moments_that_flip_within_a_flight_are_refused(tmp_path):
     """At 1000 K the moments of 10 nm iron flip within nanoseconds (K₁V/4): superparamagnetic."""
     with pytest.raises(BadInput, match="superparamagnetic"):
-        dilute_growth.grow(grains(), FORCES, number_density="1e8 /m^3", temperature="1000 K", stop=STOP, out=tmp_path / "x")
+        dilute_growth.grow(
+            grains(), FORCES, number_density="1e8 /m^3", temperature="1000 K", stop=STOP, out=tmp_path / "x"
+        )
 
 
 @pytest.mark.parametrize(

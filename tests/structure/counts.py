@@ -33,6 +33,8 @@ CAPABILITIES = {
     "grains in frames, pictures and page": 491,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
     "energy, folders of several runs named by view": 18,
+    "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
+    "filled again, populations as runs, charges, kernel": 1836,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

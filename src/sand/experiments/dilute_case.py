@@ -113,7 +113,7 @@ def _table(content: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 COST = {"resolve": 0.7e-3, "stick": 0.2e-3}
-"""Processor time [s] of a population per grain and unit of S at its end, measured for magnetic iron grains to S = 30."""
+"""Processor time [s] of a population per grain and unit of S at its end, measured for magnetic iron to S = 30."""
 
 
 def expected_cost(checked: DiluteCase, grains: int) -> float:

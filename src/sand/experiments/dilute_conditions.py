@@ -17,7 +17,7 @@ from ..forces.base import Force
 from ..forces.gas import Gas
 from ..theory.magnetic_limits import magnetic_limits
 from .dilute_body import Body
-from .dilute_flight import Pilot, kepler_start, start_distance
+from .dilute_flight import RigidFlights, kepler_start, start_distance
 from .dilute_majorant import Majorant
 from .dilute_population import Population, sizes_of
 from .scattering.event_draws import event_uniforms
@@ -59,7 +59,7 @@ def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Cont
         elif force.name in ("dipoles", "charges"):
             if force.cutoff not in (None, "auto"):
                 problems.append(
-                    f"{force.name}: a cut-off is not for encounters, which are flown from far away; leave cutoff out"
+                    f"{force.name}: a cut-off is not for encounters, which begin far apart; leave cutoff out"
                 )
             own.append(dataclasses.replace(force, cutoff=None))
         else:
@@ -78,7 +78,7 @@ def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Cont
     return contact, own, gas
 
 
-def others_meanwhile(population: Population, pilot: Pilot, draws: int = PROBES) -> float:
+def others_meanwhile(population: Population, rigid_flights: RigidFlights, draws: int = PROBES) -> float:
     """Mean expected number of encounters with others of two bodies during a flight that ends in a hit, at the start."""
     found = []
     for event in range(draws):
@@ -88,14 +88,14 @@ def others_meanwhile(population: Population, pilot: Pilot, draws: int = PROBES) 
         approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
         if approach.impact_parameter <= approach.bound:
             start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
-            flown = start and pilot.thermal(a, b, *start, (PROBE_SEED, event))
-            if flown and flown.end == HIT:
+            flight = start and rigid_flights.thermal(a, b, *start, (PROBE_SEED, event))
+            if flight and flight.end == HIT:
                 sums = float(population.sums[i] + population.sums[j])
-                found.append((sums - 2.0 * kernel) / population.volume * flown.time)
+                found.append((sums - 2.0 * kernel) / population.volume * flight.time)
     return float(np.mean(found)) if found else 0.0
 
 
-def check_population(population: Population, pilot: Pilot, density: float) -> None:
+def check_population(population: Population, rigid_flights: RigidFlights, density: float) -> None:
     """Refuse too few bodies, and a gas that is too dense for encounters of two.
 
     Raises BadInput.
@@ -104,7 +104,7 @@ def check_population(population: Population, pilot: Pilot, density: float) -> No
         raise BadInput(
             f"{len(population.bodies)} bodies are too few for a population; give at least {FEWEST} (number in [grains])"
         )
-    others = others_meanwhile(population, pilot)
+    others = others_meanwhile(population, rigid_flights)
     if others > MOST_OTHERS:
         raise BadInput(
             f"number_density = {density:.3g} /m^3: during a flight that ends in a hit the two bodies meet {others:.2g} "

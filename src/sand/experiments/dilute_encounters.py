@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.errors import BadInput
-from ..simulation.contact_phase import BOOKS
+from ..simulation.contact_phase import CHANGES
 from .dilute_body import Body, body_of
-from .dilute_flight import Flown, Pilot, kepler_start, start_distance
+from .dilute_flight import FlightResult, RigidFlights, kepler_start, start_distance
 from .dilute_hits import Hit, HitRule
 from .dilute_majorant import Approach
 from .dilute_population import Population, sizes_of
@@ -19,8 +19,8 @@ from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
 
 ENDS = {HIT: "hit", MISS: "miss", BOUND: "bound", FLIGHT_FAILED: "failed"}
 BEYOND = "beyond"
-"""End of an encounter with b above b̂, which is not flown."""
-BOOKED = tuple(name for name in BOOKS if name not in ("lost_gas", "lost_outside", "lost_cutoff_changed"))
+"""End of an encounter with b above b̂, which needs no flight."""
+HIT_CHANGES = tuple(name for name in CHANGES if name not in ("lost_gas", "lost_outside", "lost_cutoff_changed"))
 """Changes of energies [J] over a hit that can occur."""
 
 
@@ -64,10 +64,10 @@ class Encounter(NamedTuple):
 
     def row(self) -> dict[str, Any]:
         """Columns of encounters.csv."""
-        return self._asdict() | {"energies": None} | {name: self.energies.get(name, 0.0) for name in BOOKED}
+        return self._asdict() | {"energies": None} | {name: self.energies.get(name, 0.0) for name in HIT_CHANGES}
 
 
-NOT_FLOWN: dict[str, Any] = dict.fromkeys(
+WITHOUT_FLIGHT: dict[str, Any] = dict.fromkeys(
     ("flight_time", "energy_start", "flight_error", "touch_kinetic", "touch_rotation", "touch_potential", "others"), 0.0
 ) | {"flight_steps": 0}
 NO_HIT: dict[str, Any] = dict.fromkeys(("made", "slipped", "broken", "pieces", "contact_steps"), 0) | {
@@ -83,7 +83,7 @@ class Encounters:
     ----------
     population : Population
         The bodies.
-    pilot : Pilot
+    rigid_flights : RigidFlights
         Computes flights.
     hits : HitRule
         What becomes of two bodies that touch.
@@ -104,8 +104,8 @@ class Encounters:
         Number of the next body that forms.
     """
 
-    def __init__(self, population: Population, pilot: Pilot, hits: HitRule, seed: int):
-        self.population, self.pilot, self.rule, self.seed = population, pilot, hits, seed
+    def __init__(self, population: Population, rigid_flights: RigidFlights, hits: HitRule, seed: int):
+        self.population, self.rigid_flights, self.rule, self.seed = population, rigid_flights, hits, seed
         self.time, self.event, self.flights, self.hits_seen, self.others = 0.0, 0, 0, 0, 0.0
         self.longest_flight = self.recent_others = 0.0
         self.numbers = 1 + max(body.number for body in population.bodies)
@@ -126,17 +126,17 @@ class Encounters:
         drawn = _drawn(self.event, self.time, a, b) | approach._asdict() | {"kernel": kernel}
         self.event += 1
         if approach.impact_parameter > approach.bound:
-            return Encounter(**drawn, **NOT_FLOWN, **NO_HIT, end=BEYOND)
-        flown = self._fly(a, b, approach)
-        if flown is None:
-            return Encounter(**drawn, **NOT_FLOWN, **NO_HIT, end=ENDS[MISS])
-        met = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume * flown.time
-        own = _flown(flown) | {"others": met}
-        if flown.end == FLIGHT_FAILED:
+            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=BEYOND)
+        flight = self._fly(a, b, approach)
+        if flight is None:
+            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=ENDS[MISS])
+        met = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume * flight.time
+        own = _of_flight(flight) | {"others": met}
+        if flight.end == FLIGHT_FAILED:
             raise BadInput(f"the flight of event {self.event - 1} failed: its state is not finite")
-        if flown.end != HIT:
-            return Encounter(**drawn, **own, **NO_HIT, end=ENDS[flown.end])
-        hit = self.rule(a, b, flown.state)
+        if flight.end != HIT:
+            return Encounter(**drawn, **own, **NO_HIT, end=ENDS[flight.end])
+        hit = self.rule(a, b, flight.state)
         if hit.is_miss:
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[MISS])
         self._replace(i, j, hit)
@@ -144,13 +144,13 @@ class Encounters:
         self.recent_others += (met - self.recent_others) / min(self.hits_seen, RECENT)
         return Encounter(**drawn, **own, **_hit(hit), end=ENDS[HIT])
 
-    def _fly(self, a: Body, b: Body, approach: Approach) -> Flown | None:
+    def _fly(self, a: Body, b: Body, approach: Approach) -> FlightResult | None:
         start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
         if start is None:
             return None
-        flown = self.pilot.thermal(a, b, *start, (self.seed, self.event - 1))
-        self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flown.time)
-        return flown
+        flight = self.rigid_flights.thermal(a, b, *start, (self.seed, self.event - 1))
+        self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flight.time)
+        return flight
 
     def _replace(self, i: int, j: int, hit: Hit) -> None:
         """The bodies of a hit; all are copied when half of their number at the start is left."""
@@ -176,12 +176,12 @@ def _drawn(event: int, time: float, a: Body, b: Body) -> dict[str, Any]:
     return found
 
 
-def _flown(flown: Flown) -> dict[str, Any]:
-    rotation = flown.energy - flown.kinetic - flown.potential
+def _of_flight(flight: FlightResult) -> dict[str, Any]:
+    rotation = flight.energy - flight.kinetic - flight.potential
     return {
-        "flight_time": flown.time, "flight_steps": flown.steps, "energy_start": flown.energy_start,
-        "flight_error": flown.drift, "touch_kinetic": flown.kinetic, "touch_rotation": rotation,
-        "touch_potential": flown.potential,
+        "flight_time": flight.time, "flight_steps": flight.steps, "energy_start": flight.energy_start,
+        "flight_error": flight.drift, "touch_kinetic": flight.kinetic, "touch_rotation": rotation,
+        "touch_potential": flight.potential,
     }  # fmt: skip
 
 

@@ -15,6 +15,8 @@ from .dilute_kernel import CLASSES
 from .dilute_majorant import mean_power
 from .scattering.rigid_flight import contact_energy
 
+POINTS = 40
+"""Points of S(t)."""
 LEAST_HITS = 10
 """Fewest hits of a class in the figure."""
 
@@ -67,7 +69,10 @@ def dilute_figure(
         Mass [kg], radius [m] and moment [A m²] of a grain, and the temperature [K].
     """
     mass, radius, moment, temperature = unit
-    later = ledger["time"] > 0.0
+    # points at equal distances of ln S
+    steps = np.linspace(0.0, math.log(ledger["mean_cluster_size"][-1]), POINTS)
+    later = np.unique(np.searchsorted(np.log(ledger["mean_cluster_size"]), steps))
+    later = later[(later < len(ledger["time"])) & (ledger["time"][np.minimum(later, len(ledger["time"]) - 1)] > 0.0)]
     time = ledger["time"][later]
     sizes = Panel(
         "time (s)",

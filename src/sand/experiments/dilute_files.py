@@ -21,7 +21,7 @@ from ..io.damage import sealed
 from ..io.ledger_table import LedgerFile
 from ..io.table import GrowingTable, write_table
 from ..io.trajectory import Frames, TrajectoryWriter
-from .dilute_encounters import BOOKED, Encounter, Encounters
+from .dilute_encounters import HIT_CHANGES, Encounter, Encounters
 from .dilute_state import arrays_of, set_apart
 from .scattering.flights import ENDS
 
@@ -33,7 +33,7 @@ END_CODES = {name: code for code, name in enumerate((*ENDS[:3], "beyond"))}
 """Ends of encounters in encounters.csv: 0 hit, 1 miss, 2 bound, 3 beyond b̂."""
 LEDGER_COLUMNS = (
     *("step", "time", "mean_cluster_size", "clusters", "largest_cluster", "grains", "volume", "number_ratio"),
-    *("flights", "hits", "others", "to_gas", "flight_error", "touch_energy", *BOOKED),
+    *("flights", "hits", "others", "to_gas", "flight_error", "touch_energy", *HIT_CHANGES),
 )
 """Columns of the ledger, a row after each hit: draws so far, time [s], S, bodies, grains of the largest and of all, V
 [m³], n/n₀, flights, hits, mean number of encounters with others during flights that hit; then sums over all hits [J]:
@@ -58,7 +58,7 @@ def ledger_row(now: Encounters, start: float, before: dict[str, Any], hit: Encou
         sums["flight_error"] += hit.flight_error
         if hit.energies:
             sums["to_gas"] += kinetic + hit.energies["kinetic"]
-            for name in BOOKED:
+            for name in HIT_CHANGES:
                 sums[name] += hit.energies[name]
     return row | sums
 
@@ -69,7 +69,7 @@ def encounter_row(encounter: Encounter) -> list[float]:
     return [float(row[name]) for name in ENCOUNTER_COLUMNS]
 
 
-ENCOUNTER_COLUMNS = (*(name for name in Encounter._fields if name != "energies"), *BOOKED)
+ENCOUNTER_COLUMNS = (*(name for name in Encounter._fields if name != "energies"), *HIT_CHANGES)
 """Columns of encounters.csv, see `dilute_encounters.Encounter`."""
 
 

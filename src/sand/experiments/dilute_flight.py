@@ -21,7 +21,7 @@ STREAMS = 0
 """The stratum of flights; their number is that of the event."""
 
 
-class Flown(NamedTuple):
+class FlightResult(NamedTuple):
     """Result of a flight, see `scattering.rigid_flight.RESULTS`, and the state at its end."""
 
     end: int
@@ -43,7 +43,7 @@ class Flown(NamedTuple):
         return self.energy - self.energy_start
 
 
-class Pilot:
+class RigidFlights:
     """Computes flights with the same settings; its work arrays grow with the bodies.
 
     Parameters
@@ -77,13 +77,13 @@ class Pilot:
 
     def thermal(
         self, a: Body, b: Body, speed: float, impact_parameter: float, distance: float, event: tuple[int, int]
-    ) -> Flown:
+    ) -> FlightResult:
         """Flight from a plane at a distance [m], with the orientations and thermal spins of an event (seed, number)."""
         flights = self._flights
         flights.numbers[0], flights.low[0], flights.high[0] = event[1], impact_parameter**2, impact_parameter**2
         return self._fly(a, b, self._start(speed, distance), event[0], 0.0)
 
-    def onward(self, a: Body, b: Body, state: np.ndarray, escape: float) -> Flown:
+    def onward(self, a: Body, b: Body, state: np.ndarray, escape: float) -> FlightResult:
         """Flight from a state (20,), until the bodies recede beyond `escape` [m]."""
         self._flights.ends[0] = state
         return self._fly(a, b, self._start(0.0, 0.0), 0, escape)
@@ -95,7 +95,7 @@ class Pilot:
             speed, along, none, 0.0, distance, False, RANDOM, (none, none), energy, (along, along), -1.0
         )
 
-    def _fly(self, a: Body, b: Body, start: InitialConditions, seed: int, escape: float) -> Flown:
+    def _fly(self, a: Body, b: Body, start: InitialConditions, seed: int, escape: float) -> FlightResult:
         needed = max(body.flying.groups.point.shape[1] for body in (a, b))
         if self._now.position1.shape[1] < needed:
             self._now = Now(*(np.zeros((3, 2 * needed)) for _ in Now._fields))
@@ -120,7 +120,7 @@ class Pilot:
         flights_of(charged)(np.uint64(seed), self._flights, start, pair, self._now)
         found = self._flights.results[0].tolist()
         values = dict(zip(RESULTS, found, strict=True)) | {"end": int(found[0]), "steps": int(found[3])}
-        return Flown(**values, state=self._flights.ends[0].copy())
+        return FlightResult(**values, state=self._flights.ends[0].copy())
 
 
 def charge_of(body: Body) -> float:
@@ -131,9 +131,9 @@ def charge_of(body: Body) -> float:
 def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: float) -> tuple[float, float, float] | None:
     """Speed [m/s], impact parameter [m] and distance of the plane [m] of a start on the orbit of two charges.
 
-    With Q = q q′/4πε₀ of the net charges, v and b at infinity, and r² = distance² + b²: v′² = v² − 2Q/m̄r, b′v′ = b v, and
-    the plane is at √(r² − b′²).  The direction of the orbit does not matter, as orientations are random.  None if the
-    charges repel the bodies before they come so near.
+    With Q = q q′/4πε₀ of the net charges, v and b at infinity, and r² = distance² + b²: v′² = v² − 2Q/m̄r, b′v′ = b v,
+    and the plane is at √(r² − b′²).  The direction of the orbit does not matter, as orientations are random.  None if
+    the charges repel the bodies before they come so near.
     """
     speed, b_far = approach
     product = COULOMB * charge_of(a) * charge_of(b)

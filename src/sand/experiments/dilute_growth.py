@@ -1,4 +1,4 @@
-"""Growth in dilute dust: a Monte Carlo of encounters of two bodies, each of which is flown, and its contact computed.
+"""Growth in dilute dust: a Monte Carlo of encounters of two bodies, with their flights and contacts.
 
 In thin dust encounters are binary and ballistic, and the gas thermalises speed, spin and orientation of all bodies many
 times between two of them.  Growth is then a sequence of encounters whose cost does not depend on the density.  See
@@ -25,6 +25,7 @@ from ..compiler.progress import announce
 from ..forces.base import Force
 from ..io import run_folder as files
 from ..io.lock import writing
+from ..io.table import read_columns
 from ..results import Run
 from ..simulation.condition import Condition, read_condition
 from ..simulation.contact_phase import ContactPhase
@@ -32,7 +33,7 @@ from .dilute_body import NO_CONTACTS, Body, body_of, part_of
 from .dilute_conditions import MOST_OTHERS, check_forces, check_gas, check_moments, check_population
 from .dilute_encounters import Encounters
 from .dilute_files import LEDGER_COLUMNS, PopulationFiles, kept_population
-from .dilute_flight import Pilot
+from .dilute_flight import RigidFlights
 from .dilute_hits import HitRule, Resolve, Stick
 from .dilute_kernel import Kernel, kernel_of
 from .dilute_majorant import Majorant
@@ -68,24 +69,16 @@ class Grown:
     @cached_property
     def encounters(self) -> dict[str, np.ndarray]:
         """Columns of all draws by name (K,), see `dilute_encounters.Encounter`; `end` as in `dilute_files`."""
-        return _columns_of(self.folder / files.ENCOUNTERS)
+        return read_columns(self.folder / files.ENCOUNTERS)
 
     @cached_property
     def aggregates(self) -> dict[str, np.ndarray]:
         """Columns of the aggregates at the end, see `analysis.frame_statistics`; `body` is equal for copies."""
-        return _columns_of(self.folder / files.AGGREGATES)
+        return read_columns(self.folder / files.AGGREGATES)
 
     def kernel(self, edges: Sequence[int] | None = None) -> Kernel:
         """K by classes of sizes, see `dilute_kernel.kernel_of`."""
         return kernel_of([self.encounters], edges)
-
-
-def _columns_of(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a table of numbers by name."""
-    head, *lines = files.read_text(path).split("\n")[:-1]
-    names = head.split(",")
-    rows = np.array([[float(text) for text in line.split(",")] for line in lines])
-    return dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
 
 
 class Settings(NamedTuple):
@@ -122,7 +115,7 @@ def grow(
     """Grow a population of thermal bodies to its end; called again, it continues an interrupted one with equal bits.
 
     Bodies, the clusters of the grains, are in a volume at a number density; between two encounters speeds, spins and
-    orientations are those of thermal equilibrium.  Pairs are drawn in proportion to an upper bound of their rate, flown
+    orientations are those of thermal equilibrium.  Pairs are drawn in proportion to an upper bound of their rate, fly
     from far away, and those that touch are computed grain by grain until they are at rest.  When half of the bodies are
     left, all are copied, in twice the volume.
 
@@ -217,14 +210,14 @@ def _advance(
 def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]] | None) -> tuple[Encounters, float]:
     """The encounters at the start, or as they were at a checkpoint; and n₀ [1/m³]."""
     majorant = Majorant(settings.temperature)
-    pilot = Pilot(majorant.heat)
+    rigid_flights = RigidFlights(majorant.heat)
     contact, forces, gas = check_forces(settings.forces, settings.grains, settings.hits)
     rule: HitRule = Stick(contact, settings.grains.materials)
     if settings.hits == "resolve":
-        rule = Resolve(ContactPhase(settings.grains, forces), pilot)
+        rule = Resolve(ContactPhase(settings.grains, forces), rigid_flights)
     if kept is not None:
         arrays, meta = kept
-        now = Encounters(population_from(arrays, meta, majorant), pilot, rule, settings.seed)
+        now = Encounters(population_from(arrays, meta, majorant), rigid_flights, rule, settings.seed)
         for name in SINGLE_NUMBERS:
             setattr(now, name, meta[name])
         return now, settings.density
@@ -232,8 +225,8 @@ def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]
     population = Population(bodies, len(bodies) / settings.density, majorant)
     check_moments(settings.grains, settings.temperature, population)
     check_gas(gas, settings.grains, population)
-    check_population(population, pilot, settings.density)
-    return Encounters(population, pilot, rule, settings.seed), settings.density
+    check_population(population, rigid_flights, settings.density)
+    return Encounters(population, rigid_flights, rule, settings.seed), settings.density
 
 
 def bodies_of(grains: Grains, contacts: StrainedContacts) -> list[Body]:

@@ -12,9 +12,9 @@ from ..basics.grains import GrainArrays
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import Material
 from ..contact.model import Contact
-from ..simulation.contact_phase import BOOKS, ContactPhase
+from ..simulation.contact_phase import CHANGES, ContactPhase
 from .dilute_body import Body, body_of, closest_pair, in_space, part_of
-from .dilute_flight import Pilot
+from .dilute_flight import RigidFlights
 from .scattering.flight_driver import HIT
 
 MOST_RETURNS = 100
@@ -30,7 +30,7 @@ class Hit(NamedTuple):
     broken: int
     time: float  # of contact phases, and of flights between them [s]
     steps: int  # contact steps
-    energies: dict[str, float]  # changes [J] by channel: `simulation.contact_phase.BOOKS`
+    energies: dict[str, float]  # changes [J] by channel: `simulation.contact_phase.CHANGES`
 
     @property
     def is_miss(self) -> bool:
@@ -74,29 +74,29 @@ class Stick:
 
 
 class Resolve:
-    """Contact steps until everything is at rest; two pieces that part are flown on, and may touch again.
+    """Contact steps until everything is at rest; two pieces that part fly on, and may touch again.
 
     Parameters
     ----------
     phase : ContactPhase
         Contact steps with the forces of the grains.
-    pilot : Pilot
+    rigid_flights : RigidFlights
         Computes flights.
     """
 
-    def __init__(self, phase: ContactPhase, pilot: Pilot):
-        self.phase, self.pilot = phase, pilot
+    def __init__(self, phase: ContactPhase, rigid_flights: RigidFlights):
+        self.phase, self.rigid_flights = phase, rigid_flights
 
     def __call__(self, a: Body, b: Body, state: np.ndarray) -> Hit:
         """Compute a hit in the state of a pair.  Raises BadInput if the contact steps fail."""
         grains, contacts = in_space(a, b, state)
-        counts, time, steps, energies = np.zeros(3, int), 0.0, 0, dict.fromkeys(BOOKS, 0.0)
+        counts, time, steps, energies = np.zeros(3, int), 0.0, 0, dict.fromkeys(CHANGES, 0.0)
         escape = float(np.linalg.norm(state[:3])) + a.extent + b.extent
         for _ in range(MOST_RETURNS):
             end = self.phase.run(grains, contacts)
             counts += (end.made, end.slipped, end.broken)
             time, steps = time + end.time, steps + end.steps
-            for name in BOOKS:
+            for name in CHANGES:
                 energies[name] += end.energies[name]
             pieces = [
                 part_of(end.grains, end.contacts, np.flatnonzero(end.label == k)) for k in range(end.label.max() + 1)
@@ -104,13 +104,13 @@ class Resolve:
             if len(pieces) != 2:
                 break
             one, two, y = moving_pair(pieces)
-            flown = self.pilot.onward(one, two, y, escape)
-            time += flown.time
-            energies["kinetic"] += flown.energy - flown.potential - (flown.energy_start - flown.potential_start)
-            energies["distant"] += flown.potential - flown.potential_start
-            if flown.end != HIT:
+            flight = self.rigid_flights.onward(one, two, y, escape)
+            time += flight.time
+            energies["kinetic"] += flight.energy - flight.potential - (flight.energy_start - flight.potential_start)
+            energies["distant"] += flight.potential - flight.potential_start
+            if flight.end != HIT:
                 break
-            grains, contacts = in_space(one, two, flown.state)
+            grains, contacts = in_space(one, two, flight.state)
         made, slipped, broken = counts.tolist()
         return Hit(pieces, made, slipped, broken, time, steps, energies)
 

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..basics.errors import BadInput, warn
 from .damage import DIGEST, digest_of, sealed
 from .run_folder import append_text, read_text, replace_file
@@ -23,6 +25,14 @@ def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     writer.writeheader()
     writer.writerows(rows)
     replace_file(path, out.getvalue().encode())
+
+
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a table of numbers by name, (K,); an incomplete last row is dropped.  Raises BadInput."""
+    head, *lines = read_text(path).split("\n")[:-1]
+    names = head.split(",")
+    rows = np.array([[float(text) for text in line.split(",")] for line in lines])
+    return dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
 
 
 CHECK = "check"

@@ -53,10 +53,10 @@ class Settled(NamedTuple):
     broken: int
     time: float  # [s]
     steps: int
-    energies: dict[str, float]  # changes [J]: `BOOKS`
+    energies: dict[str, float]  # changes [J]: `CHANGES`
 
 
-BOOKS = ("kinetic", "contacts", "distant", *LOSSES)
+CHANGES = ("kinetic", "contacts", "distant", *LOSSES)
 """Changes of energies [J] over a contact phase: of motion, as rigid bodies; stored in contacts; of forces at a
 distance; and losses by channel. `lost_quieting` is the vibration that is left, which rigid bodies do not have. The sum
 is 0 but for errors of the integration."""
@@ -126,7 +126,7 @@ class ContactPhase:
             *counts,
             state.time,
             state.steps,
-            _books(before, after, force_columns(engine)),
+            _changes(before, after, force_columns(engine)),
         )
 
 
@@ -172,8 +172,8 @@ def _strained(engine: Engine) -> StrainedContacts:
     return StrainedContacts(pair, table["slide_vector"], table["roll_vector"], table["twist"])
 
 
-def _books(before: dict[str, float], after: dict[str, float], forces: Sequence[str]) -> dict[str, float]:
-    """`BOOKS` of the rows of the ledger at both ends."""
+def _changes(before: dict[str, float], after: dict[str, float], forces: Sequence[str]) -> dict[str, float]:
+    """`CHANGES` of the rows of the ledger at both ends."""
 
     def change(*names: str) -> float:
         return math.fsum(after[name] - before[name] for name in names)
