@@ -25,7 +25,7 @@ from .io.export import export_frames
 from .io.frame import FrameArrays
 from .io.ledger_table import read_ledger
 from .io.optics import Optics
-from .io.sweep_files import DONE, LAST, STATE, read_sweep
+from .io.sweep_files import DONE, LAST, STATE, TABLE, read_lines, read_runs, read_sweep
 from .io.trajectory import Frame, Frames
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -301,6 +301,8 @@ class Runs(Sequence[Run]):
         return "\n".join([f"<{len(self)} runs>", *(line.rstrip() for line in lines)])
 
 
+LABORATORY = "laboratory"
+"""Name of the figure of packings that are loaded."""
 SHOWN = ("growth_efficiency", "largest_remnant", "sigma", "mean_cluster_size")
 """Columns of results, the first of which in the table of a sweep is drawn if none is asked for."""
 
@@ -333,6 +335,21 @@ class Sweep:
         """
         return Columns(read_sweep(self.folder))
 
+    @cached_property
+    def rows(self) -> Columns:
+        """Rows of the tables that runs have of their own, as those of packings: keys, seed, columns, run.
+
+        Raises BadInput if no run has such a table.
+        """
+        return Columns(read_lines(self.folder))
+
+    @property
+    def loaded(self) -> list[dict[str, Any]]:
+        """Results of packings that were loaded, as in laboratory.json; `group` names the values of the keys."""
+        runs = [one for one in read_runs(self.folder) if TABLE in one]
+        texts = [", ".join(f"{key.rpartition('.')[2]} = {one[key]}" for key in self.keys) for one in runs]
+        return [one | {"group": text} for one, text in zip(runs, texts, strict=True)]
+
     @property
     def keys(self) -> list[str]:
         """The keys that change: the columns before `seed`."""
@@ -346,7 +363,9 @@ class Sweep:
 
     @property
     def shown(self) -> list[str]:
-        """The columns that `sand plot` draws: the outcome, and the first result of `SHOWN`."""
+        """What `sand plot` draws: the outcome, and the first result of `SHOWN`; of packings `LABORATORY`."""
+        if (self.folder / files.ROWS_CSV).exists() and "pressure_scale" in self.table:
+            return [LABORATORY]
         telling = [name for name in SHOWN if name in self.table]
         return [name for name in ("outcome", *telling[:1]) if name in self.table]
 

@@ -16,6 +16,9 @@ from . import report
 from .info_cost import cost_of, limits_of, of_each
 from .info_jobs import JOBS, Description
 
+PLANNED = 8
+"""Packings of different seeds that are set up for the estimate of the cost, at most."""
+
 
 def describe_case(path: Path) -> Description:
     """Check and describe a case file, with the choices that would be made automatically."""
@@ -100,7 +103,9 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
         good = slow_from(planned)
         simulation = simulation_of(planned, case.physics(), stepping=case.stepping)
     limits = limits_of(simulation)
-    cost, costs = cost_of(simulation, planned.until, math.inf, None, len(seeds), len(seeds))
+    ends = [planned.until, *(case.plan(seed).until for seed in seeds[1:PLANNED])]
+    cost, costs = cost_of(simulation, sum(ends) / len(ends), math.inf, None, len(seeds), len(seeds))
+    first, last = (format_quantity(float(f"{end:.3g}"), "s") for end in (min(ends), max(ends)))
     scales = planned.scales
     energy = f"12 pi^2 gamma R xi_c roll_factor = {scales.roll_energy:.3g} J; E_roll/r^3 = {scales.pressure:.3g} Pa"
     sides = " x ".join(format_quantity(float(f"{side:.3g}"), "m") for side in planned.sides)
@@ -112,7 +117,7 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
         ("dashpots", f"1 % of the critical one is damping_constant = {0.01 * scales.critical_damping:.2g} kg/s"),
         ("seeds", str(len(seeds))),
         *of_each(costs, len(seeds), "run"),
-        ("end", f"at {format_quantity(planned.until, 's')}"),
+        ("end", f"at {first}" if first == last else f"at {first} to {last}, according to the seed"),
         *limits.items(),
         start,
     ]

@@ -8,6 +8,7 @@ from pathlib import Path
 from ..basics.errors import BadInput
 from ..config.folders import job_in
 from ..io import run_folder as files
+from ..io.table import read_table
 from . import report
 from .info_jobs import JOBS, Description, describe_job, describe_results
 from .info_run import describe_checkpoint, describe_ledger, describe_run, describe_summary, describe_trajectory
@@ -22,7 +23,7 @@ def describe(path: Path) -> Description:
     if path.suffix not in FILE_TYPES:
         raise BadInput(
             f"{path} is not a file that SAND can describe; give a run's folder, a case file (.toml), trajectory.gsd, "
-            "a checkpoint (.npz), summary.json or ledger.csv"
+            "a checkpoint (.npz), summary.json, ledger.csv or another table (.csv)"
         )
     return FILE_TYPES[path.suffix](path)
 
@@ -56,10 +57,28 @@ def describe_json(path: Path) -> Description:
     return describe_summary(path)
 
 
+def describe_csv(path: Path) -> Description:
+    """Describe a ledger, or any other table."""
+    if path.name == files.LEDGER:
+        return describe_ledger(path)
+    names, *lines = read_table(path)
+    if names[:1] == ["step"]:
+        return describe_ledger(path)
+    rows = [("rows", str(len(lines))), ("columns", ", ".join(names))]
+    return TABLES.get(path.name, "a table"), rows, {"kind": "table", "rows": len(lines), "columns": names}
+
+
+TABLES = {
+    files.RESULTS_CSV: "the rows of all runs of a job",
+    files.SWEEP_CSV: "the table of a sweep, a row for each run",
+    files.ROWS_CSV: "the rows of the tables of all runs of a sweep",
+    files.COMPARISON: "the comparison of sand reproduce with a paper",
+}
+"""What tables hold, by the name of their file."""
 FILE_TYPES: dict[str, Callable[[Path], Description]] = {
     ".toml": _describe_case,
     ".gsd": describe_trajectory,
     ".npz": describe_checkpoint,
     ".json": describe_json,
-    ".csv": describe_ledger,
+    ".csv": describe_csv,
 }

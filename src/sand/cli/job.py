@@ -105,6 +105,7 @@ def running_job(
     wall_time: float | None = None,
     *,
     quiet: bool,
+    again: str = "",
 ) -> Iterator[tuple[Executor | None, InterruptObserver]]:
     """Executor of a job in a folder, and an observer for simulations that run in this process.
 
@@ -124,7 +125,7 @@ def running_job(
     except (KeyboardInterrupt, BrokenExecutor) as error:
         if isinstance(error, BrokenExecutor) and not (interrupts.received or interrupts.is_late):
             raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
-        text = f"{interrupts.why}; {report.how_to_continue(folder)}"
+        text = f"{interrupts.why}; {again or report.how_to_continue(folder)}"
         raise (WallTimeUsed if interrupts.is_late else KeyboardInterrupt)(text) from None
 
 
@@ -153,7 +154,10 @@ def run_job(
     no_bar = hidden or single or (lines and not sys.stderr.isatty())
     with (
         report.progress_bar(1.0, no_bar, bar_format=report.LAYOUT, every=report.JOB_LINE_EVERY) as bar,
-        running_job(job.folder, 1 if single else workers, quiet=quiet, **execution) as (executor, interrupts),
+        running_job(job.folder, 1 if single else workers, quiet=quiet, again=job.AGAIN, **execution) as (
+            executor,
+            interrupts,
+        ),
     ):
 
         def progress(text: str, part: float, line: str = "") -> None:

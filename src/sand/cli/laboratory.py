@@ -57,7 +57,13 @@ def run_rows(runs: list[dict[str, Any]]) -> report.Rows:
     def text(run: dict[str, Any]) -> str:
         last, most = (format_quantity(float(f"{run[name]:.3g}"), "Pa") for name in ("stress", "largest_stress"))
         ends = f"filling factor {run['filling_at_start']:.3g} to {run['filling']:.3g}, strain {run['strain']:.3g}"
-        stress = f"stress {last} at the end, {most} at most; {run['coordination']:.2f} contacts per grain"
+        if run["kind"] == "compress":
+            where = ""
+        elif run["largest_at_end"]:
+            where = ", where it still rises: that is no strength"
+        else:
+            where = f", at strain {run['strain_of_largest']:.3g}"
+        stress = f"stress {last} at the end, {most} at most{where}; {run['coordination']:.2f} contacts per grain"
         return f"{ends}; {stress}; {run['step']} steps, drift {run['drift']:.1e}"
 
     return report.first_of([(f"seed {run['seed']}", text(run)) for run in runs], SHOWN)

@@ -18,6 +18,8 @@ GROWTH, OF_GROWTH = "growth", ("impact_parameter", "reach", "growth_efficiency",
 FORMATS = ("png", "pdf", "svg")
 FOLDER, SWEEP_TABLE, ENCOUNTERS = "plots", "sweep.csv", "encounters.csv"
 # as `PLOTS`, `SWEEP_CSV` and `ENCOUNTERS` of `io.run_folder`, whose import is slow
+LABORATORY = "laboratory"
+"""The figure of packings that are loaded; also the name of the file with the results of such a job."""
 
 
 class PrintSize(NamedTuple):
@@ -78,7 +80,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     from ..plotting.render.still import check_picture_options
 
     given = {name: values[name] for name in options.READING}
-    if values["source"] is not None and (Path(values["source"]) / SWEEP_TABLE).exists():
+    if values["source"] is not None and _is_many(Path(values["source"])):
         return
     one = None if values["source"] is None else _first_frame(Path(values["source"]), given)
     allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
@@ -91,6 +93,11 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
         check_picture_options(*shown, size.pixels(values["dpi"] or DPI), values["dpi"] or DPI, one)
     except BadInput as error:
         yield from error.problems
+
+
+def _is_many(source: Path) -> bool:
+    """Whether a folder holds a sweep, or a finished job of packings that are loaded."""
+    return any((source / name).exists() for name in (SWEEP_TABLE, f"{LABORATORY}.json"))
 
 
 def _bonds(given: str | None) -> str | None:
@@ -156,7 +163,8 @@ def command(
 
     DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD; or a sweep, of which
     WHAT are columns of results, such as largest_remnant or outcome, or growth: growth efficiency and kinds of outcomes
-    over speed and impact parameter.
+    over speed and impact parameter. Of packings that were loaded by `sand compress`, `stretch` or `shear`, in a job or
+    a sweep, their figure is drawn, `laboratory`, or columns of the table of a job.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
     QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
@@ -166,8 +174,8 @@ def command(
     """
     from ..io.run_folder import make_folder, replace_file
 
-    if (Path(source) / SWEEP_TABLE).exists():
-        what = _of_sweep(Path(source), what)
+    if _is_many(Path(source)):
+        what = _of_many(Path(source), what)
     folder, names = _place(Path(source), what, out, form, overwrite)
     how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
     given = {name: how.pop(name) for name in options.READING}
@@ -181,16 +189,20 @@ def command(
     report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json, quiet=quiet)
 
 
-def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
-    """Columns of a sweep to draw.  Raises BadInput for others."""
+def _of_many(folder: Path, what: list[str] | None) -> list[str]:
+    """Columns of a sweep, or of the table of packings, to draw.  Raises BadInput for others."""
     from ..results import Sweep
 
+    if not (folder / SWEEP_TABLE).exists():
+        allowed = [LABORATORY, *_loaded(folder)[0]["table"]]
+        return _allowed([LABORATORY] if what is None else what, allowed)
     sweep = Sweep(folder)
     if not len(sweep.done["run"]):
         raise BadInput(f"{folder} has no run that is done, and nothing to draw")
     if what is None:
         return sweep.shown
     allowed = [*sweep.results, *([GROWTH] if set(OF_GROWTH).issubset(sweep.table) else [])]
+    allowed += [LABORATORY] * (LABORATORY in sweep.shown)
     mixed = [key for key in sweep.keys if key not in ("impact.speed", "impact.impact_parameter")]
     if GROWTH in what and mixed:
         raise BadInput(
@@ -198,9 +210,22 @@ def _of_sweep(folder: Path, what: list[str] | None) -> list[str]:
         )
     if GROWTH in what and not {"impact.speed", "speed"} & sweep.table.keys() and GROWTH in allowed:
         raise BadInput(f"--what {GROWTH} needs a sweep over impact.speed; give columns, such as growth_efficiency")
+    return _allowed(what, allowed)
+
+
+def _allowed(what: list[str], allowed: list[str]) -> list[str]:
+    """What to draw.  Raises BadInput for other names."""
     if wrong := [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in what if name not in allowed]:
         raise BadInput(wrong)
     return what
+
+
+def _loaded(folder: Path) -> list[dict[str, Any]]:
+    """Results of a job of packings.  Raises BadInput."""
+    from ..io.run_folder import read_json
+
+    runs: list[dict[str, Any]] = read_json(folder / f"{LABORATORY}.json")["runs"]
+    return runs
 
 
 def _place(
@@ -236,8 +261,8 @@ def _open_source(path: Path, given: Mapping[str, Any]) -> Source:
     if path.is_file():
         return Source(path, open_frames(path, **given), None)
     options.refuse_reading(path, given)
-    if (path / SWEEP_TABLE).exists():
-        return Source(path, None, Sweep(path))
+    if _is_many(path):
+        return Source(path, None, Sweep(path) if (path / SWEEP_TABLE).exists() else None)
     run = Run(path)
     return Source(path, run.frames, run)
 
@@ -256,7 +281,7 @@ def _first_frame(path: Path, given: Mapping[str, Any]) -> Any:
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
     if source.frames is None:
-        return _draw_sweep(source.run, names, form, how)
+        return _draw_many(source, names, form, how)
     from ..analysis.ledger_columns import LedgerColumns
     from ..basics.temperature import kinetic_temperature
     from ..io.ledger_table import read_ledger
@@ -282,13 +307,19 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
     return [figure_bytes(draw(name), form, how["transparent"], how["dpi"]) for name in names]
 
 
-def _draw_sweep(sweep: Any, names: list[str], form: str, how: dict[str, Any]) -> list[bytes]:
-    """Draw columns of a sweep."""
+def _draw_many(source: Source, names: list[str], form: str, how: dict[str, Any]) -> list[bytes]:
+    """Draw columns of a sweep, or packings."""
+    from ..experiments.laboratory_figure import laboratory_figure
     from ..plotting.collisions import growth_figure
     from ..plotting.run_figure import figure_bytes
     from ..plotting.sweeps import sweep_figure
 
+    sweep = source.run
+
     def draw(name: str) -> Any:
+        if sweep is None or name == LABORATORY:
+            runs = _loaded(source.path) if sweep is None else sweep.loaded
+            return laboratory_figure(runs, None if name == LABORATORY else name)
         if name != GROWTH:
             return sweep_figure(sweep.done, sweep.keys, name)
         columns = {name: sweep.done[name].tolist() for name in OF_GROWTH}

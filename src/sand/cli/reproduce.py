@@ -27,9 +27,10 @@ def command(
 ) -> int | None:
     """Compute the figure NAME of a paper; without NAME, list all figures.
 
-    Each is a sweep, whose case is in examples/papers, with a table of results, a figure, and a comparison with the
-    paper: what it gives, what SAND finds with its 95 % interval, and whether they agree. Writes these to DIR/results.
-    What is in DIR is not computed again: call the command again after an interruption, or in several processes at once.
+    Each is a sweep of collisions, or of packings that are compressed or stretched, whose case is in examples/papers,
+    with a table of results, a figure, and a comparison with the paper: what it gives, what SAND finds with its 95 %
+    interval, and whether they agree. Writes these to DIR/results. What is in DIR is not computed again: call the
+    command again after an interruption, or in several processes at once.
     """
     set_threads(threads)
     from ..experiments.reproduce import FIGURES, Reproduction
@@ -52,12 +53,14 @@ def _listed(job: Any) -> tuple[str, dict[str, Any]]:
     about = {
         "title": job.figure.title,
         "papers": list(job.figure.references),
+        "also": list(job.figure.also),
         "runs": len(job.names),
         "known": len(job.known),
         "core_hours": hours,
     }
     known = f"; {len(job.known)} come with SAND, which took {hours:.2g} core-hours" if job.known else ""
-    return f"{job.figure.title} ({'; '.join(job.figure.references)}): {len(job.names)} runs{known}", about
+    names = f"; also {' and '.join(job.figure.also)}" if job.figure.also else ""
+    return f"{job.figure.title} ({'; '.join(job.figure.references)}): {len(job.names)} runs{known}{names}", about
 
 
 def comparison_rows(content: dict[str, Any]) -> report.Rows:

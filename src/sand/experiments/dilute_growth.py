@@ -25,7 +25,7 @@ from ..compiler.progress import announce
 from ..forces.base import Force
 from ..io import run_folder as files
 from ..io.lock import writing
-from ..io.table import read_columns
+from ..io.table import read_table
 from ..results import Run
 from ..simulation.condition import Condition, read_condition
 from ..simulation.contact_phase import ContactPhase
@@ -69,16 +69,22 @@ class Grown:
     @cached_property
     def encounters(self) -> dict[str, np.ndarray]:
         """Columns of all draws by name (K,), see `dilute_encounters.Encounter`; `end` as in `dilute_files`."""
-        return read_columns(self.folder / files.ENCOUNTERS)
+        return _columns(self.folder / files.ENCOUNTERS)
 
     @cached_property
     def aggregates(self) -> dict[str, np.ndarray]:
         """Columns of the aggregates at the end, see `analysis.frame_statistics`; `body` is equal for copies."""
-        return read_columns(self.folder / files.AGGREGATES)
+        return _columns(self.folder / files.AGGREGATES)
 
     def kernel(self, edges: Sequence[int] | None = None) -> Kernel:
         """K by classes of sizes, see `dilute_kernel.kernel_of`."""
         return kernel_of([self.encounters], edges)
+
+
+def _columns(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a table of numbers by name, (K,)."""
+    names, *rows = read_table(path)
+    return dict(zip(names, np.array(rows, float).reshape(-1, len(names)).T, strict=True))
 
 
 class Settings(NamedTuple):

@@ -45,15 +45,16 @@ class Job:
     ----------
     content : dict
         The case, with absolute paths.
-    COMMAND, RESULTS, KEPT, PARTS : str
-        Command, results file, file that keeps finished parts until the results are written ("": none), and what the
-        parts are called in the line of progress.
+    COMMAND, RESULTS, KEPT, PARTS, AGAIN : str
+        Command, results file, file that keeps finished parts until the results are written ("": none), what the
+        parts are called in the line of progress, and how to continue after an interruption ("": by `sand resume`).
     """
 
     COMMAND: ClassVar[str]
     RESULTS: ClassVar[str]
     KEPT: ClassVar[str] = ""
     PARTS: ClassVar[str] = "parts"
+    AGAIN: ClassVar[str] = ""
 
     def __init__(
         self, path: str | Path, folder: str | Path | None = None, *, resume: bool = False, overwrite: bool = False

@@ -27,7 +27,7 @@ from ..setup.checks import pairs_in_contact, refuse_pieces
 from ..setup.from_frame import Start
 from ..simulation.simulation import Simulation
 from ..theory.compression import CLOSEST, PackingScales, packing_scales
-from .laboratory_table import Percolation, table_of
+from .laboratory_table import Percolation, shares, table_of
 
 WAYS = ("box", "walls")
 """By what a packing is loaded: its periodic box, or one of two walls. The functions of each are in laboratory_WAY."""
@@ -201,7 +201,7 @@ class Plan(NamedTuple):
         }
         parts = ("pressure", "mean_pressure", "lost_")
         more = {name: row[name] for name in row if name in OF_STATE or name.startswith(parts)}
-        return known | more
+        return known | shares(before, row) | more
 
 
 def _way(loading: Loading) -> Any:
@@ -278,6 +278,7 @@ class Loaded(NamedTuple):
     def to_dict(self) -> dict[str, Any]:
         """Results for JSON."""
         planned, last = self.plan, self.table[-1]
+        most = max(self.table[1:], key=lambda row: row["stress"], default=last)
         return {
             "kind": planned.loading.kind,
             "by": planned.loading.by,
@@ -291,7 +292,9 @@ class Loaded(NamedTuple):
             "roll_energy": planned.scales.roll_energy,
             "pressure_scale": planned.scales.pressure,
             **{name: last[name] for name in ("time", "step", "filling", "strain", "stress", "coordination")},
-            "largest_stress": max((row["stress"] for row in self.table[1:]), default=math.nan),
+            "largest_stress": most["stress"],
+            "strain_of_largest": most["strain"],
+            "largest_at_end": most is last,
             "drift": self.simulation.ledger.drift,
             "table": {name: [row[name] for row in self.table] for name in last},
         }

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..analysis.ledger_columns import ALWAYS_LOST, DAMPED
 from ..plotting.papers import Curve, Guide, Panel, panels_figure
 from ..theory.compression import (
     CLOSEST,
@@ -17,67 +16,90 @@ from ..theory.compression import (
     tatsuuma_pressure,
     tatsuuma_strength,
 )
+from .laboratory_table import CHANNELS
 
 POINTS = 60
 """Largest number of points of a curve."""
-CHANNELS = ("rolling", "sliding", "twisting")
-"""Losses that are drawn one by one; all others are drawn as one."""
 NOUNS = {"compress": "pressure", "stretch": "tension", "shear": "shear stress"}
+FILLING = r"filling factor $\phi$"
+TOO_FAST, RISING = "open: too fast for a static stress", "rises to the end: no strength"
+
+Columns = Mapping[str, np.ndarray]
 
 
-def laboratory_figure(runs: Sequence[dict[str, Any]]) -> Figure:
-    """Figure of the outcomes of a job, with the range of its seeds.
+def curve_of(tables: Sequence[Columns], x: str, y: str, label: str) -> Curve:
+    """Mean and range of a column over the tables of several seeds, within the range of x that all of them have.
+
+    Points are `weak` where a packing was loaded too fast.
+    """
+    logarithmic = x == "mean_filling"
+    low, high = max(table[x].min() for table in tables), min(table[x].max() for table in tables)
+    number = min(POINTS, *(len(table[x]) for table in tables))
+    places = np.geomspace(low, high, number) if logarithmic else np.linspace(low, high, number)
+    values = np.array([np.interp(places, table[x], table[y]) for table in tables])
+    if logarithmic and y == "stress":  # fast compressions begin with noise, which a logarithm cannot show
+        values[values <= 0.0] = np.nan
+    fast = np.max([np.interp(places, table[x], table["rate_ratio"]) for table in tables], axis=0) > 1.0
+    return Curve(label, places, values.mean(axis=0), values.min(axis=0), values.max(axis=0), np.asarray(fast))
+
+
+def shares_of(tables: Sequence[Columns], x: str) -> list[Curve]:
+    """Curves of the shares of what is dissipated, see `laboratory_table.shares`."""
+    others = [1.0 - np.sum([one[f"share_{name}"] for name in CHANNELS], axis=0) for one in tables]
+    whole = [{**one, "share_others": rest} for one, rest in zip(tables, others, strict=True)]
+    return [curve_of(whole, x, f"share_{name}", name)._replace(weak=None) for name in (*CHANNELS, "others")]
+
+
+def laboratory_figure(runs: Sequence[dict[str, Any]], column: str | None = None) -> Figure:
+    """Figure of the outcomes of a job, with the range of its seeds, or of those of a sweep.
 
     Parameters
     ----------
     runs : Sequence[dict]
-        Outcomes, as `experiments.laboratory.Loaded.to_dict`.
+        Outcomes, as `experiments.laboratory.Loaded.to_dict`; of a sweep also with "group", the values of its keys. Each
+        group has a curve; the shares of what is dissipated are those of the first one.
+    column : str or None, optional
+        A column of the table to draw alone.
     """
+    groups: dict[str, list[Columns]] = {}
+    for run in runs:
+        table = {name: np.array(column[1:], float) for name, column in run["table"].items()}
+        groups.setdefault(run.get("group", ""), []).append(table)
     first = runs[0]
     compressed = first["kind"] == "compress"
-    name, label = ("mean_filling", r"filling factor $\phi$") if compressed else ("strain", "strain")
-    tables = [_columns(run["table"]) for run in runs]
-    low, high = max(table[name].min() for table in tables), min(table[name].max() for table in tables)
-    number = min(POINTS, *(len(table[name]) for table in tables))
-    x = np.geomspace(low, high, number) if compressed else np.linspace(low, high, number)
+    x, label = ("mean_filling", FILLING) if compressed else ("strain", "strain")
+    first_name, tables = next(iter(groups.items()))
+    seeds = f"{len(tables)} seed{'s' * (len(tables) > 1)}"
 
-    def curve(column: str, text: str) -> Curve:
-        values = np.array([np.interp(x, table[name], table[column]) for table in tables])
-        if compressed and column == "stress":  # fast compressions begin with noise, which a logarithm cannot show
-            values[values <= 0.0] = np.nan
-        return Curve(text, x, values.mean(axis=0), values.min(axis=0), values.max(axis=0))
+    def curves(name: str) -> list[Curve]:
+        return [curve_of(some, x, name, group or seeds) for group, some in groups.items()]
 
-    laws, numbers = [], []
-    if compressed:
-        scale, below = first["pressure_scale"], x[x < CLOSEST]
-        laws = [
-            Guide(r"$(E_\mathrm{roll}/r^3)\,\phi^3$, Kataoka et al. 2013", x, kataoka_pressure(x, scale)),
-            Guide("Tatsuuma et al. 2023", below, tatsuuma_pressure(below, scale)),
-        ]
-        numbers = [Guide("Arakawa et al. 2019", x, arakawa_coordination(x))]
-    if first["kind"] == "stretch":
-        strength = tatsuuma_strength(first["filling_at_start"], first["surface_energy"], first["radius"])
-        laws = [Guide("strength, Tatsuuma et al. 2019", x, np.full(len(x), strength))]
-    seeds = f"{len(runs)} seed{'s' * (len(runs) > 1)}"
-    parts = [curve(channel, channel) for channel in (*CHANNELS, "others")]
+    title = f"{first['kind']}: {first['grains']} grains, {seeds}"
+    if column is not None:
+        return panels_figure([Panel(label, column, curves(column), (), "x" * compressed)], title)
+    stress, number = curves("stress"), curves("coordination")
+    laws, numbers = _laws(first, stress[0].x) if len({run["pressure_scale"] for run in runs}) == 1 else ([], [])
     log = "x" * compressed
+    notes = [TOO_FAST] if any(one.weak is not None and one.weak.any() for one in stress) else []
+    notes += [RISING] if not compressed and any(run["largest_at_end"] for run in runs) else []
     panels = [
-        Panel(label, f"{NOUNS[first['kind']]} [Pa]", [curve("stress", seeds)], laws, "xy" * compressed, not compressed),
-        Panel(label, "share of what is dissipated", parts, (), log),
-        Panel(label, "coordination number $Z$", [curve("coordination", seeds)], numbers, log),
+        Panel(label, f"{NOUNS[first['kind']]} [Pa]", stress, laws, "xy" * compressed, not compressed, "; ".join(notes)),
+        Panel(label, "share of what is dissipated", shares_of(tables, x), (), log, legend=first_name),
+        Panel(label, "coordination number $Z$", number, numbers, log),
     ]
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
-    return panels_figure(panels, f"{first['kind']}: {first['grains']} grains, {seeds}; {energy}")
+    return panels_figure(panels, f"{title}; {energy}")
 
 
-def _columns(table: dict[str, list[float]]) -> dict[str, np.ndarray]:
-    """Columns of a table without its first row, with the shares of what is dissipated in each of the others."""
-    columns = {name: np.array(column, float) for name, column in table.items()}
-    lost = {name: np.diff(columns[name]) for name in (*ALWAYS_LOST, *DAMPED) if name in columns}
-    total = np.sum(list(lost.values()), axis=0)
-    dissipates = total > 0.0
-    shares = {
-        name: np.where(dissipates, lost[f"lost_{name}"] / np.where(dissipates, total, 1.0), 0.0) for name in CHANNELS
-    }
-    shares["others"] = 1.0 - np.sum(list(shares.values()), axis=0)
-    return {name: column[1:] for name, column in columns.items()} | shares
+def _laws(run: dict[str, Any], x: np.ndarray) -> tuple[list[Guide], list[Guide]]:
+    """Laws of the literature: of the stress, and of the coordination number."""
+    if run["kind"] == "compress":
+        scale, below = run["pressure_scale"], x[x < CLOSEST]
+        return [
+            Guide(r"$(E_\mathrm{roll}/r^3)\,\phi^3$, Kataoka et al. 2013", x, kataoka_pressure(x, scale)),
+            Guide("Tatsuuma et al. 2023", below, tatsuuma_pressure(below, scale)),
+        ], [Guide("Arakawa et al. 2019", x, arakawa_coordination(x))]
+    if run["kind"] == "stretch":
+        strength = tatsuuma_strength(run["filling_at_start"], run["surface_energy"], run["radius"])
+        return [Guide("strength, Tatsuuma et al. 2019", x, np.full(len(x), strength))], []
+    return [], []

@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, percolation_axes
+from ..analysis.ledger_columns import ALWAYS_LOST, DAMPED
 from ..basics.box import Box
 from ..io.trajectory import Frames
 from ..simulation.observers import Observer
 
 Plan = Any
 """`laboratory.Plan`, whose module imports this one."""
+CHANNELS = ("rolling", "sliding", "twisting")
+"""Losses whose share of what is dissipated the table states, as `share_rolling`, …"""
 
 
 class Percolation(Observer):
@@ -48,6 +51,14 @@ def percolating(position: np.ndarray, pairs: np.ndarray, box: Box) -> dict[str, 
         "percolating_size": int(sizes[largest]),
         **{f"percolates_{name}": int(one) for name, one in zip("xyz", along, strict=True)},
     }
+
+
+def shares(before: dict[str, float] | None, row: dict[str, float]) -> dict[str, float]:
+    """Share of each of `CHANNELS` in what was dissipated between two rows of the ledger; 0 if nothing was."""
+    start = before or row
+    lost = {name: row[name] - start[name] for name in (*ALWAYS_LOST, *DAMPED) if name in row}
+    total = math.fsum(lost.values())
+    return {f"share_{name}": lost[f"lost_{name}"] / total if total > 0.0 else 0.0 for name in CHANNELS}
 
 
 def table_of(planned: Plan, rows: Sequence[dict[str, float]], seen: Percolation) -> list[dict[str, Any]]:

@@ -58,5 +58,6 @@ FIGURES = (
         chain_panels,
         {"sequence.collisions": 4},
         {"seeds": 2, "vary": {"impact.speed": ["4 m/s"]}},
+        ("largest", "impact_energy", "contacts_after", "gyration_after"),
     ),
 )

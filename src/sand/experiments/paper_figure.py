@@ -41,6 +41,14 @@ class PaperFigure:
         Panels of the figure, of the same rows.
     small, small_sweep : dict
         Keys of the case, and of [sweep], that make the campaign small.
+    columns : tuple of str
+        Columns of the tables of the runs that figure and comparison need; the others are left out of the results.
+        Each row of such a table is a row of the campaign, with the parameters and results of its run.
+    also : tuple of str
+        Further names for `sand reproduce`, of papers whose figures the same runs give.
+    compressed : dict or None
+        If runs start from packings that are compressed before, those of the case examples/papers/NAME-compression.toml:
+        the keys that make these small. The campaign varies `aggregate.filling`.
     """
 
     name: str
@@ -50,6 +58,9 @@ class PaperFigure:
     panels: Callable[[Sequence[Row]], list[Panel]]
     small: dict[str, Any] = field(default_factory=dict)
     small_sweep: dict[str, Any] = field(default_factory=dict)
+    columns: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    compressed: dict[str, Any] | None = None
 
 
 def grouped(rows: Sequence[Row], *keys: str) -> dict[Any, list[Row]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -11,22 +12,28 @@ from typing import Any
 from ..analysis.collision_kinds import growth_efficiency
 from ..basics.errors import BadInput, did_you_mean
 from ..contact.model import Contact
-from ..io.run_folder import COMPARISON, FIGURE, RESULTS, SWEEP_CSV, read_toml
-from ..io.sweep_files import DONE, FAILED, LAST, STATE, read_sweep, write_sweep
+from ..io.run_folder import COMPARISON, FIGURE, LABORATORY, RESULTS, SWEEP_CSV, read_toml, write_toml
+from ..io.sweep_files import DONE, FAILED, LAST, STATE, TABLE, read_runs, write_sweep
 from ..io.table import write_table
 from ..plotting.papers import panels_figure
 from ..plotting.run_figure import save
 from ..theory import contact
-from . import paper_chain, paper_compression, paper_growth
+from . import paper_chain, paper_compression, paper_growth, paper_packings
 from .job import Progress, ignored
+from .laboratory_case import LaboratoryCase
+from .laboratory_job import LaboratoryJob
 from .paper_figure import Compared, PaperFigure, Row
+from .sweep_cases import Expected, SweptLoading
 from .sweep_design import changed_content
-from .sweep_job import SweepJob
+from .sweep_job import ROW_BYTES, SweepJob
+from .sweep_row import Row as Run
 
 FIGURES: dict[str, PaperFigure] = {
-    one.name: one for module in (paper_growth, paper_compression, paper_chain) for one in module.FIGURES
+    one.name: one for module in (paper_growth, paper_compression, paper_chain, paper_packings) for one in module.FIGURES
 }
 """Figures by name; a further one is a `PaperFigure` in `FIGURES` of a module named here."""
+NAMES = {name: one for one in FIGURES.values() for name in (one.name, *one.also)}
+"""The same, also by their further names."""
 NO_PHYSICS = "small version: a test of the installation, no result of physics"
 """Verdict on each number of a small version."""
 KEPT = (
@@ -35,6 +42,10 @@ KEPT = (
 )
 """Columns of the table besides the keys that change."""
 
+DIGITS = 7
+"""Digits that are kept of the numbers in the tables of the runs."""
+COMPRESSED = "compressed"
+"""Subfolder of the packings with which runs begin, and name of their case."""
 MEASURED = ("impact_energy", "contacts_after", "gyration_after")
 """Columns that `Reproduction` converts to the units of the figures."""
 
@@ -77,6 +88,8 @@ class Reproduction(SweepJob):
         Rows of the table that comes with SAND.
     """
 
+    AGAIN = "nothing is lost: to continue, call the same command again"
+
     def __init__(
         self,
         name: str,
@@ -86,18 +99,22 @@ class Reproduction(SweepJob):
         known: bool = False,
         retry: bool = False,
     ):
-        if name not in FIGURES:
-            raise BadInput(f"there is no figure '{name}'; {did_you_mean(name, list(FIGURES))}")
-        self.figure, self.small = FIGURES[name], small
-        figure = self.figure
-        path = papers_folder() / f"{name}.toml"
+        if name not in NAMES:
+            raise BadInput(f"there is no figure '{name}'; {did_you_mean(name, list(NAMES))}")
+        self.figure, self.small, place = NAMES[name], small, papers_folder()
+        figure, name = self.figure, self.figure.name
+        path, folder = place / f"{name}.toml", Path(folder or f"{name}{'-small' * small}")
         content = changed_content(read_toml(path), figure.small if small else {})
+        self.first: dict[str, Any] | None = None
+        if figure.compressed is not None:
+            before = read_toml(place / f"{name}-compression.toml")
+            self.first = changed_content(before, figure.compressed if small else {})
+            content = changed_content(content, {"aggregate.file": str((folder / COMPRESSED).absolute())})
         settings = figure.small_sweep if small else {}
-        super().__init__(path, folder or f"{name}{'-small' * small}", settings, content=content, retry=retry)
+        super().__init__(path, folder, settings, content=content, retry=retry)
         self.names = [row.name for row in self.rows]
         self._offsets = len({row.values.get("impact.impact_parameter") for row in self.rows})
-        place = papers_folder() / name
-        rows = _cells(place) if known and (place / SWEEP_CSV).exists() else []
+        rows = self._cells(place / name) if known else []
         self.known = [cells for cells in rows if cells["run"] in self.names]
         have = {cells["run"] for cells in self.known}
         # cheap runs first, and all of one seed before those of the next
@@ -105,6 +122,24 @@ class Reproduction(SweepJob):
             (row for row in self.rows if row.name not in have),
             key=lambda row: (sum(n for key, n in row.values.items() if key.endswith(".grains")), row.seed),
         )
+
+    def named_by(self, case: dict[str, Any]) -> dict[str, Any]:
+        """What names a run: its case without the folder of the packings, which other machines do not have."""
+        return case if self.first is None else changed_content(case, {"aggregate.file": COMPRESSED})
+
+    def expected(self, left: Sequence[Run]) -> Expected:
+        """As `SweepJob.expected`; before packings are compressed, their cost, and that of runs with a packing."""
+        if self.first is None or not left or (self.folder / COMPRESSED / LABORATORY).exists():
+            return super().expected(left)
+        body, self._is_set_up = self.first["aggregate"], True
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of rates that are too fast for packings that are not compressed
+            cases = (SweptLoading({**case, "aggregate": body}, str(self.path)) for case in (self.first, self.content))
+            costs = [one.expected(self.seeds[0]) for one in cases]
+        numbers = len(self.seeds), len(left)
+        seconds = [n * one.seconds for n, one in zip(numbers, costs, strict=True) if one.seconds is not None]
+        disk = numbers[0] * (costs[0].disk or 0.0) + numbers[1] * ROW_BYTES
+        return Expected(math.fsum(seconds) if len(seconds) == 2 else None, costs[0].memory, disk)
 
     def run(
         self, executor: Executor | None = None, observers: Sequence[Any] = (), progress: Progress = ignored
@@ -114,10 +149,22 @@ class Reproduction(SweepJob):
         content["failures"] = {}
         try:
             if self.rows:
+                self._compress(executor, observers, progress)
                 content = super().run(executor, observers, progress)
         finally:
             found = self.conclude()
         return content | found
+
+    def _compress(self, executor: Executor | None, observers: Sequence[Any], progress: Progress) -> None:
+        """Compress the packings with which runs begin, or go on with this, unless all are there."""
+        place = self.folder / COMPRESSED
+        if self.first is None or (place / LABORATORY).exists():
+            return
+        self.refuse_others()
+        self.begin()
+        case = place.with_suffix(".toml")
+        write_toml(case, self.first, f"packings with which {self.figure.name} begins")
+        LaboratoryJob(case, place, self.seeds, resume=place.exists()).run(executor, observers, progress)
 
     def conclude(self) -> dict[str, Any]:
         """Write table, comparison and figure of all runs that are done.
@@ -127,7 +174,7 @@ class Reproduction(SweepJob):
         dict
             Numbers of rows and of all runs, their CPU time [s], and the comparison.
         """
-        found = {one["run"]: one for one in (*self.known, *(_cells(self.folder) if self.rows else ()))}
+        found = {one["run"]: one for one in (*self.known, *(self._cells(self.folder) if self.rows else ()))}
         cells = [found[name] for name in self.names if name in found and found[name][STATE] == DONE]
         place, compared = self.folder / RESULTS, list[Compared]()
         total = len(self.names)
@@ -150,13 +197,17 @@ class Reproduction(SweepJob):
         return {"rows": len(cells), "design": total, "cpu_seconds": seconds, "comparison": results} | note
 
     def _rows_of(self, cells: dict[str, Any]) -> list[Row]:
-        """Rows as figures take them of one row of the table, of a sequence one for each collision."""
+        """Rows as figures take them of one row of the table, one for each row of the table of its run if it has one."""
+        columns, own = cells.get(TABLE, {}), {name: cell for name, cell in cells.items() if name != TABLE}
+        table = [dict(zip(columns, line, strict=True)) for line in zip(*columns.values(), strict=True)]
         values = {key: cells[key] for key in self.keys}
         case: Any = self.kind(changed_content(self.content, values), str(self.path)).case
+        if isinstance(case, LaboratoryCase):
+            return [own | line for line in table if not math.isnan(line["stress"])]  # the first row has no mean values
         material, radius = case.materials_by_name()[case.target.material], float(case.target.radius)
         limit = next((f.rolling_limit for f in case.forces.build() if isinstance(f, Contact)), None)
         numbers = contact(material, radius, rolling_limit=limit)
-        shared = cells | {
+        shared = own | {
             "speed": case.impact.speed,
             "offset": float(str(case.impact.impact_parameter).rstrip(" bc")),
             "offsets": self._offsets,
@@ -165,35 +216,32 @@ class Reproduction(SweepJob):
             "break_energy": numbers.break_energy,
         }
         if case.projectile is None:
-            columns = [[float(text) for text in str(cells[name]).split()] for name in ("largest", *MEASURED)]
-            return [shared | _sizes(n, radius, *several) for n, *several in zip(columns[0], *columns[1:], strict=True)]
+            return [shared | _sizes(line["largest"], radius, *(line[name] for name in MEASURED)) for line in table]
         target, projectile = case.target.grains, case.projectile.grains
         growth = {"bodies": f"{target} + {projectile} grains", "mass_ratio": target / projectile}
         growth["growth_efficiency"] = growth_efficiency(target, projectile, cells["largest"])
-        sizes = _sizes(
-            target + projectile,
-            radius,
-            *(cells[name] for name in ("impact_energy", "contacts_after", "gyration_after")),
-        )
+        sizes = _sizes(target + projectile, radius, *(cells[name] for name in MEASURED))
         return [shared | growth | sizes | {"largest_remnant": cells["largest"] / (target + projectile)}]
+
+    def _cells(self, folder: Path) -> list[dict[str, Any]]:
+        """Rows of the table of a sweep with the columns that are kept; sizes of fragments are summarised."""
+        if not (folder / SWEEP_CSV).exists():
+            return []
+        found = []
+        for cells in read_runs(folder):
+            if TABLE in cells:
+                table = {name: cells[TABLE][name] for name in self.figure.columns}
+                rounded = {name: [float(f"{v:.{DIGITS}g}") for v in column] for name, column in table.items()}
+                found.append(cells | {TABLE: rounded})
+                continue
+            if "fragments" in cells and "largest" not in cells:  # numbers of grains, in decreasing order
+                sizes = [int(size) for size in str(cells["fragments"]).split()] + [0]
+                cells |= {"largest": sizes[0], "second": sizes[1], "fragments": len(sizes) - 1}
+            found.append({name: cell for name, cell in cells.items() if name in KEPT or "." in name})
+        return found
 
 
 def _sizes(grains: float, radius: float, energy: float, contacts: float, gyration: float) -> Row:
     """Impact energy, contacts per grain, and radius of gyration in radii of a grain, of bodies that have collided."""
     sizes = {"contacts_per_grain": contacts / grains, "gyration": gyration / radius}
     return {"grains": grains, "impact_energy": energy, **sizes}
-
-
-def _cells(folder: Path) -> list[dict[str, Any]]:
-    """Rows of the table of a sweep with the columns that are kept; sizes of fragments are summarised."""
-    if not (folder / SWEEP_CSV).exists():
-        return []
-    table = read_sweep(folder)
-    found = []
-    for values in zip(*table.values(), strict=True):
-        cells = {name: getattr(v, "item", lambda v=v: v)() for name, v in zip(table, values, strict=True)}
-        if "largest" not in cells:  # numbers of grains, in decreasing order
-            sizes = [int(size) for size in str(cells["fragments"]).split()] + [0]
-            cells |= {"largest": sizes[0], "second": sizes[1], "fragments": len(sizes) - 1}
-        found.append({name: cell for name, cell in cells.items() if name in KEPT or "." in name})
-    return found

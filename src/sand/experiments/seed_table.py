@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..analysis.fits import falls_below, jackknife
+
+OUTSIDE = "outside the range of the campaign"
+"""Text of an estimate that is NaN."""
 
 
 class Interval(NamedTuple):
@@ -21,7 +24,7 @@ class Interval(NamedTuple):
     def text(self, unit: str = "") -> str:
         """The estimate and its interval, such as "48 (44 … 52) m/s"."""
         if not math.isfinite(self.value):
-            return "outside the range of the campaign"
+            return OUTSIDE
         limits = f"{self.low:.3g} … {self.high:.3g}" if math.isfinite(self.low) else "no interval"
         return f"{self.value:.3g} ({limits}) {unit}".rstrip()
 
@@ -34,6 +37,13 @@ class Interval(NamedTuple):
         if not math.isfinite(self.value):
             return reason
         return f"{self.value - paper:+.2g}{f' ({self.value / paper - 1.0:+.0%})' if paper else ''}: {reason}"
+
+
+def mean_of(values: Sequence[float]) -> Interval:
+    """Mean of the values of independent seeds, with its 95 % interval of Student's distribution; NaN if one is NaN."""
+    one = np.array(values, float)
+    without = (one.sum() - one) / max(len(one) - 1, 1)
+    return Interval(float(one.mean()), *jackknife(float(one.mean()), without)[1:])
 
 
 class SeedTable(NamedTuple):

@@ -14,6 +14,7 @@ from ..config.key_errors import validate
 from ..config.sections import with_integrator
 from ..io.checkpoint_files import checkpoint_files
 from ..io.run_folder import FLIGHTS
+from ..io.sweep_files import TABLE
 from ..io.table import GrowingTable
 from ..setup.aggregates import chain
 from ..simulation.outcome import Outcome
@@ -94,7 +95,7 @@ class SweptCase:
         Returns
         -------
         dict
-            Results, which must not depend on the machine or on interruptions.
+            Results, which must not depend on the machine or on interruptions; with `TABLE` rows of the run's own.
 
         Raises
         ------
@@ -192,7 +193,7 @@ class SweptCollision(SweptCase):
 
 
 class SweptSequence(SweptCollision):
-    """A case of sequential collisions, which only a sweep reads; its results are lists over the collisions."""
+    """A case of sequential collisions, which only a sweep reads; the table of a run has a row for each collision."""
 
     NAME = "sequential collisions"
 
@@ -219,10 +220,9 @@ class SweptSequence(SweptCollision):
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
         """Simulate all collisions; nothing is kept of an interrupted run."""
         found = [one.to_dict() for one in self.case.collide(seed, observers)]
-        return {key: [one[key] for one in found] for key in SEQUENCE} | {
-            "largest": [one["fragments"][0] for one in found],
-            "fragments": [len(one["fragments"]) for one in found],
-        }
+        sizes = [one["fragments"] for one in found]
+        counts = {"largest": [one[0] for one in sizes], "fragments": [len(one) for one in sizes]}
+        return {TABLE: {key: [one[key] for one in found] for key in SEQUENCE} | counts}
 
 
 class SweptScattering(SweptCase):
@@ -296,7 +296,7 @@ class SweptLoading(SweptCase):
         return Expected(_without_figure(cost), cost.memory, cost.disk)
 
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
-        """Load the packing; the columns of its table are lists."""
+        """Load the packing."""
         return loaded(self.case, seed, folder, observers, resumed=True)
 
 

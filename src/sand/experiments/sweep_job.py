@@ -173,7 +173,11 @@ class SweepJob(Job):
     def _name_of(self, values: dict[str, Any], seed: int) -> str:
         """A digest of case and seed; keys that have the default of a case without them change nothing."""
         case = changed_content(self.content, {k: v for k, v in values.items() if v != self.defaults.get(k)})
-        return digest_of({"command": self.command, "case": case, "seed": seed})[:12]
+        return digest_of({"command": self.command, "case": self.named_by(case), "seed": seed})[:12]
+
+    def named_by(self, case: dict[str, Any]) -> dict[str, Any]:
+        """What of the case of a run, besides its seed, gives its name: all."""
+        return case
 
     def expected(self, left: Sequence[Row]) -> Expected:
         """Set up some runs in memory, which finds further errors, and estimate the cost of all that are left.

@@ -11,7 +11,7 @@ from typing import Any
 from ..basics.errors import warn
 from ..io import run_folder as files
 from ..io.lock import writing
-from ..io.sweep_files import DONE, FAILED, STATE, cell_of, flat, read_rows, write_sweep
+from ..io.sweep_files import DONE, FAILED, STATE, TABLE, cell_of, flat, read_rows, write_sweep
 from .job import Progress
 from .sweep_design import value_read
 from .sweep_row import Row, kind_of, named, version
@@ -165,6 +165,8 @@ def _cells(name: str, row: dict[str, Any], defaults: Mapping[str, Any]) -> dict[
     """Cells of the table of one row, with its keys and their values."""
     values = {key: value_read(row["case"], key, defaults.get(key)) for key in dict.fromkeys([*defaults, *row["keys"]])}
     values |= {key: cell_of(value) for key, value in row["keys"].items()}
-    shared = {"seed": row["seed"], STATE: row[STATE], **flat(row["results"])}
+    results = dict(row["results"])
+    table = {TABLE: results.pop(TABLE)} if TABLE in results else {}
+    shared = {"seed": row["seed"], STATE: row[STATE], **flat(results), **table}
     costs = {key: row[key] for key in ("message", "seconds", "cpu_seconds", "version")}
     return {**shared, **costs, "run": name, "values": values, "keys": tuple(row["keys"])}

@@ -40,12 +40,18 @@ class Exported(NamedTuple):
         own = [self.materials.index(name) for name in self.frame.materials]
         return np.array(own, np.int64)[self.frame.material]
 
+    @property
+    def virial(self) -> list[np.ndarray]:
+        """Shares (N, 9) [J] of the grains in the virial of contacts, xx, xy, … zz; none of runs without stress."""
+        return [] if self.frame.stored_virial is None else [self.frame.stored_virial]
+
 
 def to_xyz(one: Exported) -> str:
     """Format a frame as extended XYZ, in ångström, all else in SI.
 
     Columns: species, position, radius, velocity, moment, spin, mass, charge, own quantities, material, identity,
-    crossings of the box, and cluster. Names of materials, and units of own quantities, are in the second line.
+    crossings of the box, cluster, and of runs with stress the virial. Names of materials, and units of own quantities,
+    are in the second line.
     """
     frame = one.frame
     periodic = " ".join("T" if v is not None else "F" for v in frame.box.lengths)
@@ -54,12 +60,13 @@ def to_xyz(one: Exported) -> str:
     head = (
         f'Lattice="{x:.17g} 0 0 0 {y:.17g} 0 0 0 {z:.17g}" Origin="{-x / 2:.17g} {-y / 2:.17g} {-z / 2:.17g}" '
         "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:moment:R:3:spin:R:3:mass:R:1:charge:R:1"
-        f"{own}:material:I:1:id:I:1:images:I:3:cluster:I:1 "
+        f"{own}:material:I:1:id:I:1:images:I:3:cluster:I:1{':virial:R:9' * len(one.virial)} "
         f'Time={frame.time!r} Step={frame.step} materials="{listed(one.materials)}" pbc="{periodic}" '
         f"length_unit=angstrom other_units=SI{units}"
     )
     columns = [frame.position / ANGSTROM, frame.radius / ANGSTROM, frame.velocity, frame.moment, frame.spin]
     columns += [frame.mass, frame.charge, *frame.own.values(), one.material, frame.id, frame.image, one.cluster]
+    columns += one.virial
     return xyz_frame(one.materials, one.material, head, columns)
 
 
@@ -78,23 +85,25 @@ def to_lammps_dump(one: Exported) -> str:
     """Format a frame as a snapshot of a custom dump.
 
     Columns: id, type, position, radius, velocity, spin, moment, mass, charge, crossings of the box, time [s], own
-    quantities in SI with the prefix `d_` that LAMMPS gives such numbers, chemical symbol, and cluster. The time is a
+    quantities in SI with the prefix `d_` that LAMMPS gives such numbers, of runs with stress the virial as `d2_virial`,
+    chemical symbol, and cluster. The time is a
     column, because some readers do not accept `ITEM: TIME`, and the names of the materials, in the order of their
     types, are behind `NUMBER OF ATOMS`, because others accept no text but chemical symbols in columns. `TIMESTEP` is
     different in each frame, see `_numbers`.
     """
     frame = one.frame
     boundary = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
+    virial = "".join(f" d2_virial[{k}]" for k in range(1, 9 * len(one.virial) + 1))
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     head = (
         f"ITEM: TIMESTEP\n{one.number}\n"
         f"ITEM: NUMBER OF ATOMS # {listed(one.materials)}\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {boundary}\n{box}"
         "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz mass q ix iy iz v_time"
-        f"{''.join(f' d_{name}' for name in frame.own)} element c_cluster\n"
+        f"{''.join(f' d_{name}' for name in frame.own)}{virial} element c_cluster\n"
     )
     columns = [one.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, frame.mass]
-    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values()]
+    columns += [frame.charge, frame.image, np.full(len(frame), frame.time), *frame.own.values(), *one.virial]
     symbols = [symbol_of(name) for name in one.materials]
     ends = [f"{symbols[kind]} {cluster}\n" for kind, cluster in zip(one.material, one.cluster + 1, strict=True)]
     return head + "".join(f"{row} {end}" for row, end in zip(_rows(frame.id, columns), ends, strict=True))
@@ -144,9 +153,9 @@ def to_vtp(one: Exported) -> str:
     """Format a frame as VTK: grains as points, contacts as lines with overlap and force.
 
     Contacts across a periodic face have no line. Point data: radius [m], moment [A m²], velocity, spin, mass, charge,
-    material, id, image (crossings of the box), cluster, own quantities in SI. Cell data (zero for the vertices, which
-    come first): overlap [m], force [N]. Field data: the time, the names of the materials, and the sides of the box [m],
-    0 where it is open.
+    material, id, image (crossings of the box), cluster, virial [J] of runs with stress, own quantities in SI. Cell data
+    (zero for the vertices, which come first): overlap [m], force [N]. Field data: the time, the names of the materials,
+    and the sides of the box [m], 0 where it is open.
     """
     frame, n = one.frame, len(one.frame)
     offset = np.diff(frame.position[frame.pair], axis=1)[:, 0]
@@ -158,6 +167,7 @@ def to_vtp(one: Exported) -> str:
     points = [_array(name, getattr(frame, name)) for name in columns]
     points += [_array("material", one.material), _array("id", frame.id), _array("image", frame.image)]
     points += [_array("cluster", one.cluster)]
+    points += [_array("virial", values, "J") for values in one.virial]
     points += [_array(name, values, frame.own.units[name]) for name, values in frame.own.items()]
     sides = np.array([0.0 if v is None else v for v in frame.box.lengths])
     fields = _array("TimeValue", np.array([frame.time])) + _array("periodic_box", sides, "m")

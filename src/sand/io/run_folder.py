@@ -25,7 +25,7 @@ from .lock import LOCK, refuse_locked, writing
 
 OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS_CSV, FLIGHTS,
-    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON, LABORATORY, LOADED, ENCOUNTERS, AGGREGATES,
+    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON, LABORATORY, LOADED, ROWS_CSV, ENCOUNTERS, AGGREGATES,
 ) = (
     "case.toml",
     "trajectory.gsd",
@@ -45,6 +45,7 @@ OWN_FILES = (
     "comparison.csv",
     "laboratory.json",
     "loaded.jsonl",  # outcomes of the finished runs of sand compress, stretch or shear until all are
+    "rows.csv",  # rows of the tables of all runs of a sweep
     "encounters.csv",
     "aggregates.csv",
 )  # fmt: skip

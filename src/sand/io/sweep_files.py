@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,8 @@ import numpy as np
 
 from ..basics.errors import BadInput, import_optional, warn
 from .damage import sealed
-from .run_folder import ROW, RUNS, SWEEP_CSV, plain, read_json, read_text, replace_file, replacing, write_json
+from .run_folder import ROW, ROWS_CSV, RUNS, SWEEP_CSV, plain, read_json, replacing, write_json
+from .table import read_table, write_table
 
 CLAIM = ".claim"
 """File in the folder of a run that is locked by who computes it."""
@@ -21,8 +20,10 @@ PARQUET = "sweep.parquet"
 STATE, DONE, FAILED = "state", "done", "failed"
 """Column of the table that says how a run ended, and its values."""
 LAST = ("message", "seconds", "cpu_seconds", "version", "run")
-"""Columns after the results; `COST` of them depend on the machine and on interruptions."""
-COST = ("seconds", "cpu_seconds")
+"""Columns after the results; `COST` of them depend on the machine and on interruptions, `TEXTS` are never numbers."""
+COST, TEXTS = ("seconds", "cpu_seconds"), ("message", "version", "run")
+TABLE = "table"
+"""The result of a run that is a table of its own, such as that of a packing: columns by name, lists of equal length."""
 
 
 def write_row(place: Path, row: dict[str, Any]) -> None:
@@ -76,17 +77,33 @@ def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def write_sweep(folder: Path, rows: Sequence[Mapping[str, Any]], parquet: bool = False) -> None:
-    """Write the table of a sweep, numbers to full precision; with `parquet` also `PARQUET`.  Raises FilesFailed."""
-    names, out = columns_of(rows), io.StringIO()
-    writer = csv.DictWriter(out, names, lineterminator="\n", restval="")
-    writer.writeheader()
-    writer.writerows(rows)
-    replace_file(folder / SWEEP_CSV, out.getvalue().encode())
+    """Write the table of a sweep, and `ROWS_CSV` if runs have tables of their own, numbers to full precision.
+
+    With `parquet` also as Parquet.  Raises FilesFailed.
+    """
+    alone = [{name: cell for name, cell in row.items() if name != TABLE} for row in rows]
+    _write(folder / SWEEP_CSV, columns_of(alone), alone, parquet)
+    lines = [line for row in rows for line in lines_of(row)]
+    if lines:
+        names = dict.fromkeys(name for line in lines for name in line if name != "run")
+        _write(folder / ROWS_CSV, [*names, "run"], lines, parquet)
+
+
+def lines_of(row: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the table of a run, each with its keys, seed and name; none if it has no table."""
+    columns, names = row.get(TABLE) or {}, list(row)
+    shared = {name: row[name] for name in names[: names.index(STATE)]}
+    lines = zip(*columns.values(), strict=True)
+    return [{**shared, **dict(zip(columns, line, strict=True)), "run": row["run"]} for line in lines]
+
+
+def _write(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]], parquet: bool) -> None:
+    write_table(path, rows, names)
     if parquet:
         pyarrow = import_optional("pyarrow", "--parquet")
         import_optional("pyarrow.parquet", "--parquet")
         columns = {name: _of_one_type([row.get(name) for row in rows]) for name in names}
-        with replacing(folder / PARQUET) as file:
+        with replacing(path.with_suffix(".parquet")) as file:
             pyarrow.parquet.write_table(pyarrow.table(columns), file)
 
 
@@ -100,10 +117,37 @@ def _of_one_type(values: list[Any]) -> list[Any]:
 
 def read_sweep(folder: Path) -> dict[str, np.ndarray]:
     """Columns of the table of a sweep: numbers, flags, or text; empty cells of numbers are NaN.  Raises BadInput."""
-    lines = list(csv.reader(read_text(folder / SWEEP_CSV).splitlines()))
-    if not lines or not {STATE, *LAST} <= set(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
-        raise BadInput(f"{folder / SWEEP_CSV} is not the table of a sweep, or it is damaged")
-    return {name: _column([line[k] for line in lines[1:]]) for k, name in enumerate(lines[0])}
+    return _read(folder / SWEEP_CSV, {STATE, *LAST}, "the table of a sweep")
+
+
+def read_lines(folder: Path) -> dict[str, np.ndarray]:
+    """Columns of the rows of the tables of all runs of a sweep, see `lines_of`.  Raises BadInput."""
+    return _read(folder / ROWS_CSV, {"seed", "run"}, "the table of the rows of a sweep")
+
+
+def read_runs(folder: Path) -> list[dict[str, Any]]:
+    """Rows of the table of a sweep, with `TABLE` if runs have tables of their own.  Raises BadInput."""
+    table = read_sweep(folder)
+    columns = (column.tolist() for column in table.values())
+    runs = [dict(zip(table, line, strict=True)) for line in zip(*columns, strict=True)]
+    if not (folder / ROWS_CSV).exists():
+        return runs
+    lines = read_lines(folder)
+    number, own = lines.pop("run"), [name for name in lines if name not in list(table)[: list(table).index(STATE)]]
+    places = {number[rows[0]]: rows for rows in np.split(np.arange(len(number)), _changes(number)) if len(rows)}
+    tables = {run: {name: lines[name][rows].tolist() for name in own} for run, rows in places.items()}
+    return [one | ({TABLE: tables[one["run"]]} if one["run"] in tables else {}) for one in runs]
+
+
+def _changes(column: np.ndarray) -> np.ndarray:
+    """Places at which a column has another value than before."""
+    return np.flatnonzero(column[1:] != column[:-1]) + 1
+
+
+def _read(path: Path, needed: set[str], what: str) -> dict[str, np.ndarray]:
+    names, *lines = read_table(path, needed, what)
+    columns = {name: [line[k] for line in lines] for k, name in enumerate(names)}
+    return {name: np.array(cells, str) if name in TEXTS else _column(cells) for name, cells in columns.items()}
 
 
 def _column(texts: Iterable[str]) -> np.ndarray:

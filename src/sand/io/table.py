@@ -7,32 +7,39 @@ import csv
 import io
 import json
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..basics.errors import BadInput, warn
 from .damage import DIGEST, digest_of, sealed
 from .run_folder import append_text, read_text, replace_file
 
 
-def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Write a header and one line per row, numbers to full precision.  Raises FilesFailed."""
+def write_table(path: Path, rows: Sequence[Mapping[str, Any]], names: Sequence[str] = ()) -> None:
+    """Write a header, by default the names in the first row, and one line per row, numbers to full precision.
+
+    Cells that rows lack are empty.  Raises FilesFailed.
+    """
     out = io.StringIO()
-    writer = csv.DictWriter(out, list(rows[0]) if rows else [], lineterminator="\n")
+    writer = csv.DictWriter(out, names or list(rows[0] if rows else ()), lineterminator="\n", restval="")
     writer.writeheader()
     writer.writerows(rows)
     replace_file(path, out.getvalue().encode())
 
 
-def read_columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a table of numbers by name, (K,); an incomplete last row is dropped.  Raises BadInput."""
-    head, *lines = read_text(path).split("\n")[:-1]
-    names = head.split(",")
-    rows = np.array([[float(text) for text in line.split(",")] for line in lines])
-    return dict(zip(names, rows.reshape(-1, len(names)).T, strict=True))
+def read_table(path: Path, needed: Iterable[str] = (), what: str = "a table") -> list[list[str]]:
+    """Cells of all lines of a table, the first of which are the names of its columns.
+
+    Raises
+    ------
+    BadInput
+        If it lacks columns that are `needed`, of what is called `what`, or its lines differ in length.
+    """
+    lines = list(csv.reader(read_text(path).splitlines()))
+    if not lines or not set(needed) <= set(lines[0]) or any(len(line) != len(lines[0]) for line in lines):
+        raise BadInput(f"{path} is not {what}, or it is damaged")
+    return lines
 
 
 CHECK = "check"

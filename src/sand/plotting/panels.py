@@ -50,6 +50,11 @@ OPTIONAL_CHANNELS = ("damping", "stiffness", "settling", "gas", "outside", "cuto
 
 TEMPERATURE_LINES = (("translation", BLUE), ("rotation, mean", ORANGE), ("rotation, median", PURPLE))
 """Label and colour of each column of TEMPERATURES."""
+PRESSURES = {"pressure": ("instant", MUTED)} | {
+    f"mean_pressure_{axis}": (f"mean, {axis}", colour)
+    for axis, colour in zip("xyz", (BLUE, ORANGE, GREEN), strict=True)
+}
+"""Label and colour of the columns of the pressure; of runs with stress."""
 LEAST_BODIES = 10
 """Bodies at the start of a run from which its figure shows their temperatures."""
 
@@ -205,6 +210,21 @@ def draw_temperatures(axes: Axes, ledger: Any, time: AxisUnit) -> None:
     lowest = min(float(np.min(values, where=values > 0.0, initial=top)) for values in drawn)
     axes.set(yscale="log", ylim=(max(lowest / 1.3, top * 10.0**-DECADES), 1.3 * top))
     _log_ticks(axes, plain=True)
+    legend_above(axes)
+
+
+def draw_pressure(axes: Axes, ledger: Any, time: AxisUnit) -> None:
+    """Draw the pressure of the instant and, in a box that is deformed, its means along the axes that change."""
+    t, names = ledger["time"] / time.size, [name for name in PRESSURES if name in ledger.columns]
+    unit = AxisUnit(*si_prefix(max(peak(column(ledger, name)) for name in names), "Pa"))
+    drawn = [column(ledger, name) / unit.size for name in names]
+    axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
+    for name, values in zip(names, drawn, strict=True):
+        label, colour = PRESSURES[name]
+        axes.plot(t, values, color=colour, label=label, **_markers(t))
+    if any(map(peak, drawn)):
+        _scale(axes, [values for values in drawn if peak(values)])
+    axes.set_ylabel(f"$P$ ({unit.name})")
     legend_above(axes)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import cycle
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,13 +15,14 @@ from .style import LARGEST_COLOURS, MARKERS, MUTED, legend_above, log_axis, pane
 
 
 class Curve(NamedTuple):
-    """Points of one curve; with `low` and `high`, limits of their intervals."""
+    """Points of one curve; with `low` and `high`, limits of their intervals; `weak` ones are open, and dotted."""
 
     label: str
     x: np.ndarray
     y: np.ndarray
     low: np.ndarray | None = None
     high: np.ndarray | None = None
+    weak: np.ndarray | None = None
 
 
 class Guide(NamedTuple):
@@ -61,7 +62,11 @@ def _draw(axes: Axes, panel: Panel) -> None:
     if panel.zero:
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
     for curve, colour, marker in zip(panel.curves, cycle(LARGEST_COLOURS), cycle(MARKERS), strict=False):
-        axes.plot(curve.x, curve.y, marker=marker, color=colour, markersize=4.0, linewidth=1.0, label=curve.label)
+        weak = np.zeros(len(curve.x), bool) if curve.weak is None else curve.weak
+        look: dict[str, Any] = {"marker": marker, "color": colour, "markersize": 4.0, "linewidth": 1.0}
+        axes.plot(curve.x, np.where(weak, np.nan, curve.y), label=curve.label, **look)
+        if weak.any():
+            axes.plot(curve.x, np.where(weak, curve.y, np.nan), **look, linestyle=":", fillstyle="none")
         if curve.low is not None and curve.high is not None:
             axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.18, linewidth=0.0)
     for guide, style in zip(panel.guides, cycle(("--", ":", "-.")), strict=False):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +17,13 @@ from ..analysis.quantities import material_names
 from ..basics.box import Box
 from ..io.run_folder import replace_file
 from .panels import (
+    AxisUnit,
     draw_balance,
     draw_clusters,
     draw_contacts,
     draw_energies,
     draw_losses,
+    draw_pressure,
     draw_temperatures,
     draw_time,
     energy_unit,
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
-LETTERS = "abcdefg"
+LETTERS = "abcdefgh"
 """Letters of the panels."""
 MIN_GRAIN_RADIUS = 11.0
 """Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
@@ -52,8 +54,10 @@ _METADATA: dict[str, dict[str, Any]] = {
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
 _TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
 _MARGIN = 0.012
-_HEIGHTS, _HEIGHTS_WITH_TEMPERATURES = (1.0, 1.35, 1.1, 0.5), (1.0, 1.25, 1.0, 0.8, 0.6)
-"""Heights of the panels over time, relative to each other."""
+_HEIGHTS, _HEIGHTS_WITH_MORE, _HEIGHT = (1.0, 1.35, 1.1), (1.0, 1.25, 1.0), 0.8
+"""Heights of the first panels over time, relative to each other, and of each of more between them and the balance."""
+_BALANCE = (0.5, 0.6)
+"""Height of the balance without, and with more panels."""
 
 
 class RunFigure(Figure):
@@ -70,10 +74,10 @@ def run_figure(simulation: Simulation) -> Figure:
     """Figure of a run so far.
 
     Left, over time: clusters (Eq. 17), energies, losses by channel, the temperatures of the bodies of a run that began
-    with ten or more, and the energy balance. Right: the grains at the present time with their moments, coloured by
-    cluster; if they are small, the largest clusters again, enlarged. Energies are in N k_B T₀, or in joules if the
-    grains were initially at rest. Of one or two bodies, as in a collision, contacts take the place of clusters, and
-    energies are in units of their kinetic energy at the start.
+    with ten or more, the pressure of a run with stress, and the energy balance. Right: the grains at the present time
+    with their moments, coloured by cluster; if they are small, the largest clusters again, enlarged. Energies are in
+    N k_B T₀, or in joules if the grains were initially at rest. Of one or two bodies, as in a collision, contacts take
+    the place of clusters, and energies are in units of their kinetic energy at the start.
 
     The left half is empty if the ledger has no row, the right half if no position is finite.
     """
@@ -84,7 +88,7 @@ def run_figure(simulation: Simulation) -> Figure:
         if simulation.ledger.rows:
             _draw_history(figure, simulation)
         if scene.label.size:
-            letters = LETTERS[4 + has_temperatures(simulation.ledger) :]
+            letters = LETTERS[4 + len(_more_panels(simulation.ledger)) :]
             _draw_grains(figure, scene, len(simulation.grains) - scene.label.size, letters)
     return figure
 
@@ -144,19 +148,26 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    heights = _HEIGHTS_WITH_TEMPERATURES if has_temperatures(ledger) else _HEIGHTS
+    more = _more_panels(ledger)
+    first = _HEIGHTS_WITH_MORE if more else _HEIGHTS
+    heights = (*first, *[_HEIGHT] * len(more), _BALANCE[bool(more)])
     panels = [figure.add_axes((_LEFT[0], 0.1 * k, _LEFT[1] - _LEFT[0], 0.1)) for k in range(len(heights))]
     (draw_contacts if has_few_bodies(ledger) else draw_clusters)(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
-    if has_temperatures(ledger):
-        draw_temperatures(panels[3], ledger, time)
+    for axes, draw in zip(panels[3:], more, strict=False):
+        draw(axes, ledger, time)
     draw_balance(panels[-1], ledger, time, unit)
     draw_time(panels, time, ledger)
     for name, axes in zip(LETTERS, panels, strict=False):
         axes.yaxis.set_label_coords(-0.155, 0.5)
         panel_letter(axes, name, -0.185)
     _place_panels(figure, panels, heights)
+
+
+def _more_panels(ledger: Any) -> list[Callable[[Axes, Any, AxisUnit], None]]:
+    """Functions that draw the panels which only some runs have."""
+    return [draw_temperatures] * has_temperatures(ledger) + [draw_pressure] * ("pressure" in ledger.columns)
 
 
 def _place_panels(figure: Figure, panels: list[Axes], heights: Sequence[float]) -> None:

@@ -3,17 +3,19 @@
 import csv
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sand
+from sand.cli.laboratory import run_rows
 from sand.cli.main import main
 from sand.experiments import laboratory
-from sand.experiments.laboratory import Loading, load, plan
+from sand.experiments.laboratory import Loaded, Loading, load, plan
 from sand.experiments.laboratory_figure import laboratory_figure
 from sand.experiments.laboratory_job import rows_of
-from sand.experiments.laboratory_table import Percolation, percolating, table_of
+from sand.experiments.laboratory_table import Percolation, percolating, shares, table_of
 from sand.theory.compression import packing_scales
 
 from ...cases import COMPRESSION
@@ -174,6 +176,7 @@ def test_stress_between_walls_is_the_impulse_of_the_lid(kind, to, axis, sign):
     assert abs(content["drift"]) < 1e-3
 
 
+@pytest.mark.draws
 @pytest.mark.compiled("deformation")
 @pytest.mark.filterwarnings("ignore:the rate,")
 @pytest.mark.parametrize("kind", ["compress", "stretch"])
@@ -190,6 +193,8 @@ def test_stress_in_a_box_is_the_mean_of_its_axes(kind):
     stress = np.array([row["stress"] for row in table])
     assert len(stress) > 3 and stress.any()
     assert (stress if compressed else -stress) == pytest.approx(mean, rel=1e-6, abs=1e-6 * np.abs(mean).max())
+    labels = [axes.get_ylabel() for axes in found.simulation.figure().axes]
+    assert [label[:3] for label in labels].count("$P$") == 1
     last, sides = table[-1], found.plan.sides
     assert last["filling" if compressed else "strain"] == pytest.approx(0.2, rel=1e-4, abs=0.0)
     factors = [last[f"side_{axis}"] / side for axis, side in zip("xyz", sides, strict=True)]
@@ -277,7 +282,7 @@ def test_a_job(tmp_path, monkeypatch, capsys):
 @pytest.mark.compiled("contacts")
 @pytest.mark.filterwarnings("ignore:the rate,")
 def test_a_sweep_over_the_end(tmp_path, monkeypatch, capsys):
-    """`sand sweep` varies a key of [compression]; a run has the results of the job, its columns as lists."""
+    """`sand sweep` varies a key of [compression]; the rows of all runs are those of the job, and are drawn."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cake.toml").write_text(COMPRESSION)
     how = ["--vary", "compression.to=0.28,0.3", "--seeds", "2-2", "--files", "none", "--out", "swept", "--quiet"]
@@ -285,32 +290,97 @@ def test_a_sweep_over_the_end(tmp_path, monkeypatch, capsys):
     table = sand.open("swept").table
     assert table["compression.to"].tolist() == [0.28, 0.3]
     assert table["filling"] == pytest.approx([0.28, 0.3], rel=1e-9, abs=0.0)
-    assert len(table["table_stress"][1].split()) > len(table["table_stress"][0].split())
+    assert not [name for name in table if name.startswith("table")]
+    rows = sand.open("swept").rows
+    assert list(rows)[:3] == ["compression.to", "seed", "time"] and list(rows)[-1] == "run"
+    of_first = rows["run"] == table["run"][0]
+    assert (rows["compression.to"] == np.where(of_first, 0.28, 0.3)).all()
+    assert 0 < of_first.sum() < (~of_first).sum()
+    assert rows["filling"][~of_first][-1] == table["filling"][1] and np.isnan(rows["stress"][~of_first][0])
+    # the same packing, loaded by the job of the other command
+    assert main(["compress", "cake.toml", "--seeds", "2-2", "--quiet"]) == 0
+    with open("cake/results.csv", encoding="utf-8") as file:
+        job = list(csv.DictReader(file))
+    assert [row["stress"] for row in job][1:] == [repr(v) for v in rows["stress"][~of_first][1:].tolist()]
+    capsys.readouterr()
+    for folder, what, names in (("swept", None, ["laboratory"]), ("cake", "laboratory,coordination", None)):
+        assert main(["plot", folder, *(["--what", what] if what else []), "--json"]) == 0
+        files = [path.rpartition("/")[2] for path in json.loads(capsys.readouterr().out)["files"]]
+        assert files == [f"{name}.png" for name in names or what.split(",")]
+    assert main(["plot", "cake", "--what", "stres"]) == 2 and "did you mean 'stress'" in capsys.readouterr().err
+    for name, text in (("swept/rows.csv", "the rows of the tables of all runs"), ("cake/results.csv", "of all runs")):
+        assert main(["info", name]) == 0 and text in (said := capsys.readouterr().out) and "coordination" in said
 
 
 def outcome(seed, kind="compress", noise=0.0):
     """An outcome whose pressure is 5e5 φ³, and whose losses are of rolling alone."""
     phi = np.geomspace(0.02, 0.3, 40)
     table = {"mean_filling": phi, "strain": 3 * phi, "stress": 5e5 * phi**3 * (1 + noise), "coordination": 2 + phi}
-    table |= {"lost_rolling": phi, "lost_sliding": 0 * phi, "lost_twisting": 0 * phi, "lost_walls": -9 * phi}
+    table |= {
+        "share_rolling": 0 * phi + 1,
+        "share_sliding": 0 * phi,
+        "share_twisting": 0 * phi,
+        "rate_ratio": 0.1 / phi,
+    }
     scales = {"kind": kind, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
-    scales |= {"filling_at_start": 0.1, "surface_energy": 0.1, "radius": 1e-7}
+    scales |= {"filling_at_start": 0.1, "surface_energy": 0.1, "radius": 1e-7, "largest_at_end": kind == "stretch"}
     return {"seed": seed, "table": {name: column.tolist() for name, column in table.items()}} | scales
 
 
 @pytest.mark.parametrize("kind", ["compress", "stretch"])
 def test_figure(kind):
-    """Lines are where the outcomes are: P, the share 1 of rolling, Z."""
+    """Lines are where the outcomes are: P, the share 1 of rolling, Z; open below φ = 0.1, where loading is too fast."""
     figure = laboratory_figure([outcome(1, kind), outcome(2, kind, noise=0.1)])
     stress, shares, z = figure.axes[:3]
-    line = stress.get_lines()[0 if kind == "compress" else 1]
-    x, y = line.get_data()
+    line, fast = stress.get_lines()[slice(2) if kind == "compress" else slice(1, 3)]
+    x, y = (np.array(one) for one in line.get_data())
     phi = x if kind == "compress" else x / 3
-    assert y == pytest.approx(1.05 * 5e5 * phi**3, rel=2e-2, abs=0.0)
+    static = phi > 0.1
+    assert y[static] == pytest.approx(1.05 * 5e5 * phi[static] ** 3, rel=2e-2, abs=0.0)
+    assert np.isnan(y[phi < 0.099]).all() and (np.isnan(y) != np.isnan(fast.get_ydata())).all()
     assert next(one for one in shares.get_lines() if one.get_label() == "rolling").get_ydata() == pytest.approx(
         np.ones(len(x)), rel=1e-12, abs=0.0
     )
-    assert z.get_lines()[0].get_ydata() == pytest.approx(2 + phi, rel=1e-3, abs=0.0)
+    assert z.get_lines()[0].get_ydata()[static] == pytest.approx(2 + phi[static], rel=1e-3, abs=0.0)
+    title = stress.get_legend().get_title().get_text()
+    assert "too fast" in title and ("no strength" in title) == (kind == "stretch")
+
+
+def test_figure_of_a_sweep():
+    """Each combination of values has a curve, and a column may be drawn alone."""
+    runs = [outcome(seed) | {"group": f"to = {end}"} for seed in (1, 2) for end in (0.2, 0.3)]
+    lines = laboratory_figure(runs).axes[2].get_lines()
+    assert [one.get_label() for one in lines if one.get_label().startswith("to")] == ["to = 0.2", "to = 0.3"]
+    alone = laboratory_figure(runs, "coordination").axes
+    assert len(alone) == 1 and alone[0].get_ylabel() == "coordination"
+
+
+def test_shares_of_what_is_dissipated():
+    """Of 1 + 2 + 3 + 2 J that are lost between two rows, a normal dashpot included; the work of a wall is no loss."""
+    before = {"lost_rolling": 1.0, "lost_sliding": 1.0, "lost_twisting": 0.0, "lost_damping_normal": 5.0}
+    row = {"lost_rolling": 2.0, "lost_sliding": 3.0, "lost_twisting": 3.0, "lost_damping_normal": 7.0}
+    found = shares(before | {"lost_walls": 0.0}, row | {"lost_walls": -100.0})
+    assert found == {"share_rolling": 1 / 8, "share_sliding": 2 / 8, "share_twisting": 3 / 8}
+    assert set(shares(None, row).values()) == {0.0}
+
+
+@pytest.mark.parametrize(("kind", "end", "text"), [
+    ("stretch", 5.0, "5 kPa at most, where it still rises: that is no strength"),
+    ("stretch", 3.0, "4 kPa at most, at strain 0.2"),
+    ("compress", 5.0, "5 kPa at most;"),
+])  # fmt: skip
+def test_a_tension_that_still_rises(kind, end, text):
+    """The largest stress of a stretch is a strength only if the stress has fallen after it."""
+    planned = plan(PACKING, Loading(kind, "1e-4 /t_c", 0.3, box="1 um"))
+    stresses = [math.nan, 2e3, 4e3, 1e3 * end]
+    table = [
+        {"stress": one, "strain": 0.1 * k, "time": 0.0, "step": k, "filling": 0.1, "coordination": 2.0}
+        for k, one in enumerate(stresses)
+    ]
+    content = Loaded(planned, table, SimpleNamespace(ledger=SimpleNamespace(drift=0.0))).to_dict()
+    assert content["largest_stress"] == max(4e3, 1e3 * end) and content["largest_at_end"] == (end == 5.0)
+    ((_, said),) = run_rows([content | {"seed": 1}])
+    assert text in said
 
 
 def test_rows_have_their_seed():

@@ -22,8 +22,9 @@ from sand.experiments.paper_growth import (
     compare_parameter,
     mass_ratio_panels,
 )
+from sand.experiments.paper_packings import compare_pressures, compare_strengths, compression_panels, strengths
 from sand.experiments.reproduce import FIGURES, Reproduction, papers_folder
-from sand.experiments.seed_table import Interval, seed_table
+from sand.experiments.seed_table import Interval, mean_of, seed_table
 from sand.experiments.sequential import collide_in_sequence
 from sand.plotting.papers import panels_figure
 from sand.setup import bpca, grain
@@ -157,6 +158,90 @@ def test_a_chain_is_compared():
     assert slow.verdict.startswith("agrees") and fast.verdict.startswith("agrees")
 
 
+def test_a_mean_over_seeds():
+    """1, 2, 6: the mean 3 with the standard error √(7/3), times t = 4.303 of two degrees of freedom; one has none."""
+    found = mean_of([1.0, 2.0, 6.0])
+    half = 4.302653 * math.sqrt(7.0 / 3.0)
+    assert found == pytest.approx((3.0, 3.0 - half, 3.0 + half), rel=1e-6, abs=0.0)
+    assert mean_of([4.0]).text() == "4 (no interval)" and math.isnan(mean_of([1.0, math.nan]).value)
+
+
+SCALE = {"pressure_scale": 4.74e5, "contact_time": 2e-10, "surface_energy": 0.1, "radius": 1e-7}
+
+
+def compressed(rate, end, factor):
+    """Rows of compressions by two seeds: P = factor (1 ± 0.1) × 4.74e5 Pa φ³; rolling goes over into sliding."""
+    phi = np.exp(np.arange(math.log(0.01), math.log(end), 0.02))
+    return [
+        SCALE | {
+            "seed": seed, "run": f"{rate}-{seed}", "rate": rate / 2e-10, "mean_filling": p, "rate_ratio": 0.04 / p,
+            "stress": factor * (1.3 - 0.2 * seed) * 4.74e5 * p**3, "coordination": 2.0 + 9.38 * p**1.62 + 0.1 * p,
+            "share_rolling": 0.8 * (p < 0.35), "share_sliding": 0.8 * (p > 0.35), "share_twisting": 0.1,
+        }
+        for seed in (1, 2)
+        for p in phi.tolist()
+    ]  # fmt: skip
+
+
+def test_pressures_are_compared():
+    """Both rates beside φ³, what reaches φ = 0.6 beside the other laws; a box that is too fast is the reason given.
+
+    Tatsuuma's law over φ³ is (1 − φ/0.74)^−3: within 3 % of φ = 0.3 the rows are 0.2919 … 0.3038.
+    """
+    rows = compressed(1e-5, 0.6, 1.1) + compressed(3e-6, 0.12, 0.5)
+    found = {one.what: one for one in compare_pressures(rows)}
+    one = found["P/((E_roll/r³) φ³) at φ = 0.1, C_v = 1e-05"]
+    assert one.ours == "1.1 (-0.298 … 2.5)" and one.verdict.startswith("not decided")  # 1.1 (1.1, 0.9), t = 12.7
+    slow = found["P/((E_roll/r³) φ³) at φ = 0.03, C_v = 3e-06"]
+    assert slow.ours.startswith("0.5 (") and len([name for name in found if "C_v = 3e-06" in name]) == 4
+    dense = found["P/((E_roll/r³)(1/φ − 1/0.74)⁻³) at φ = 0.3"].ours
+    assert float(dense.split()[0]) == pytest.approx(1.1 * (1.0 - 0.3 / 0.74) ** 3, rel=0.02, abs=0.0)
+    z = found["Z/(2 + 9.38 φ^1.62) at φ = 0.6"]
+    assert z.ours == "1.01 (1.01 … 1.01)" and z.verdict == "+0.0098 (+1%): within 5%"
+    reached = "φ = 0.1, 0.2, 0.3, 0.4, 0.5, 0.6"
+    assert found[f"share of rolling in what is dissipated at {reached}"].ours == "0.80, 0.80, 0.80, 0.00, 0.00, 0.00"
+    one_seed = [row | {"stress": 2.0 * 4.74e5 * row["mean_filling"] ** 3} for row in rows if row["seed"] == 1]
+    verdict = compare_pressures(one_seed)[0].verdict
+    assert verdict == "+1 (+100%): the box is 1.3 times too fast"
+    panels = compression_panels(rows)
+    assert [one.label for one in panels[1].curves] == ["$C_v$ = 1e-05", "$C_v$ = 3e-06"]
+    assert panels[1].curves[0].y == pytest.approx(np.full(60, 1.1), rel=1e-3, abs=0.0)
+    assert panels[1].curves[0].weak.tolist() == (panels[1].curves[0].x < 0.04).tolist()
+
+
+def stretched(filling, seed, strength, peak):
+    """Rows of a stretch whose tension rises linearly to a plateau of five rows, and falls."""
+    strain = 0.02 * np.arange(1, 41)
+    tension = np.interp(strain, [0.0, peak, peak + 0.08, peak + 0.1, 9.0], strength * np.array([0, 1, 1, 0, 0]))
+    whole = SCALE | {
+        "filling_at_start": filling,
+        "seed": seed,
+        "run": f"{filling}-{seed}",
+        "aggregate.filling": filling,
+    }
+    return [
+        whole | {"strain": x, "stress": y, "rate_ratio": 0.5} for x, y in zip(strain.tolist(), tension, strict=True)
+    ]
+
+
+def test_strengths_are_compared():
+    """The largest mean over five rows is the plateau; 6e5 φ^1.8 is found, and a tension that still rises is said."""
+    fillings = (0.05, 0.1, 0.2, 0.3)
+    rows = [
+        row
+        for phi in fillings
+        for seed in (1, 2, 3)
+        for row in stretched(phi, seed, 6e5 * phi**1.8 * (1.05, 0.95, 1.0)[seed - 1], 0.4)
+    ]
+    assert [round(one["strain"], 9) for one in strengths(rows)] == [0.44] * 12
+    assert not any(one["at_end"] for one in strengths(rows))
+    *ratios, slope = compare_strengths(rows)
+    assert [one.ours.split()[0] for one in ratios] == ["1"] * 4 and all(one.verdict == "agrees" for one in ratios)
+    assert slope.ours.startswith("1.8 (") and slope.verdict == "agrees"
+    rising = compare_strengths(stretched(0.1, 1, 9e3, 5.0))
+    assert rising[0].verdict.endswith("the tension still rises at the end of 1 runs")
+
+
 @pytest.mark.compiled("contacts")
 def test_a_sequence_of_collisions():
     """Slow grains stick: N doubles, contacts are kept, E_imp is that of bodies of N grains; and it is reproducible."""
@@ -185,6 +270,7 @@ def test_the_largest_fragment_goes_on():
 def test_the_case_of_each_figure(name):
     """The case of the full version is read; its first comment names the command; seeds come after sizes of bodies."""
     job = Reproduction(name)
+    assert all(Reproduction(other).figure is job.figure for other in job.figure.also)
     assert f"sand reproduce {name}" in (papers_folder() / f"{name}.toml").read_text("utf-8").split("[", 1)[0]
     assert len(job.rows) == len(job.names) > 1
     sizes = [sum(n for key, n in row.values.items() if key.endswith(".grains")) for row in job.rows]
@@ -206,9 +292,9 @@ def test_the_speeds_of_wada_2008():
 
 
 @pytest.mark.draws
-@pytest.mark.compiled("contacts", "small")
-@pytest.mark.filterwarnings("ignore:in .* run.*overlap too deeply")
-@pytest.mark.parametrize("name", ["wada2013-ice", "wada2008-quartz", "suyama2008"])
+@pytest.mark.compiled("contacts", "small", "deformation")
+@pytest.mark.filterwarnings("ignore:in .* run.*overlap too deeply", "ignore:.*too fast for a static stress")
+@pytest.mark.parametrize("name", ["wada2013-ice", "wada2008-quartz", "suyama2008", "kataoka2013", "tatsuuma2019"])
 def test_the_small_version(tmp_path, monkeypatch, capsys, name):
     """The command: table, comparison and figure; called again, nothing is computed, and the results are the same."""
     monkeypatch.chdir(tmp_path)
@@ -216,7 +302,8 @@ def test_the_small_version(tmp_path, monkeypatch, capsys, name):
     first = json.loads(capsys.readouterr().out)
     place = tmp_path / f"{name}-small" / "results"
     assert first["rows"] == first["design"] == first["done"] and first["cpu_seconds"] > 0.0
-    assert {path.name for path in place.iterdir()} == {"sweep.csv", "comparison.csv", "figure.png"}
+    tables = {"rows.csv"} if not name.startswith("wada") else set()
+    assert {path.name for path in place.iterdir()} == {"sweep.csv", "comparison.csv", "figure.png", *tables}
     assert len(sand.open(place).table["seed"]) == first["rows"]
     lines = (place / "comparison.csv").read_text("utf-8").splitlines()
     assert len(lines) > 1 and all("small version" in line and "no result of physics" in line for line in lines[1:])
@@ -247,10 +334,38 @@ def test_known_rows_are_not_computed_again(tmp_path, monkeypatch):
     assert not job.rows and job.run()["rows"] == 2
 
 
+@pytest.mark.draws
+@pytest.mark.compiled("deformation")
+@pytest.mark.filterwarnings("ignore:.*too fast for a static stress")
+def test_packings_that_are_compressed_before(tmp_path, monkeypatch):
+    """Their cost is part of what is expected; names of runs do not depend on the folder; known runs need no packing."""
+    monkeypatch.setattr(reproduce, "papers_folder", lambda: tmp_path / "papers")
+    shutil.copytree(papers_folder(), tmp_path / "papers")
+    job, other = (Reproduction("tatsuuma2019", tmp_path / name, small=True) for name in ("one", "other"))
+    assert job.names == other.names and job.content != other.content
+    expected = job.expected(job.left())
+    job.run()
+    alone = Reproduction("tatsuuma2019", tmp_path / "one", small=True)
+    assert expected.seconds > alone.expected(alone.rows).seconds > 0.0
+    starts = sand.open(tmp_path / "one" / "results").table
+    assert starts["filling_at_start"] == pytest.approx(starts["aggregate.filling"], rel=0.02, abs=0.0)
+    assert (starts["grains"] == 64).all()
+    place = tmp_path / "papers" / "tatsuuma2019"
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(tmp_path / "one" / "results", place)
+    known = Reproduction("tatsuuma2019", tmp_path / "known", small=True, known=True)
+    assert not known.rows
+    known.run()
+    for name in ("rows.csv", "sweep.csv", "comparison.csv"):
+        assert (tmp_path / "known" / "results" / name).read_bytes() == (place / name).read_bytes()
+    assert not (tmp_path / "known" / "compressed").exists()
+
+
 def test_the_list(capsys):
     """Without a name: all figures with their numbers of runs.  An unknown one: the nearest name."""
     assert main(["reproduce", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert list(found) == list(FIGURES) and found["wada2013-ice"]["runs"] == 540
+    assert found["kataoka2013"]["also"] == ["tatsuuma2023", "arakawa2019"]
     assert main(["reproduce", "wada2013"]) == 2
     assert capsys.readouterr().err == "sand: there is no figure 'wada2013'; did you mean 'wada2013-ice'?\n"

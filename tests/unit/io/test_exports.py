@@ -212,6 +212,35 @@ def test_round_trip_of_everything(trajectory, tmp_path, form, chosen):
         assert theirs["names"] == [ours.materials[k] for k in ours.material]
 
 
+@pytest.mark.filterwarnings("ignore:.*not read. virial")
+@pytest.mark.parametrize("form", ["xyz", "lammps-dump", "vtk"])
+def test_shares_in_the_virial(tmp_path, form):
+    """Of a run with stress each grain has its nine numbers, xx, xy, … zz in J; its other columns are read as before.
+
+    Frames have them in single precision, 2^-24 = 6e-8, written with nine digits.
+    """
+    grains, shares = grains_at_step(0), 1e-18 * np.arange(45.0).reshape(5, 3, 3)
+    writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
+    writer.write(0, 0.0, grains, Box.open(), contacts_of(grains), virial=shares)
+    writer.close()
+    path = export_frames(Frames(tmp_path / "trajectory.gsd"), tmp_path / "out", form, cluster_labels)[-1]
+    if form == "vtk":
+        points = {one.get("Name"): one for one in ElementTree.parse(path).iter("DataArray")}
+        found, unit = points["virial"].text, points["virial"].find("InformationKey").text
+        assert points["virial"].get("NumberOfComponents") == "9" and unit == "J"
+        numbers = np.array(found.split(), float)
+    else:
+        lines = path.read_text("utf-8").splitlines()
+        first, names = (9, lines[8].split()[2:]) if form == "lammps-dump" else (2, [])
+        at = names.index("d2_virial[1]") if names else -9
+        numbers = np.array([line.split()[at:][:9] for line in lines[first:]], float).ravel()
+        assert "virial:R:9" in lines[1] if form == "xyz" else names[at + 8] == "d2_virial[9]"
+        known = {material.name: material for material in grains.materials}
+        read = read_grains(path, materials=known).grains
+        assert (read.moment == grains.moment).all() and list(read.own) == OWN_KEPT[form]
+    assert numbers == pytest.approx(shares.ravel(), rel=7e-8, abs=0.0)
+
+
 @pytest.mark.parametrize("name", STRANGE)
 def test_names_survive(name, tmp_path):
     """Names of materials with characters that mean something in a file come back from bodies in both formats."""

@@ -11,9 +11,10 @@ from PIL import Image
 
 import sand
 from sand.analysis.clusters import unwrapped
+from sand.analysis.ledger_columns import LedgerColumns
 from sand.basics.box import Box
 from sand.basics.constants import BOLTZMANN
-from sand.plotting.panels import energy_unit, time_unit
+from sand.plotting.panels import draw_pressure, energy_unit, time_unit
 from sand.plotting.render.scene import camera_rotation, make_scene, side_by_side, view_window
 from sand.plotting.render.spheres import SUPERSAMPLING, Spheres, render_spheres
 from sand.plotting.run_figure import figure_bytes, run_figure, save, show
@@ -366,6 +367,17 @@ def test_grains_with_nan_positions_are_omitted():
     assert "left out: 1" in texts(figure)
     run.grains.arrays.position[0, 0] = np.inf
     assert len(run_figure(run).axes) == 4  # the panels over time
+
+
+def test_pressure_of_a_run_with_stress():
+    """Its panel has the pressure of the instant and the means along deformed axes, in one unit; others have none."""
+    rows = [{"step": k, "time": 1e-8 * k, "pressure": 2e3 * k, "mean_pressure_x": -500.0 * k} for k in range(4)]
+    axes = Figure().subplots()
+    ledger = LedgerColumns.from_rows(rows)
+    draw_pressure(axes, ledger, time_unit(ledger))
+    lines = {one.get_label(): one.get_ydata().tolist() for one in axes.get_lines() if one.get_label()[0] != "_"}
+    assert axes.get_ylabel() == "$P$ (kPa)"
+    assert lines == {"instant": [0.0, 2.0, 4.0, 6.0], "mean, x": [0.0, -0.5, -1.0, -1.5]}
 
 
 @pytest.mark.slow
