@@ -161,7 +161,7 @@ def test_wrong_arguments_are_refused(tmp_path, changes, words):
 def test_few_grains_undamped_contacts_and_other_forces_are_refused(tmp_path):
     """Fewer than 100 bodies; hits = 'resolve' without damping; gravity; a cut-off; no contact model; a dense gas."""
     how = {**NUMBERS, "stop": STOP, "out": tmp_path / "none"}
-    gas = sand.Gas(temperature="100 K", density="1e-3 kg/m^3", molecule_mass="2.3 u")
+    gas = sand.Gas(temperature="100 K", density="1 kg/m^3", molecule_mass="2.3 u")
     cases = [
         (grains(50), FORCES, "too few"),
         (grains(), [sand.Contact(), sand.Dipoles()], "undamped"),

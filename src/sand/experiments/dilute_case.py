@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from ..basics.constants import MAGNETIC
-from ..basics.errors import BadInput, ErrorCollector
+from ..basics.errors import BadInput, ErrorCollector, naming
 from ..basics.settings import For, Number, Word
 from ..basics.units import format_quantity
 from ..config.build import start_of
@@ -19,7 +19,7 @@ from ..config.sections import Section
 from ..io import run_folder as files
 from ..simulation.condition import read_condition
 from .dilute_body import NO_CONTACTS
-from .dilute_conditions import check_forces, check_gas, check_moments
+from .dilute_conditions import FEWEST, check_forces, check_gas, check_moments
 from .dilute_growth import HITS, Grown, bodies_of, grow
 from .dilute_majorant import Majorant
 from .dilute_population import Population
@@ -100,10 +100,21 @@ def check_dilute(content: dict[str, Any], name: str) -> DiluteCase:
     if grains.get("kind", "gas") == "gas":
         grains |= {"extent": 1.0, "spins": "equipartition"}  # positions of bodies do not matter
     case = errors.take(check_case, own, name)
-    if case is not None and not case.grains.temperature:
-        errors.problems.append(f"{name}: grains.temperature is missing; add it, for example temperature = '100 K'")
+    if case is not None and method is not None:
+        errors.take(_check_forces, case, method, name)
+        few = case.grains.number
+        if case.grains.kind == "gas" and not case.grains.classes and few is not None and few < FEWEST:
+            errors.problems.append(f"{name}: grains.number = {few} is too few for a population; give at least {FEWEST}")
+        if not case.grains.temperature:
+            errors.problems.append(f"{name}: grains.temperature is missing; add it, for example temperature = '100 K'")
     errors.done()
     return DiluteCase(case, section.number_density, method)
+
+
+def _check_forces(case: Case, method: MethodSection, name: str) -> None:
+    """Refuse forces that encounters do not have.  Raises BadInput."""
+    with naming(f"{name}: forces"):
+        check_forces(case.forces.build(), method.hits)
 
 
 def _table(content: dict[str, Any], name: str) -> dict[str, Any]:
@@ -133,7 +144,7 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
     checked = check_dilute(content, "case")
     checked.case.run.seed = seed
     start, temperature = start_of(checked.case), float(checked.case.grains.temperature)
-    _, _, gas = check_forces(checked.case.forces.build(), start.grains, checked.method.hits)
+    _, _, gas = check_forces(checked.case.forces.build(), checked.method.hits)
     majorant, density = Majorant(temperature), checked.density
     bodies = bodies_of(start.grains, start.contacts or NO_CONTACTS)
     population = Population(bodies, len(bodies) / density, majorant)
@@ -178,15 +189,13 @@ def population_of(content: dict[str, Any], seed: int, folder: str | Path, observ
     checked = check_dilute(content, "case")
     checked.case.run.seed = seed
     start, run = start_of(checked.case), checked.case.run
-    forces = checked.case.forces.build()
-    check_forces(forces, start.grains, checked.method.hits)
     described = content | {"run": content.get("run", {}) | {"seed": seed}}
     described.pop("grow", None)
     if not (Path(folder) / files.CASE).exists() and Path(folder).is_dir() and files.is_used(Path(folder)):
         raise BadInput(f"{folder} is not empty, and holds no population; give another folder")
     return grow(
         start.grains,
-        forces,
+        checked.case.forces.build(),
         number_density=checked.density,
         temperature=checked.case.grains.temperature,
         out=folder,

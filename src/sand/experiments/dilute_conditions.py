@@ -38,7 +38,7 @@ THERMALISED = 3.0
 """Least time between two encounters of a body, in stopping times."""
 
 
-def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Contact, list[Force], Gas | None]:
+def check_forces(forces: Sequence[Any], hits: str) -> tuple[Contact, list[Force], Gas | None]:
     """The contact model, the forces of contact phases, and the gas.
 
     Raises
@@ -71,11 +71,15 @@ def check_forces(forces: Sequence[Any], grains: Grains, hits: str) -> tuple[Cont
             "contact: hits = 'resolve' computes contacts until they are at rest, which undamped ones never are; give "
             "damping = 'critical', settling_time, or hits = 'stick'"
         )
-    if grains.charge.any() != any(force.name == "charges" for force in own):
-        problems.append("charges: charged grains need sand.Charges() among the forces, and this needs charged grains")
     if problems or contact is None:
         raise BadInput(problems)
     return contact, own, gas
+
+
+def check_charges(forces: Sequence[Any], grains: Grains) -> None:
+    """Refuse charged grains without their force, and this force without charges.  Raises BadInput."""
+    if grains.charge.any() != any(force.name == "charges" for force in forces):
+        raise BadInput("charges: charged grains need sand.Charges() among the forces, and this needs charged grains")
 
 
 def others_meanwhile(population: Population, rigid_flights: RigidFlights, draws: int = PROBES) -> float:
