@@ -11,6 +11,7 @@ import numpy as np
 
 from ..basics.errors import BadInput, warn
 from ..basics.grains import Grains
+from ..basics.ramps import ramps_of
 from ..basics.units import format_quantity
 from ..contact.model import Contact
 from ..forces.base import Force
@@ -56,6 +57,8 @@ def check_forces(forces: Sequence[Any], hits: str) -> tuple[Contact, list[Force]
         elif isinstance(force, Contact):
             contact = force
             own.append(force)
+        elif force.name == "field" and field_of([force]) is not None:
+            own.append(force)
         elif force.name in ("dipoles", "charges"):
             if force.cutoff not in (None, "auto"):
                 problems.append(
@@ -74,6 +77,15 @@ def check_forces(forces: Sequence[Any], hits: str) -> tuple[Contact, list[Force]
     if problems or contact is None:
         raise BadInput(problems)
     return contact, own, gas
+
+
+def field_of(forces: Sequence[Any]) -> tuple[float, float, float] | None:
+    """The constant flux density [T] of the forces, 0 without a field; None if it depends on time."""
+    fields = [force for force in forces if force.name == "field"]
+    if any(force.time_dependent or ramps_of(force) for force in fields):
+        return None
+    x, y, z = (float(sum(force.flux_density[k] for force in fields)) for k in range(3))
+    return x, y, z
 
 
 def check_charges(forces: Sequence[Any], grains: Grains) -> None:

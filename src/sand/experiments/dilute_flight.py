@@ -9,6 +9,7 @@ import numpy as np
 
 from ..basics.constants import COULOMB, MAGNETIC
 from .dilute_body import Body
+from .dilute_start import start_in_field
 from .scattering.encounters import MOST_FLIGHT_STEPS
 from .scattering.flight_driver import Flights
 from .scattering.initial_conditions import RANDOM, InitialConditions
@@ -66,7 +67,7 @@ class RigidFlights:
         step_fraction: float = STEP_FRACTION,
         group_size: float = GROUP_SIZE,
     ):
-        self.spin_energy, self.field = spin * heat, field
+        self.heat, self.spin_energy, self.field = heat, spin * heat, field
         self.step_fraction, self.group_size = step_fraction, group_size
         self._now = Now(*(np.zeros((3, 0)) for _ in Now._fields))
         # one flight, whose arrays are used again
@@ -79,12 +80,16 @@ class RigidFlights:
         self, a: Body, b: Body, speed: float, impact_parameter: float, distance: float, event: tuple[int, int]
     ) -> FlightResult:
         """Flight from a plane at a distance [m], with the orientations and thermal spins of an event (seed, number)."""
+        if any(self.field):
+            approach = speed, impact_parameter, distance
+            state = start_in_field((a, b), approach, self.heat, self.spin_energy, self.field, event)
+            return self.onward(a, b, state, 0.0)
         flights = self._flights
         flights.numbers[0], flights.low[0], flights.high[0] = event[1], impact_parameter**2, impact_parameter**2
         return self._fly(a, b, self._start(speed, distance), event[0], 0.0)
 
     def onward(self, a: Body, b: Body, state: np.ndarray, escape: float) -> FlightResult:
-        """Flight from a state (20,), until the bodies recede beyond `escape` [m]."""
+        """Flight from a state (20,), until the bodies recede beyond `escape` [m]; 0: as a flight from a plane ends."""
         self._flights.ends[0] = state
         return self._fly(a, b, self._start(0.0, 0.0), 0, escape)
 

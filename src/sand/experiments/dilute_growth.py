@@ -30,7 +30,15 @@ from ..results import Run
 from ..simulation.condition import Condition, read_condition
 from ..simulation.contact_phase import ContactPhase
 from .dilute_body import NO_CONTACTS, Body, body_of, part_of
-from .dilute_conditions import MOST_OTHERS, check_charges, check_forces, check_gas, check_moments, check_population
+from .dilute_conditions import (
+    MOST_OTHERS,
+    check_charges,
+    check_forces,
+    check_gas,
+    check_moments,
+    check_population,
+    field_of,
+)
 from .dilute_encounters import Encounters
 from .dilute_files import LEDGER_COLUMNS, PopulationFiles, kept_population
 from .dilute_flight import RigidFlights
@@ -216,8 +224,8 @@ def _advance(
 def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]] | None) -> tuple[Encounters, float]:
     """The encounters at the start, or as they were at a checkpoint; and n₀ [1/m³]."""
     majorant = Majorant(settings.temperature)
-    rigid_flights = RigidFlights(majorant.heat)
     contact, forces, gas = check_forces(settings.forces, settings.hits)
+    rigid_flights = RigidFlights(majorant.heat, field=field_of(forces) or (0.0, 0.0, 0.0))
     check_charges(settings.forces, settings.grains)
     rule: HitRule = Stick(contact, settings.grains.materials)
     if settings.hits == "resolve":

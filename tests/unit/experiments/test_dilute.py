@@ -14,6 +14,7 @@ from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
 from sand.experiments.dilute_hits import Stick, moving_pair
 from sand.experiments.dilute_majorant import Majorant, Sizes
 from sand.experiments.dilute_population import Population, sizes_of
+from sand.experiments.dilute_start import orientation_in_field, start_in_field
 from sand.experiments.scattering.event_draws import event_uniforms
 from sand.experiments.scattering.groups import GROUP
 
@@ -274,3 +275,38 @@ def test_bodies_that_stick_touch_as_at_rest():
     )
     assert overlap == pytest.approx(rest, rel=1e-6, abs=0.0)
     assert len(contacts.pair) == len(a.contacts.pair) + len(b.contacts.pair) + 1
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 20.0])
+def test_moments_in_a_field_have_langevins_mean(ratio):
+    """⟨cos θ⟩ = coth x − 1/x of moments about the field, x = μB/k_BT, within 4 standard errors of 300 bodies.
+
+    Rotations are proper; about the moment the body is at a random angle, so that a direction across it averages to 0.
+    """
+    rng, heat, field = np.random.default_rng(1), BOLTZMANN * T, np.array([0.0, 3e-4, 4e-4])
+    moment = ratio * heat / 5e-4 * np.array([0.6, 0.0, 0.8])
+    turns = [orientation_in_field(moment, field, heat, tuple(rng.random(3))) for _ in range(300)]
+    assert all(abs(np.linalg.det(turn) - 1.0) < 1e-12 for turn in turns[:20])
+    cosine = np.array([turn @ [0.6, 0.0, 0.8] @ field for turn in turns]) / 5e-4
+    mean = 1.0 / math.tanh(ratio) - 1.0 / ratio if ratio else 0.0
+    if ratio:
+        assert abs(cosine.mean() - mean) < 4.0 * cosine.std() / math.sqrt(300)
+    across = np.array([turn @ [0.0, 1.0, 0.0] for turn in turns])
+    assert np.abs(across.mean(axis=0)).max() < 4.0 / math.sqrt(300)
+
+
+def test_flights_in_a_field_come_from_all_sides_with_thermal_spins():
+    """b and the distance are those given, directions of flight average to 0, and ½L²/I to ½ k_BT per axis; 4 σ."""
+    heat, states = BOLTZMANN * T, []
+    for event in range(100):
+        states.append(start_in_field((DIMER, GRAIN), (2.0, 3e-8, 4e-7), heat, 1.5 * heat, (0.0, 0.0, 5e-5), (1, event)))
+    y = np.array(states)
+    flight = y[:, 3:6] / 2.0
+    along = (y[:, :3] * flight).sum(axis=1)
+    assert along == pytest.approx(np.full(100, -4e-7), rel=1e-12, abs=0.0)
+    assert np.linalg.norm(y[:, :3] - along[:, None] * flight, axis=1) == pytest.approx(
+        np.full(100, 3e-8), rel=1e-9, abs=0.0
+    )
+    assert np.abs(flight.mean(axis=0)).max() < 4.0 / math.sqrt(3.0 * 100)
+    energy = (y[:, 17:20] ** 2).sum(axis=1) / (2.0 * GRAIN.flying.inertia[0]) / heat
+    assert abs(energy.mean() - 1.5) < 4.0 * math.sqrt(1.5 / 100)
