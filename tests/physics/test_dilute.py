@@ -127,6 +127,21 @@ def test_flights_stop_just_before_a_touch_and_keep_their_energy():
     assert np.sqrt(np.mean([flight.drift**2 for _, flight in hits])) < 3.0 * HEAT
 
 
+def test_groups_of_grains_act_as_the_grains_at_a_distance():
+    """A chain of 12 flies past one of 24: the change of velocity with groups is that of all pairs to 5 %.
+
+    A group of radius a in the distance d errs by (a/d)² of its force, with a at most 1/4 of their gap: groups
+    half as large err by less than half as much.
+    """
+    large, small = (aggregate([[k, 0, 0] for k in range(n)], [[1, 0, 0]] * n) for n in (24, 12))
+    y = start_state(large, small, 1.0, 4e-7, 2e-6, seed=4)
+    found = [RigidFlights(HEAT, group_size=size).onward(large, small, y, 2e-6) for size in (0.25, 0.125, 0.0)]
+    assert [flight.end for flight in found] == [MISS] * 3
+    changes = [flight.state[3:6] - y[3:6] for flight in found]
+    first, second = (np.linalg.norm(each - changes[2]) / np.linalg.norm(changes[2]) for each in changes[:2])
+    assert 0.0 < second < 0.5 * first < 0.025
+
+
 def test_the_random_numbers_of_a_flight_are_those_of_its_event():
     """A flight has the same bits alone, after others, and with larger work arrays."""
     one = RigidFlights(HEAT).thermal(DIMER, GRAIN, 5.0, 1e-7, 1e-6, (1, 17))

@@ -13,6 +13,7 @@ from sand.cli.main import main
 from sand.experiments import dilute_files, dilute_growth
 from sand.experiments.dilute_kernel import kernel_of
 from sand.experiments.growth import growth_of, read_box
+from sand.experiments.kernel_table import measured
 from sand.io.run_folder import read_json, read_toml, write_toml
 
 pytestmark = pytest.mark.compiled("scattering", "dipoles")
@@ -108,6 +109,11 @@ def test_the_kernel_follows_from_hits_and_bounds(population):
     kernel = population.kernel()
     assert kernel.edges[0] == 1 and kernel.value[0, 1] == kernel.value[1, 0]
     assert abs(kernel.value[0, 0] - 3.03e-14) < 4.0 * kernel.error[0, 0]
+    # the table of classes is a kernel of any two masses in its range, which the coagulation equation takes
+    mass = 3.298e-20
+    table = measured(kernel.rows(mass), extrapolate=True)
+    assert table(mass, mass) == pytest.approx(kernel.value[0, 0], rel=1e-6, abs=0.0)
+    assert table(2.0 * mass, mass) == pytest.approx(kernel.value[0, 1], rel=1e-6, abs=0.0)
     both = kernel_of([population.encounters] * 2)
     assert both.value[0, 0] == pytest.approx(kernel.value[0, 0], rel=1e-12, abs=0.0)
 

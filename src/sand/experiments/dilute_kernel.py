@@ -20,6 +20,15 @@ class Kernel(NamedTuple):
     error: np.ndarray  # (C, C) its standard error
     hits: np.ndarray  # (C, C) hits from which it follows
     draws: np.ndarray  # (C, C)
+    sizes: np.ndarray  # (C,) mean number of grains in the draws of a class
+
+    def rows(self, mass: float) -> list[tuple[float, float, float, float]]:
+        """Rows (m1, m2, K over 1 m/s, 1 m/s) of all pairs of classes with hits, as `kernel_table.measured` takes them.
+
+        `mass` is that of a grain [kg].
+        """
+        pairs = zip(*np.nonzero(np.triu(self.hits)), strict=True)
+        return [(mass * self.sizes[i], mass * self.sizes[j], self.value[i, j], 1.0) for i, j in pairs]
 
 
 def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[int] | None = None) -> Kernel:
@@ -37,6 +46,7 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
     """
     bounds = np.array(CLASSES if edges is None else edges, float)
     hits, weight, draws = (np.zeros((len(encounters), len(bounds) - 1, len(bounds) - 1)) for _ in range(3))
+    grains, bodies = np.zeros(len(bounds) - 1), np.zeros(len(bounds) - 1)
     for k, each in enumerate(encounters):
         first, second = (np.searchsorted(bounds, each[f"grains{n}"], "right") - 1 for n in (1, 2))
         inside = (np.minimum(first, second) >= 0) & (np.maximum(first, second) < len(bounds) - 1)
@@ -45,6 +55,9 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
         np.add.at(hits[k], (low, high), each["end"][inside] == 0)
         np.add.at(weight[k], (low, high), 1.0 / each["kernel"][inside])
         np.add.at(draws[k], (low, high), 1.0)
+        for number, column in ((first, "grains1"), (second, "grains2")):
+            np.add.at(grains, number[inside], each[column][inside])
+            np.add.at(bodies, number[inside], 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         value = hits.sum(axis=0) / weight.sum(axis=0)
         error = value / np.sqrt(hits.sum(axis=0))
@@ -52,4 +65,4 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
             apart = (hits - value * weight).std(axis=0, ddof=1) * math.sqrt(len(encounters))
             error = np.maximum(apart / weight.sum(axis=0), error)
     upper = [np.triu(each) + np.triu(each, 1).T for each in (value, error, hits.sum(axis=0), draws.sum(axis=0))]
-    return Kernel(bounds.astype(int), *upper)
+    return Kernel(bounds.astype(int), *upper, grains / np.maximum(bodies, 1.0))
