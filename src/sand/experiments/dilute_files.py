@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -27,6 +28,8 @@ from .scattering.flights import ENDS
 
 CHECKPOINT_EVERY = 30.0
 """Longest wall time [s] between checkpoints, which are written after hits."""
+SHOWN_EVERY = 0.5
+"""Wall time [s] between two lines of progress."""
 FRAMES_PER_DECADE = 10
 """Frames per decade of S."""
 END_CODES = {name: code for code, name in enumerate((*ENDS[:3], "beyond"))}
@@ -162,6 +165,28 @@ class PopulationFiles:
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
         files.write_json(self.folder / files.SUMMARY, sealed(files.plain(summary)))
         return summary
+
+
+class HitsSeen:
+    """An observer of a population that shows its state, at most twice a second.
+
+    Parameters
+    ----------
+    show : callable
+        Called with a text such as ":  S 12.3  n/n0 0.12  1,210 hits  3,900 flights  31 hits/s".
+    """
+
+    def __init__(self, show: Callable[[str], None]):
+        self.show, self.last, self.hits = show, monotonic(), 0
+
+    def see(self, simulation: Any, row: dict[str, Any]) -> None:
+        """Show a row of the ledger."""
+        elapsed = monotonic() - self.last
+        if elapsed > SHOWN_EVERY:
+            speed = max(row["hits"] - self.hits, 0) / elapsed
+            numbers = f"S {row['mean_cluster_size']:.1f}  n/n0 {row['number_ratio']:.3f}  {row['hits']:,} hits"
+            self.show(f":  {numbers}  {row['flights']:,} flights  {speed:.0f} hits/s")
+            self.last, self.hits = monotonic(), row["hits"]
 
 
 WHOLE = ("step", "clusters", "largest_cluster", "grains", "flights", "hits")

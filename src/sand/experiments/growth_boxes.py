@@ -18,6 +18,7 @@ from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..simulation.serialise import case_of, changed_tables
 from .dilute_case import check_dilute, is_dilute, run_population
+from .dilute_files import HitsSeen
 from .executors import results_of
 from .growth_case import DEFAULT_SEEDS, read_growth
 from .job import Job, Progress, ignored
@@ -54,16 +55,19 @@ class GrowthJob(Job):
     ) -> dict[str, Any]:
         """Run all boxes to their end, see `grow`; returns how they ended."""
         outcomes: dict[int, str] = {}
+        parts = "populations" if is_dilute(self.content) else self.PARTS
 
-        def show(line: str = "") -> None:
+        def show(line: str = "", state: str = "") -> None:
             done, total = len(outcomes), len(self.seeds)
-            progress(f"{done} of {total} {self.PARTS}", done / total, line and f"{line}  ({done} of {total})")
+            progress(f"{done} of {total} {parts}{state}", done / total, line and f"{line}  ({done} of {total})")
 
         def finished(seed: int, outcome: str) -> None:
             outcomes[seed] = outcome
             show(f"  seed {seed}: {outcome}")
 
         show()
+        if executor is None and is_dilute(self.content):
+            observers = [*observers, HitsSeen(lambda state: show("", state))]
         grow(self.content, self.seeds, self.folder, executor, finished, observers)
         return {"folder": str(self.folder), "seeds": self.seeds, "outcomes": outcomes}
 
