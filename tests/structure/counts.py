@@ -36,7 +36,7 @@ CAPABILITIES = {
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
     "plot of packings, stress in exports and in the figure of a run, tables described by info": 357,
     "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
-    "filled again, populations as runs, charges, a field, kernel": 1908,
+    "filled again, populations as runs, charges, a field, kernel": 1932,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
