@@ -222,9 +222,9 @@ export class Selection {
   /** Both ends and the length of the line from a grain to the nearest image of another. */
   private line(i: number, j: number): [number[], number[], string] {
     const { picture: { frame, positions }, dataset: { manifest } } = this.context;
-    const box = frame?.box ?? [1, 1, 1];
     const a = [0, 1, 2].map((k) => positions[3 * i + k]);
-    const d = [0, 1, 2].map((k) => nearestImage(positions[3 * j + k] - a[k], box[k], manifest.periodic[k]));
+    const apart = [0, 1, 2].map((k) => positions[3 * j + k] - a[k]);
+    const d = nearestImage(apart, frame ?? { box: [1, 1, 1] }, manifest.periodic);
     return [a, a.map((v, k) => v + d[k]), quantity(Math.hypot(...d) * manifest.unit, "m", 4)];
   }
 

@@ -34,6 +34,7 @@ def test_case_files_are_valid(path):
     """Each is read by the command named in its first comment."""
     reads = {"run": read_case, "grow": read_growth, "collide": read_collision, "scatter": read_scattering}
     reads |= {"sweep": SweepJob, "compress": partial(read_laboratory, command="compress")}
+    reads |= {"elastic": partial(read_laboratory, command="elastic")}
     comment = path.read_text().split("[", 1)[0]
     command = next(word for word in reads if f"sand {word} examples/{path.name}" in comment)
     reads[command](path)

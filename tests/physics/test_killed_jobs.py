@@ -76,9 +76,22 @@ seed = 3
 """,
 }
 CASES["compress"] = COMPRESSION.replace("1 m/s", "0.2 m/s").replace("[1, 2]", "[1, 2, 3, 4, 5, 6]")
+CASES["elastic"] = f"""
+[aggregate]
+kind = "lattice"
+shape = [4, 4, 4]
+radius = "0.1 um"
+material = "ice"
+[elastic]
+box = {4 * (2e-7 - sand.theory.contact("ice", "0.1 um").rest_overlap)!r}
+strains = [1e-6, 1e-5, 1e-4]
+sound = false
+seeds = [1, 2, 3, 4, 5, 6]
+[forces.contact]
+"""
 CASES["sweep"] = f"{CASES['collide']}[sweep]\nseeds = 2\n[sweep.vary]\nimpact.speed = [2, 3, 4]\n"
 RESULTS = {"grow": "growth.json", "collide": "collision.json", "scatter": "results.csv", "sweep": "sweep.csv"}
-RESULTS["compress"] = "laboratory.json"
+RESULTS["compress"] = RESULTS["elastic"] = "laboratory.json"
 WAYS = ("Ctrl-C", "SIGTERM", "parent killed", "worker killed")
 
 
@@ -132,7 +145,7 @@ def begun(command, folder, rows=0):
     """Whether the first results of a job are in its folder, and so many rows of them."""
     if command == "sweep":
         return len(list(folder.glob("runs/*/row.json"))) >= max(rows, 1)
-    names = {"collide": "collisions.jsonl", "scatter": "flights.csv"}
+    names = {"collide": "collisions.jsonl", "scatter": "flights.csv", "elastic": "loaded.jsonl"}
     path = folder / names.get(command, "seed-2/ledger.csv")
     return path.exists() and len(path.read_text().splitlines()) >= rows
 
@@ -147,7 +160,7 @@ def results(command, folder):
     found = json.loads((folder / RESULTS[command]).read_text())
     if command == "collide":
         return found["collisions"]
-    if command == "compress":
+    if command in ("compress", "elastic"):
         return [(folder / "results.csv").read_text(), found["runs"]]
     boxes = [folder / f"seed-{seed}" for seed in found["seeds"]]
     frames = [read_frames(box / "trajectory.gsd") for box in boxes]
@@ -214,6 +227,7 @@ def stop_and_check(job, folder, way):
         ("scatter", "SIGTERM"),
         ("sweep", "parent killed"),
         ("compress", "worker killed"),
+        ("elastic", "SIGTERM"),
     ],
 )
 def test_stopped_once(tmp_path, command, way):

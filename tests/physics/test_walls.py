@@ -195,6 +195,43 @@ def test_wall_with_a_mass():
     assert momentum == pytest.approx(given, abs=1e-9 * 2e-8 * sim.time)
 
 
+@pytest.mark.compiled("contacts")
+def test_a_force_that_changes(tmp_path):
+    """Under F = F₁ t/T a free wall of mass M moves by F₁ T²/6M and has v = F₁ T/2M; all work is its kinetic energy.
+
+    The force has the mean of each of 1000 intervals, set at the first end of a step, dt = T/3200, within it: v is off
+    by less than F₁ dt/M.  A run that is stopped and resumed has the same bits.
+    """
+    ramp, end = {"values": ["0 N", "10 nN"], "times": ["0 s", "1 us"]}, 1e-6
+
+    def start(**options):
+        lid = sand.Wall([0, 0, 1e-4], [0, 0, -1], "silica", mass="5e-15 kg", force=ramp, name="lid")
+        return sand.Simulation(
+            grain(velocity=[0, 0, 0], spin=[0, 0, 0]),
+            [sand.Contact()],
+            walls=[lid],
+            stepping=sand.Verlet(step=end / 3200),
+            **options,
+        )
+
+    one, first = start(), start(out=tmp_path / "run")
+    one.run(until=end)
+    lid, given = one.walls[0], sand.Ramp(**ramp)
+    assert one.state.to_arrays()["walls/push"] == pytest.approx([1e-8], rel=1e-3, abs=0.0)
+    assert lid.velocity[2] == pytest.approx(-1e-8 * end / 2 / 5e-15, rel=1e-3, abs=0.0)
+    assert lid.position[2] - 1e-4 == pytest.approx(-1e-8 * end**2 / 6 / 5e-15, rel=2e-3, abs=0.0)
+    assert abs(one.ledger["lost_walls"][-1]) < 1e-11 * 0.5 * 5e-15 * lid.velocity[2] ** 2
+    first.run(until=0.41 * end)
+    del first
+    second = sand.resume(tmp_path / "run")
+    second.run(until=end)
+    assert state(one) == state(second)
+    with pytest.raises(sand.BadInput, match="wall: velocity cannot be a ramp; parameters with ramps: force"):
+        sand.Wall([0, 0, 0], [0, 0, 1], "silica", velocity=given)
+    with pytest.raises(sand.BadInput, match="force is given without a mass"):
+        sand.Wall([0, 0, 0], [0, 0, 1], "silica", force=given)
+
+
 @pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("speed", [0.01, 3.0, 300.0])

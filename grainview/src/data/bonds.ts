@@ -21,9 +21,8 @@ export interface Bonds {
 /** Force along the line of centres of a contact [N]; positive if repulsive. */
 export function normalForce(frame: Frame, contact: number, periodic: boolean[]): number {
   const [i, j] = [frame.pair[2 * contact], frame.pair[2 * contact + 1]];
-  const d = [0, 1, 2].map((a) =>
-    nearestImage(frame.position[3 * i + a] - frame.position[3 * j + a], frame.box[a], periodic[a]),
-  );
+  const apart = [0, 1, 2].map((a) => frame.position[3 * i + a] - frame.position[3 * j + a]);
+  const d = nearestImage(apart, frame, periodic);
   const size = Math.hypot(...d);
   return [0, 1, 2].reduce((sum, a) => sum + (frame.force[3 * contact + a] * d[a]) / size, 0);
 }
@@ -88,7 +87,7 @@ export function bondPieces(
   const colours = new Uint8Array(4 * capacity);
   const smaller = new Float32Array(capacity);
   const contact = new Uint32Array(capacity);
-  const d = new Float64Array(3);
+  let d = [0, 0, 0];
   let used = 0;
   const add = (c: number, grain: number, fraction: number, colour: Colour3): void => {
     for (let a = 0; a < 3; a++) {
@@ -103,12 +102,9 @@ export function bondPieces(
   for (let c = 0; 2 * c < pair.length; c++) {
     const [i, j] = [pair[2 * c], pair[2 * c + 1]];
     if (shown && !(shown[i] && shown[j])) continue;
-    let wrapped = false;
-    for (let a = 0; a < 3; a++) {
-      const straight = positions[3 * j + a] - positions[3 * i + a];
-      d[a] = nearestImage(straight, box[a], manifest.periodic[a]);
-      wrapped ||= Math.abs(d[a] - straight) > 0.5 * box[a];
-    }
+    const straight = [0, 1, 2].map((a) => positions[3 * j + a] - positions[3 * i + a]);
+    d = nearestImage(straight, frame, manifest.periodic);
+    const wrapped = d.some((component, a) => Math.abs(component - straight[a]) > 0.5 * box[a]);
     const colour = colourOf(c);
     const share = wrapped ? contactShare(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], radius[i], radius[j]) : 1;
     add(c, i, share, colour);

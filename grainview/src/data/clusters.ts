@@ -1,10 +1,17 @@
 // Clusters of a frame: unwrapping across periodic faces, sizes, members, properties.
 
-import { type Frame, type Grains, SINGLE } from "./types";
+import { type Box, type Frame, type Grains, SINGLE } from "./types";
 
 /** One component of a difference of positions, by the nearest image. */
-export function nearestImage(d: number, length: number, periodic: boolean): number {
+function nearestAlong(d: number, length: number, periodic: boolean): number {
   return periodic ? d - length * Math.round(d / length) : d;
+}
+
+/** A difference of positions, by the nearest image; in a tilted box, images along z are displaced along x. */
+export function nearestImage(d: number[], frame: Box, periodic: boolean[]): number[] {
+  const { box, tilt = 0 } = frame;
+  const along = tilt ? d[0] - tilt * Math.round(d[2] / box[2]) : d[0];
+  return [along, d[1], d[2]].map((component, a) => nearestAlong(component, box[a], periodic[a]));
 }
 
 /** Neighbours in contact (compressed rows): those of grain i are `other[first[i]] … other[first[i + 1] − 1]`. */
@@ -47,24 +54,25 @@ export function unwrappedPositions(frame: Frame, periodic: boolean[]): Float32Ar
         if (visited[j]) continue;
         visited[j] = 1;
         queue[tail++] = j;
-        for (let a = 0; a < 3; a++) {
-          const d = positions[3 * j + a] - positions[3 * i + a];
-          positions[3 * j + a] = positions[3 * i + a] + nearestImage(d, frame.box[a], periodic[a]);
-        }
+        const apart = nearestImage(
+          [0, 1, 2].map((a) => positions[3 * j + a] - positions[3 * i + a]),
+          frame,
+          periodic,
+        );
+        for (let a = 0; a < 3; a++) positions[3 * j + a] = positions[3 * i + a] + apart[a];
       }
     }
-    centreInBox(positions, queue.subarray(0, tail), frame.box, periodic);
+    centreInBox(positions, queue.subarray(0, tail), frame, periodic);
   }
   return positions;
 }
 
-function centreInBox(positions: Float32Array, members: Uint32Array, box: number[], periodic: boolean[]): void {
+function centreInBox(positions: Float32Array, members: Uint32Array, frame: Box, periodic: boolean[]): void {
+  const centre = [0, 0, 0];
+  for (const i of members) for (let a = 0; a < 3; a++) centre[a] += positions[3 * i + a] / members.length;
+  const inside = nearestImage(centre, frame, periodic);
   for (let a = 0; a < 3; a++) {
-    if (!periodic[a]) continue;
-    let centre = 0;
-    for (const i of members) centre += positions[3 * i + a] / members.length;
-    const shift = box[a] * Math.round(centre / box[a]);
-    if (shift) for (const i of members) positions[3 * i + a] -= shift;
+    if (inside[a] !== centre[a]) for (const i of members) positions[3 * i + a] += inside[a] - centre[a];
   }
 }
 

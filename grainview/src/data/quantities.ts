@@ -1,6 +1,6 @@
 // Quantities of grains: one table, from which controls, legends and tables of values are generated.
 
-import { clusterSizes, coordination } from "./clusters";
+import { clusterSizes, coordination, nearestImage } from "./clusters";
 import { type Frame, type Grains, type Manifest, SINGLE } from "./types";
 
 export interface Dataset {
@@ -78,12 +78,10 @@ function pressure(frame: Frame, { grains, manifest }: Dataset): Float32Array {
   const out = new Float32Array(manifest.grains);
   for (let c = 0; 2 * c < frame.pair.length; c++) {
     const [i, j] = [frame.pair[2 * c], frame.pair[2 * c + 1]];
+    const apart = [0, 1, 2].map((a) => frame.position[3 * i + a] - frame.position[3 * j + a]);
+    const branch = nearestImage(apart, frame, manifest.periodic);
     let product = 0;
-    for (let a = 0; a < 3; a++) {
-      let apart = frame.position[3 * i + a] - frame.position[3 * j + a];
-      if (manifest.periodic[a]) apart -= frame.box[a] * Math.round(apart / frame.box[a]);
-      product += apart * manifest.unit * frame.force[3 * c + a];
-    }
+    for (let a = 0; a < 3; a++) product += branch[a] * manifest.unit * frame.force[3 * c + a];
     for (const k of [i, j]) out[k] += (product * grains.radius[k]) / (grains.radius[i] + grains.radius[j]);
   }
   return out.map((virial, i) => virial / (4 * Math.PI * (grains.radius[i] * manifest.unit) ** 3));

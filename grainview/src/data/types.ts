@@ -50,12 +50,17 @@ export interface Grains {
   material: Uint8Array;
 }
 
+/** The drawn box, and the displacement of its images along z, along x; absent where there is none. */
+export interface Box {
+  box: number[];
+  tilt?: number;
+}
+
 /** One frame; positions and box in the manifest's `unit`, all others in SI units. */
-export interface Frame {
+export interface Frame extends Box {
   frame: number;
   step: number;
   time: number;
-  box: number[];
   position: Float32Array;
   velocity: Float32Array;
   spin: Float32Array;

@@ -96,9 +96,8 @@ export function clusterRows(
 /** Distances of centres and surfaces of two grains, by the nearest image. */
 export function distanceRows(i: number, j: number, frame: Frame, dataset: Dataset): Row[] {
   const { manifest, grains } = dataset;
-  const d = [0, 1, 2].map((a) =>
-    nearestImage(frame.position[3 * j + a] - frame.position[3 * i + a], frame.box[a], manifest.periodic[a]),
-  );
+  const apart = [0, 1, 2].map((a) => frame.position[3 * j + a] - frame.position[3 * i + a]);
+  const d = nearestImage(apart, frame, manifest.periodic);
   const distance = Math.hypot(...d) * manifest.unit;
   const gap = distance - (grains.radius[i] + grains.radius[j]) * manifest.unit;
   return [

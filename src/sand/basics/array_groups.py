@@ -55,6 +55,8 @@ class Array(NamedTuple):
         Number of columns that it may have instead, if it is not needed (0), or if all columns are equal (1).
     summed : bool
         Whether it is a sum over time since the start, such as a loss [J] or an impulse.
+    earlier : int or None
+        Number of columns in checkpoints of earlier versions, to which the others are added as `initial`.
     """
 
     shape: tuple[int | str, ...]
@@ -67,6 +69,7 @@ class Array(NamedTuple):
     required: bool = True
     fewer: int | None = None
     summed: bool = False
+    earlier: int | None = None
 
 
 @cache

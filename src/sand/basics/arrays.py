@@ -66,8 +66,8 @@ class PairList(NamedTuple):
     break_overlap: Annotated[np.ndarray, Array((USED,), "m", fewer=1)]
     # positions when the list was built; a buffer while it is built from cells
     anchor: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan", initial=np.inf)]
-    # lengths of the box when the list was built, 0 on open axes
-    built: Annotated[np.ndarray, Array((3,), "m", required=False)]
+    # lengths of the box when the list was built, 0 on open axes, and its tilt
+    built: Annotated[np.ndarray, Array((4,), "m", required=False, earlier=3)]
     # inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
     inner: Annotated[np.ndarray, Array((INNER,), dtype="u4", saved=False)]
     # remaining skins, largest speeds: indices in basics.state, explained in neighbours.skin
@@ -83,8 +83,8 @@ class LongRangeArrays(NamedTuple):
 
     # positions when the list was built
     anchor: Annotated[np.ndarray, Array((3, GRAINS), "m", rule="no nan", initial=np.inf, fewer=0)]
-    # lengths of the box when the list was built, 0 on open axes
-    built: Annotated[np.ndarray, Array((3,), "m", required=False)]
+    # lengths of the box when the list was built, 0 on open axes, and its tilt
+    built: Annotated[np.ndarray, Array((4,), "m", required=False, earlier=3)]
     order: Annotated[np.ndarray, Array(("sorted",), dtype="u4", names=(GRAINS,), saved=False)]  # grain
     start: Annotated[np.ndarray, Array(("grains + 1",), dtype="u4", saved=False)]  # first entry of rows in neighbour
     neighbour: Annotated[np.ndarray, Array(("neighbours",), dtype="u4", saved=False)]  # sorted indices
@@ -117,23 +117,25 @@ class LongRangeArrays(NamedTuple):
 class CellArrays(NamedTuple):
     """A box that is deformed, and what its deformation has done."""
 
-    # the words of basics.box.MovingSpan
-    span: Annotated[np.ndarray, Array((9,))]
+    # the words of basics.box.TiltedSpan, of which the first are those of MovingSpan
+    span: Annotated[np.ndarray, Array((11,), earlier=9)]
     # lengths at the start, 0 on open axes
     start: Annotated[np.ndarray, Array((3,), "m")]
-    # rates that are prescribed: dL/dt / L, or dL/dt over the length at the start, or the largest ones
-    rate: Annotated[np.ndarray, Array((3,), "1/s")]
+    # rates that are prescribed: dL/dt / L, or dL/dt over the length at the start, or the largest ones; that of shear
+    rate: Annotated[np.ndarray, Array((4,), "1/s", earlier=3)]
     # pressure that the rates follow, and the present running means along each axis
     goal: Annotated[np.ndarray, Array((1,), "Pa")]
     pressure: Annotated[np.ndarray, Array((3,), "Pa")]
-    # virial W_aa of contacts and dipoles when it was last summed; strain of each axis, and time, since then
-    virial: Annotated[np.ndarray, Array((3,), "J")]
-    strain: Annotated[np.ndarray, Array((3,))]
+    # virial W_aa of contacts and dipoles, and W_zx, when it was last summed; strains that go with them, and time, since
+    virial: Annotated[np.ndarray, Array((4,), "J", earlier=3)]
+    strain: Annotated[np.ndarray, Array((4,), earlier=3)]
+    # shear strain since the start
+    shear: Annotated[np.ndarray, Array((1,), required=False)]
     elapsed: Annotated[np.ndarray, Array((1,), "s")]
     # time from which a row of the ledger may begin a mean: that of the last change of rates or, just after it, of a box
     changed: Annotated[np.ndarray, Array((1,), "s", required=False)]
-    # work of the boundaries on the grains, by the deformation along each axis, up to then
-    work: Annotated[np.ndarray, Array((3,), "J", summed=True)]
+    # work of the boundaries on the grains, by the deformation along each axis and by shear, up to then
+    work: Annotated[np.ndarray, Array((4,), "J", summed=True, earlier=3)]
 
 
 class ClusterArrays(NamedTuple):

@@ -109,7 +109,7 @@ def rampable(force: type[T]) -> type[T]:
     part of its equality and of its settings.
     """
     read, parameters, equals = force.__post_init__, force.parameters, force.__eq__  # type: ignore[attr-defined]
-    label = str(force.name)  # type: ignore[attr-defined]
+    label = str(getattr(force, "place", force.name))  # type: ignore[attr-defined]
 
     def read_with_ramps(self: Any) -> None:
         errors, ramps = ErrorCollector(), {}

@@ -139,6 +139,8 @@ GROUPS = ("contacts", "pair_list", "long_range", "clusters", "bodies")
 """Groups of arrays of a state, besides its grains and the groups of components."""
 CELL = "cell"
 """Name of the group of a box that may be deformed, of a component (`components.deformation`)."""
+TILT = 9
+"""Word of its span with the tilt."""
 SINGLE = ("clock", "count", "lost", "cutoff", "order")
 """Its other arrays."""
 IN_GROUPS, OTHERS = attrgetter(*GROUPS), attrgetter(*SINGLE)
@@ -195,7 +197,7 @@ class State:
     @property
     def box(self) -> Box:
         """Box at the time of the state."""
-        return self.fixed_box if self.cell is None else box_of(self.cell.span)
+        return self.fixed_box if self.cell is None else box_of(self.cell.span, self.cell.span[TILT])
 
     @property
     def time(self) -> float:
@@ -366,6 +368,9 @@ class State:
             return  # saved without a Verlet list: Engine.load_state builds one
         elif found is not None and each.fewer == 1 and self.uniform_contacts:  # one column is stored for all
             _copy_into(array, {name: np.repeat(found[..., :1], array.shape[-1], axis=-1)}, name)
+        elif found is not None and found.shape[-1] == each.earlier:
+            array[...] = each.initial
+            _copy_into(array[..., : each.earlier], saved, name)
         else:
             _copy_into(array[..., : self._columns(group, each)], saved, name)
 

@@ -35,7 +35,7 @@ def run_case(path: Path) -> Description:
 
     case = read_case(path)
     if case.grains.kind == "given":
-        rows = [("grains", f"{case.grains.number}, from a script"), ("box", case.box.periodic.describe())]
+        rows = [("grains", f"{case.grains.number}, from a script"), ("box", case.box.space.describe())]
         return "the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
     with naming(path):
         simulation = simulation_of(case, None)
@@ -112,7 +112,9 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
     rows = [
         ("aggregate", f"{len(simulation.grains)} grains, filling factor {planned.filling(planned.sides):.3g}"),
         ("between walls" if planned.loading.by == "walls" else "box", sides),
-        ("rate of strain", f"{planned.rate_text(planned.rate)}; the largest that is slow enough: {good}"),
+        ("rate of strain", f"{planned.rate_text(planned.rate)}; the largest that is slow enough: {good}")
+        if good
+        else ("lid", "moves freely under the pressure, with the mass of all grains"),
         ("E_roll", energy),
         ("dashpots", f"1 % of the critical one is damping_constant = {0.01 * scales.critical_damping:.2g} kg/s"),
         ("seeds", str(len(seeds))),
@@ -123,6 +125,26 @@ def _laboratory_case(path: Path, start: tuple[str, str]) -> Description:
     ]
     numbers = {"rate": planned.rate, "until": planned.until, "sides": planned.sides.tolist(), **scales._asdict()}
     return "a valid case", rows, {"kind": "laboratory case", "case": content, "cost": cost, "limits": limits} | numbers
+
+
+def _elastic_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.laboratory_case import read_laboratory
+
+    content, case = files.read_toml(path), read_laboratory(path, "elastic")
+    seeds = case.section.seeds
+    with naming(path):
+        begun = case.first_plan()
+    limits, grains = limits_of(begun.simulation), len(begun.simulation.grains)
+    cost, costs = cost_of(begun.simulation, begun.until, math.inf, None, len(seeds), 1)
+    rows = [
+        ("packing", f"{grains} grains, box at the start {begun.simulation.box.describe()}"),
+        ("seeds", str(len(seeds))),
+        *of_each(costs, len(seeds), "seed"),
+        ("cost", "a rough estimate: how long a packing needs to come to rest is seen then"),
+        *limits.items(),
+        start,
+    ]
+    return "a valid case", rows, {"kind": "elastic case", "case": content, "cost": cost, "limits": limits}
 
 
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
@@ -158,6 +180,7 @@ JOB_CASES: dict[str, Callable[[Path, tuple[str, str]], Description]] = {
     "collide": _collision_case,
     "grow": _growth_case,
     **dict.fromkeys(LOADINGS, _laboratory_case),
+    "elastic": _elastic_case,
     "sweep": _sweep_case,
 }
 """Description of the case files of jobs; the second argument is the row with the command that runs the case."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..basics.errors import BadInput
-from ..config.commands import LOADINGS
+from ..config.commands import PACKINGS
 from ..io import run_folder as files
 from . import report
 from .collide import collision_rows
@@ -20,7 +20,7 @@ JOBS = {
     "scatter": ("a scattering job", "scattering"),
     "collide": ("collisions", "collision"),
     "grow": ("boxes", "growth"),
-    **{name: (f"a job of sand {name}", name) for name in LOADINGS},
+    **{name: (f"a job of sand {name}", name) for name in PACKINGS},
     "sweep": ("a sweep", "sweep"),
 }
 """Names of jobs by command: for people, and the `kind` for machines."""

@@ -1,7 +1,8 @@
-"""What `sand compress`, `sand stretch` and `sand shear` share: their options, and the rows that they print."""
+"""What `sand compress`, `stretch`, `shear` and `elastic` share: their options, and the rows that they print."""
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,14 @@ SHOWN = 12
 """Runs listed one by one on the screen; laboratory.json has all of them."""
 
 
-def command_of(name: str, short: str, what: str) -> click.Command:
-    """The command of a kind of loading."""
+RUNS = "Runs each seed in DIR/seed-N, with all files of `sand run`, and writes"
+"""What a command does with seeds that have folders of their own."""
+
+
+def command_of(
+    name: str, short: str, what: str, job_of: tuple[str, str] = ("laboratory_job", "LaboratoryJob"), does: str = RUNS
+) -> click.Command:
+    """The command of a kind of loading; `job_of`: module and class of its job."""
 
     @parsing.command(name, short_help=short)
     @options.job_of_seeds
@@ -25,17 +32,17 @@ def command_of(name: str, short: str, what: str) -> click.Command:
         case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
     ) -> None:
         set_threads(threads)
-        from ..experiments.laboratory_job import LaboratoryJob
         from .launch import refuse_folder
 
-        job = LaboratoryJob(case, out, seeds, name, overwrite=overwrite)
+        module, kind = job_of
+        made = getattr(import_module(f"sand.experiments.{module}"), kind)
+        job = made(case, out, seeds, name, overwrite=overwrite)
         refuse_folder(job.folder, Path(case), overwrite=overwrite)
         laboratory(job, threads=threads, **how)
 
     command.help = (
-        f"{what}\n\nRuns each seed in DIR/seed-N, with all files of `sand run`, and writes laboratory.json, "
-        "results.csv with the rows of all seeds, and a figure to the folder. Ctrl-C interrupts it; continue with "
-        "`sand resume`."
+        f"{what}\n\n{does} laboratory.json, results.csv with the rows of all seeds, and a figure "
+        "to the folder. Ctrl-C interrupts it; continue with `sand resume`."
     )
     return command
 
@@ -55,6 +62,8 @@ def run_rows(runs: list[dict[str, Any]]) -> report.Rows:
     from ..basics.units import format_quantity
 
     def text(run: dict[str, Any]) -> str:
+        if "bulk" in run:
+            return moduli_text(run)
         last, most = (format_quantity(float(f"{run[name]:.3g}"), "Pa") for name in ("stress", "largest_stress"))
         ends = f"filling factor {run['filling_at_start']:.3g} to {run['filling']:.3g}, strain {run['strain']:.3g}"
         if run["kind"] == "compress":
@@ -67,3 +76,18 @@ def run_rows(runs: list[dict[str, Any]]) -> report.Rows:
         return f"{ends}; {stress}; {run['step']} steps, drift {run['drift']:.1e}"
 
     return report.first_of([(f"seed {run['seed']}", text(run)) for run in runs], SHOWN)
+
+
+def moduli_text(run: dict[str, Any]) -> str:
+    """Moduli and speeds of a packing at rest in words."""
+    from ..basics.units import format_quantity
+
+    bulk, shear, residual = (format_quantity(float(f"{run[name]:.3g}"), "Pa") for name in ("bulk", "shear", "residual"))
+    waves = " and ".join(f"{run[f'speed_{kind}']:.3g}" for kind in ("longitudinal", "transverse"))
+    static = " and ".join(f"{run[f'speed_{kind}_static']:.3g}" for kind in ("longitudinal", "transverse"))
+    sound = f"sound {waves} m/s" if run["waves"] else "sound not measured"
+    return (
+        f"filling factor {run['filling']:.3g}, residual pressure {residual}; K {bulk}, G {shear}, linear up to "
+        f"a strain of {run['linear_to']:g}; {sound}, of the moduli {static} m/s; "
+        f"{run['coordination']:.2f} contacts per grain"
+    )

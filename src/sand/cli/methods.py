@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..basics.errors import BadInput
-from ..config.commands import LOADINGS
+from ..config.commands import PACKINGS
 from ..config.folders import job_in
 from ..io import run_folder as files
 from . import options, parsing, report
@@ -136,9 +136,7 @@ def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     yield f"The initial state was {count}, {origin}: {section(grains, 'kind', 'number', 'classes')}."
     for one in grains.classes:
         yield f"A class of its members had: {settings(one)}."
-    where = (
-        "open space" if case.box.periodic is None else f"a box, {case.box.periodic.describe().replace(' um', ' µm')}"
-    )
+    where = "open space" if case.box.space is None else f"a box, {case.box.space.describe().replace(' um', ' µm')}"
     yield f"They moved in {where}."
     used = _names(grains.material) + [name for one in grains.classes for name in _names(one.material)]
     yield from _common(case, [*used, *case.materials], results, case.forces.build())
@@ -224,16 +222,16 @@ def _of_loading(folder: Path, path: Path) -> Sentences:
 
     case = check_laboratory(files.read_toml(path), str(path))
     runs = _content(folder / files.LABORATORY).get("runs", [])
-    seeds = case.section.seeds
+    seeds, done = case.section.seeds, "measured at rest" if case.section.kind == "elastic" else "loaded"
     yield (
-        f"Packings that differ by the seed alone were loaded, seeds {_seeds(seeds)}; {len(runs)} of {len(seeds)} runs "
+        f"Packings that differ by the seed alone were {done}, seeds {_seeds(seeds)}; {len(runs)} of {len(seeds)} runs "
         "are finished."
     )
     yield from _loading(case)
 
 
 def _loading(case: Any) -> Sentences:
-    """Sentences on a case of `sand compress`, `sand stretch` or `sand shear`."""
+    """Sentences on a case of `sand compress`, `stretch`, `shear` or `elastic`."""
     from .method_text import section
 
     yield f"The packing was: {section(case.aggregate)}."
@@ -308,7 +306,7 @@ KINDS: dict[str | None, Callable[[Path, Path], Sentences]] = {
     "collide": _of_collisions,
     "grow": _of_growth,
     "scatter": _of_scattering,
-    **dict.fromkeys(LOADINGS, _of_loading),
+    **dict.fromkeys(PACKINGS, _of_loading),
     "sweep": _of_sweep,
 }
 """What describes the folder of each command; the arguments are the folder and its case file."""

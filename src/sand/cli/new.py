@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 
 from ..basics.errors import BadInput
-from ..config.commands import LOADINGS
+from ..config.commands import PACKINGS
 from . import options, parsing, report
 
-COMMANDS = ("run", "collide", "scatter", "grow", *LOADINGS, "sweep")
+COMMANDS = ("run", "collide", "scatter", "grow", *PACKINGS, "sweep")
 """Commands that read a case file; as `experiments.templates.TEMPLATES`, which takes long to import."""
 
 
@@ -38,6 +38,7 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
     compress  a fluffy aggregate of ice, in a periodic box
     stretch   a compact aggregate of ice, between two walls
     shear     a compact aggregate of ice, between two walls
+    elastic   a fluffy aggregate of ice, compressed in a periodic box
     sweep     the aggregates, for several speeds, impact parameters and seeds
 
     It can be run as it is; keys that are not in use are comments.

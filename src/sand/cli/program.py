@@ -18,6 +18,7 @@ from . import (
     collide,
     completion,
     compress,
+    elastic,
     export,
     grow,
     info,
@@ -39,7 +40,7 @@ from . import (
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 COMMANDS = (
-    *(new, run, resume, build, collide, scatter, grow, compress, stretch, shear, sweep, reproduce),
+    *(new, run, resume, build, collide, scatter, grow, compress, stretch, shear, elastic, sweep, reproduce),
     *(analyse, plot, view, export, info, methods, cite, completion),
 )
 """One module per command, with a click command named `command`."""

@@ -39,6 +39,7 @@ JOBS = {
     "scatter": (SCATTERING, "scattering.job", "ScatterJob", scatter),
     "grow": (GROWTH, "growth_boxes", "GrowthJob", grow),
     **dict.fromkeys(LOADINGS, (LABORATORY, "laboratory_job", "LaboratoryJob", laboratory)),
+    "elastic": (LABORATORY, "elastic_job", "ElasticJob", laboratory),
     "sweep": (SWEEP, "sweep_job", "SweepJob", sweep),
 }
 """Results file, module and class of each job, and what runs it and prints its results."""

@@ -273,7 +273,7 @@ class Table:
             self._addresses[self.index(name)] = address_of(self._rows[name])
 
     def share(self, name: str, memory: np.ndarray) -> None:
-        """Let the numbers of a part, a tuple that is set, be those of an array, which stages may change."""
+        """Let the numbers of a part, a tuple that is set, be the first of an array, which stages may change."""
         self._shared[name] = self._rows[name] = memory
         self._addresses[self.index(name)] = address_of(memory)
 
@@ -301,7 +301,8 @@ class Table:
 
     def __getitem__(self, name: str) -> Any:
         memory = self._shared.get(name)
-        return self._parts[name] if memory is None else type(self._parts[name])(*memory.tolist())
+        part = self._parts[name]
+        return part if memory is None else type(part)(*memory[: len(part)].tolist())
 
     def __getattr__(self, name: str) -> Any:
         """A part, as in compiled code."""

@@ -11,11 +11,11 @@ import numpy as np
 
 from ..basics.arguments import checked
 from ..basics.arrays import CellArrays
-from ..basics.box import Box, least_side
+from ..basics.box import Box, MovingSpan, TiltedSpan, box_of, least_side
 from ..basics.errors import BadInput, shown
 from ..basics.ramps import force_at, forces_at_points, rampable, ramps_of
 from ..basics.settings import RAMP, For, Number, Reading, Settings, Word
-from ..basics.state import CELL, CONTACTS, TIME, State
+from ..basics.state import CELL, CONTACTS, TILT, TIME, State
 from ..basics.units import si
 from ..basics.vectors import components, three
 from ..contact.law import ContactLaw
@@ -31,11 +31,18 @@ from .deformation_stage import (
     LINEAR,
     PRESSURE,
     RATE,
+    SHEAR,
     DeformationNumbers,
     deformation_stages,
 )
 
 AXES = "xyz"
+OF_SHEAR = ("tilt", "shear", "work_shear", "mean_shear_stress")
+OF_BOX = (
+    *("box_x", "box_y", "box_z", "filling", "work_x", "work_y", "work_z"),
+    *("mean_pressure_x", "mean_pressure_y", "mean_pressure_z", *OF_SHEAR),
+)
+"""Columns of the ledger; the last ones are those of a box that is sheared."""
 LEAST_STRAIN = 1e-9
 """Least strain of an axis between two rows for a mean of the pressure."""
 REFUSED = {
@@ -62,15 +69,15 @@ def _not_zero(value: Any, name: str) -> float:
 @rampable
 @dataclass(frozen=True)
 class Deformation(Settings):
-    """A periodic box that is deformed: compressed, stretched, or led by a pressure.
+    """A periodic box that is deformed: compressed, stretched, sheared, or led by a pressure.
 
     Velocities of grains are those relative to the flow A x of the box, with its rates of strain A. In the laboratory
     they are u + A x, and grains and box move by Newton's law.
 
     Parameters
     ----------
-    rate : float, str or sequence
-        Rates of strain [1/s], one for all axes or three: below 0 the box becomes smaller; or a `Ramp`.
+    rate : float, str or sequence, optional
+        Rates of strain [1/s], one for all axes or three: below 0 the box becomes smaller; or a `Ramp`. 0 by default.
     law : str, optional
         "exponential": dL/dt = rate L. "linear": dL/dt = rate L₀, with the length L₀ at the start, or after the last
         change of the box. "pressure": dL/dt = rate L (P̄ − P)/\\|P\\|, at most rate L, so that the pressure comes to P.
@@ -79,6 +86,9 @@ class Deformation(Settings):
         the mean of the axes, otherwise that along each of them.
     time : float or str, optional
         Time [s] > 0 of the running mean P̄ of the pressure, with law = "pressure".
+    shear : float or str, optional
+        Rate of simple shear dv_x/dz [1/s]: the velocity along x grows along z, and images above slide over those below;
+        or a `Ramp`. With law = "linear" the velocity of the images is constant, that of this rate at the start.
 
     Raises
     ------
@@ -86,12 +96,13 @@ class Deformation(Settings):
         If a value has a wrong unit, or is out of range; one line each.
     """
 
-    rate: Annotated[Any, Reading(_rates, unit="1/s"), RAMP]
+    rate: Annotated[Any, Reading(_rates, unit="1/s"), RAMP] = 0.0
     law: Annotated[str, Word(*LAWS)] = EXPONENTIAL
     pressure: Annotated[
         Any, Reading(_not_zero, unit="Pa"), For("law", PRESSURE, needed="a pressure in Pa, such as '1 kPa'"), RAMP
     ] = None
     time: Annotated[Any, Number("s", above=0.0), For("law", PRESSURE, needed="a time in s, such as '10 ns'")] = None
+    shear: Annotated[Any, Number("1/s"), RAMP] = None
 
     name: ClassVar[str] = "deformation"
 
@@ -108,6 +119,11 @@ def read_deformation(value: Any) -> tuple[Deformation, ...]:
     return () if value is None else (value,)
 
 
+def box_columns(*, sheared: bool) -> list[str]:
+    """Columns of the ledger of a box that is deformed."""
+    return list(OF_BOX if sheared else OF_BOX[: -len(OF_SHEAR)])
+
+
 class DeformedBox(Component):
     """A box that is deformed (`Deformation`), and the work of its boundaries."""
 
@@ -116,7 +132,7 @@ class DeformedBox(Component):
     every_step = True
     groups: ClassVar[Mapping[str, type]] = {CELL: CellArrays}
 
-    _lengths: np.ndarray
+    _box: Box
 
     @property
     def given(self) -> Deformation:
@@ -127,7 +143,15 @@ class DeformedBox(Component):
     @property
     def moves_box(self) -> bool:  # type: ignore[override]
         """Whether any rate is ever other than 0; otherwise the steps are those of a box that keeps its shape."""
-        return bool(self.items) and any(any(each.rate) for each in forces_at_points(self.given))
+        return bool(self.items) and any(any((*each.rate, each.shear)) for each in forces_at_points(self.given))
+
+    def shears(self, box: Box) -> bool:
+        """Whether the box is tilted, or has a rate of shear, also if that is 0 at first."""
+        return bool(box.tilt or (self.items and self.given.shear is not None))
+
+    def span(self, box: Box) -> MovingSpan | TiltedSpan:
+        """As `Component.span`."""
+        return box.moving_span(sheared=self.shears(box))
 
     def problems(self, setup: Setup) -> list[str]:
         """As `Component.problems`."""
@@ -137,16 +161,22 @@ class DeformedBox(Component):
                 found.append(f"axis {axis} of the box is open, but a box that is deformed has three periodic ones")
         if self.moves_box:
             others = [REFUSED[each.name] for each in setup.components if each.name in REFUSED]
-            others += [f"the force '{each.name}'" for each in setup.forces.long_range if not isinstance(each, Dipoles)]
+            sheared = self.shears(setup.box)
+            others += [
+                f"the force '{each.name}'"
+                for each in setup.forces.long_range
+                if sheared or not isinstance(each, Dipoles)
+            ]
             positions = [each for each in setup.forces.external if getattr(each, "position_dependent", False)]
             others += [f"the force '{each.name}', whose energy depends on the position," for each in positions]
             if setup.stepping.name != "verlet":
                 others.append(f"stepping = '{setup.stepping.name}'")
             found += [f"{other} {where}" for other in others]
-            step, rates = getattr(setup.stepping, "step", "auto"), [each.rate for each in forces_at_points(self.given)]
+            points = forces_at_points(self.given)
+            step, rates = getattr(setup.stepping, "step", "auto"), [(*each.rate, each.shear or 0.0) for each in points]
             if step != "auto" and step * np.abs(rates).max() > LARGEST_STRAIN:
                 found.append(f"a step of {step:g} s strains the box by more than {LARGEST_STRAIN:g}; use step = 'auto'")
-            found += self._problems_of_dipoles(setup)
+            found += [] if sheared else self._problems_of_dipoles(setup)
         return [f"deformation: {line}" for line in found]
 
     def _problems_of_dipoles(self, setup: Setup) -> list[str]:
@@ -164,27 +194,30 @@ class DeformedBox(Component):
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Stages of the deformation; none if all rates are 0."""
-        self._lengths = np.array(setup.box.lengths, np.float64)
+        self._box = setup.box
         if not self.moves_box:
             return {}
         shortest = least_side(setup.grains.radius)
         number, time = LAWS.index(self.given.law), self.given.time or 0.0
-        return deformation_stages(DeformationNumbers(number, time, shortest, bool(setup.forces.long_range)))
+        dipoles, sheared = bool(setup.forces.long_range), self.shears(setup.box)
+        return deformation_stages(DeformationNumbers(number, time, shortest, dipoles, sheared))
 
     def add_arrays(self, state: State, law: ContactLaw, settings: ContactParameters) -> None:
         """Give a new state the box in memory."""
         state.add_groups(self.groups, {})
         cell = _cell_of(state)
-        cell.span[:], cell.start[:] = state.fixed_box.moving_span, self._lengths
+        cell.span[:], cell.start[:] = state.fixed_box.moving_span(sheared=True), self._box.lengths
 
     def begin(self, engine: Engine) -> None:
         """Set rates and pressure of the present intervals of the ramps, and A where rates have changed."""
         cell, given = _cell_of(engine.stored_state), force_at(self.given, engine.stored_state.time)
         cell.goal[0] = given.pressure or 0.0
-        if (cell.rate != given.rate).any():
-            cell.rate[:] = given.rate
+        rates, linear = (*given.rate, given.shear or 0.0), given.law == LINEAR
+        if (cell.rate != rates).any():
+            cell.rate[:] = rates
             if given.law != PRESSURE:
-                cell.span[RATE:] = cell.rate * (cell.start / cell.span[:3] if given.law == LINEAR else 1.0)
+                cell.span[RATE:TILT] = cell.rate[:3] * (cell.start / cell.span[:3] if linear else 1.0)
+            cell.span[SHEAR] = cell.rate[3] * (cell.start[2] / cell.span[2] if linear else 1.0)
 
     def next_time(self, engine: Engine) -> float:
         """Next time [s] at which a ramp changes a rate or the pressure."""
@@ -206,23 +239,25 @@ class DeformedBox(Component):
 
     def changed(self, arrays: dict[str, np.ndarray], *, regroups: bool) -> None:
         """Take over the lengths of a box that the user has changed; the work up to then was that of the box before."""
-        time = arrays["clock"][TIME]
-        arrays["cell/work"], arrays["cell/strain"] = self._work, np.zeros(3)
-        if (arrays["cell/rate"] != force_at(self.given, time).rate).any():
+        time, span = arrays["clock"][TIME], arrays["cell/span"]
+        arrays["cell/work"], arrays["cell/strain"] = self._work, np.zeros(4)
+        given = force_at(self.given, time)
+        if (arrays["cell/rate"] != (*given.rate, given.shear or 0.0)).any():
             arrays["cell/changed"] = np.array([time])
-        if (arrays["cell/span"][:3] != self._lengths).any():
+        if box_of(span, span[TILT]) != self._box:
             arrays["cell/changed"] = np.nextafter([time], math.inf)
-            arrays["cell/start"] = self._lengths.copy()
-            arrays["cell/span"] = np.concatenate([self._lengths, 1.0 / self._lengths, arrays["cell/span"][RATE:]])
+            arrays["cell/start"] = np.array(self._box.lengths, np.float64)
+            words = np.array(self._box.moving_span(sheared=True))
+            words[[*range(RATE, TILT), SHEAR]] = span[[*range(RATE, TILT), SHEAR]]
+            arrays["cell/span"] = words
 
     def choices(self) -> dict[str, str]:
         """The settings, for the description of a run."""
         return {self.name: ", ".join(f"{name} = {value}" for name, value in self.given.parameters().items())}
 
     def columns(self) -> list[str]:
-        """Lengths of the box, filling factor, work of the boundaries and pressure."""
-        each = [f"{kind}_{axis}" for kind in ("box", "work") for axis in AXES]
-        return [*each[:3], "filling", *each[3:], *(f"mean_pressure_{axis}" for axis in AXES)]
+        """Lengths of the box, filling factor, work of the boundaries and pressure; of shear the same."""
+        return box_columns(sheared=self.shears(self._box))
 
     def losses(self) -> list[str]:
         """The energy that the boundaries took from the grains."""
@@ -232,14 +267,18 @@ class DeformedBox(Component):
         """Values of the columns; the pressure is that of the present moment."""
         cell, grains = _cell_of(state), state.grains.arrays
         lengths, volume = cell.span[:3], float(np.prod(cell.span[:3]))
-        work = present_work(state)
-        pressure = (present_virial(state) + (grains.mass * grains.velocity**2).sum(axis=1)) / volume
+        work, (x, y, z) = present_work(state), grains.velocity
+        flux = (grains.mass * np.array([x * x, y * y, z * z, z * x])).sum(axis=1)
+        pressure = (present_virial(state) + flux) / volume
         filling = 4.0 / 3.0 * math.pi * math.fsum(grains.radius**3) / volume
-        values = [*lengths, filling, *work, *pressure, -math.fsum(work)]
-        return dict(zip([*self.columns(), *self.losses()], map(float, values), strict=True))
+        values = [*lengths, filling, *work[:3], *pressure[:3], cell.span[TILT], cell.shear[0], work[3], -pressure[3]]
+        named = {name: float(value) for name, value in zip(OF_BOX, values, strict=True)}
+        return {name: named[name] for name in self.columns()} | {"lost_box": -math.fsum(work)}
 
     def means(self, state: State, before: Mapping[str, float] | None, now: Mapping[str, float]) -> dict[str, float]:
         """The pressure P_aa = −ΔW_a / ∫ V dL_a / L_a since the row before, from the work W_a on the grains.
+
+        That of shear, ΔW / ∫ V dγ, is the shear stress −P_zx, positive if it opposes the motion.
 
         For rates in constant ratios, the integral is Δ ln L_a times the logarithmic mean of the volumes.  With a strain
         below LEAST_STRAIN the quotient would be rounding.  There is no mean over a change by the user, nor along an
@@ -248,7 +287,8 @@ class DeformedBox(Component):
         found: dict[str, float] = {}
         if before is None or before["time"] < _cell_of(state).changed[0]:
             return found
-        first, last = (force_at(self.given, row["time"]).rate for row in (before, now))
+        rates = [force_at(self.given, row["time"]) for row in (before, now)]
+        (first, last), turns = (one.rate for one in rates), math.prod(one.shear or 0.0 for one in rates) < 0.0
         volumes = [math.prod(row[f"box_{axis}"] for axis in AXES) for row in (before, now)]
         ratio = math.log(volumes[1] / volumes[0])
         mean = (volumes[1] - volumes[0]) / ratio if abs(ratio) > 1e-6 else 0.5 * (volumes[0] + volumes[1])
@@ -256,6 +296,8 @@ class DeformedBox(Component):
             strain = math.log(now[f"box_{axis}"] / before[f"box_{axis}"])
             if abs(strain) > LEAST_STRAIN and first[a] * last[a] >= 0.0:
                 found[f"mean_pressure_{axis}"] = (before[f"work_{axis}"] - now[f"work_{axis}"]) / (mean * strain)
+        if "shear" in before and abs(sheared := now["shear"] - before["shear"]) > LEAST_STRAIN and not turns:
+            found["mean_shear_stress"] = (now["work_shear"] - before["work_shear"]) / (mean * sheared)
         return found
 
     def parameters(self) -> dict[str, Any]:
@@ -264,16 +306,16 @@ class DeformedBox(Component):
 
 
 def present_virial(state: State) -> np.ndarray:
-    """W_aa (3,) [J] of contacts and dipoles, whose energy is a third of the trace, with the loads of a state."""
+    """W_aa and W_zx (4,) [J] of contacts and dipoles, whose energy is a third of the trace, with the present loads."""
     grains, contacts, used = state.grains.arrays, state.contacts, int(state.count[CONTACTS])
     first, second = grains.position[:, contacts.pair[:, :used]].swapaxes(0, 1)
-    branch = state.box.nearest((first - second).T)
-    of_contacts: np.ndarray = (branch.T * contacts.force[:, :used]).sum(axis=1)
-    return of_contacts - 0.5 * float((grains.moment * grains.field).sum())
+    branch, force = state.box.nearest((first - second).T).T, contacts.force[:, :used]
+    of_dipoles = 0.5 * float((grains.moment * grains.field).sum())
+    return np.append((branch * force).sum(axis=1) - of_dipoles, (branch[2] * force[0]).sum())
 
 
 def present_work(state: State) -> np.ndarray:
-    """Work (3,) [J] of the boundaries, with that since the virial was last summed."""
+    """Work (4,) [J] of the boundaries, with that since the virial was last summed."""
     cell = _cell_of(state)
     return np.asarray(cell.work - 0.5 * cell.strain * (cell.virial + present_virial(state)))
 

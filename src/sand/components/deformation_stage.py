@@ -10,14 +10,18 @@ A ← A F⁻¹, is the exact flight between two kicks.  The boundaries do the wo
 
     d(K + U)/dt = −Σ A_a W_aa,    W_aa = Σ_grains m u_a² + Σ_contacts l_a f_a
 
-on the grains: the part of K, ½ Σ m u_a² (1 − F_a²) after the drift, is exact.  W of contacts is summed every
+on the grains: the part of K, ½ Σ m u_a² (1 − F_a²) after the drift, is exact.  Simple shear moves images of a box whose
+matrix H = ((L_x, 0, T), (0, L_y, 0), (0, 0, L_z)) has a tilt T: then A and F have the element xz, too, and its work is
+−∫ A_xz W_zx dt with W_zx = Σ m u_z u_x + Σ l_z f_x.  W of contacts is summed every
 STEPS_OF_WORK steps, a sixth of the fastest contact period, and its integral is that of the trapezoidal rule, whose sum
 over periods has no error for the first harmonics of an oscillation.
 """
 
 from typing import NamedTuple
 
-from ..basics.state import CONTACTS, STEPS
+import numpy as np
+
+from ..basics.state import CONTACTS, STEPS, TILT
 from ..compiler.jit import loop
 from ..compiler.stage import stage
 from ..contact.virial import contact_virial
@@ -26,8 +30,8 @@ from ..integrate.parts import DT, LIMIT, Stop
 from ..integrate.step_control import quantise_step
 from ..numerics.vec import dot, load
 
-INVERSE, RATE = 3, 6
-"""First words of 1/L and A in `CellArrays.span`."""
+INVERSE, RATE, SHEAR = 3, 6, 10
+"""First words of 1/L and A in `CellArrays.span`, and A_xz."""
 STEPS_OF_WORK = 4
 """Steps between two sums of the virial of contacts, each of which takes as long as a tenth of a step."""
 LARGEST_STRAIN = 1e-3
@@ -43,12 +47,13 @@ class DeformationNumbers(NamedTuple):
     time: float  # of the running mean of the pressure [s]
     shortest: float  # least length of an axis [m], so that no two grains touch through two images
     dipoles: bool  # whether dipoles act, in a box that keeps its shape
+    sheared: bool  # whether the box is tilted, or is ever sheared
 
 
 @stage("the time step of a box that is deformed")
 def limit_strain(cell, scratch, parameters):
     """Lower `scratch[LIMIT]` to a power of two of a second; returns `Stop.BOX_TOO_SMALL` where the box is."""
-    fastest = 0.0
+    fastest = abs(cell.span[SHEAR])
     for a in range(3):
         if cell.span[a] < parameters.shortest:
             return Stop.BOX_TOO_SMALL.value
@@ -65,6 +70,35 @@ def twice_kinetic_energy(grains, a):
     for i in range(grains.mass.size):
         total += grains.mass[i] * grains.velocity[a, i] * grains.velocity[a, i]
     return total
+
+
+@loop
+def wrap_tilt(grains, pair_list, long_range, cell, side):
+    """Bring a tilt beyond half a side along x [m] within it: the same images, of which some are counted otherwise."""
+    turns = np.rint(cell.span[TILT] / side)
+    if turns != 0.0:
+        cell.span[TILT] -= turns * side
+        pair_list.built[3] -= turns * pair_list.built[0]
+        long_range.built[3] -= turns * long_range.built[0]
+        for i in range(grains.mass.size):
+            grains.image[0, i] += np.int32(turns) * grains.image[2, i]
+
+
+@stage("the shear of the box")
+def shear(grains, pair_list, long_range, cell, scratch):
+    """Shear the box as the drift has moved its grains; the work on their motion.  Before `deform` has changed rates."""
+    dt, rate, strained, flux, upwards = scratch[DT], cell.span[SHEAR], 1.0 + scratch[DT] * cell.span[RATE], 0.0, 0.0
+    for i in range(grains.mass.size):
+        momentum = grains.mass[i] * grains.velocity[2, i]
+        flux += momentum * grains.velocity[0, i]
+        upwards += momentum * grains.velocity[2, i]
+    cell.work[3] -= dt * rate * (strained * flux + 0.5 * dt * rate * upwards)
+    cell.span[TILT] = strained * cell.span[TILT] + dt * rate * cell.span[2]
+    cell.span[SHEAR] /= strained * (1.0 + dt * cell.span[RATE + 2])
+    cell.strain[3] += 0.5 * dt * (rate + cell.span[SHEAR])
+    cell.shear[0] += 0.5 * dt * (rate + cell.span[SHEAR])
+    wrap_tilt(grains, pair_list, long_range, cell, strained * cell.span[0])
+    return 0
 
 
 @stage("the deformation of the box")
@@ -102,7 +136,7 @@ def follow_pressure(grains, cell, dt, time):
 @loop
 def add_work(cell, virial):
     """Add the work during the strain since the last sum, by the mean of its virial and the present one [J]."""
-    for a in range(3):
+    for a in range(4):
         cell.work[a] -= 0.5 * cell.strain[a] * (cell.virial[a] + virial[a])
         cell.virial[a], cell.strain[a] = virial[a], 0.0
 
@@ -124,10 +158,12 @@ def work_of_box(grains, contacts, cell, count, scratch, span, parameters):
         found = contact_virial(grains, contacts.pair, contacts.force, count[CONTACTS], span)
         # the energy U ∝ L⁻³ of dipoles has the trace 3U
         of_dipoles = dipole_energy(grains) if parameters.dipoles else 0.0
-        add_work(cell, (found[0] + of_dipoles, found[4] + of_dipoles, found[8] + of_dipoles))
+        add_work(cell, (found[0] + of_dipoles, found[4] + of_dipoles, found[8] + of_dipoles, found[6]))
     for a in range(3):
         if parameters.law != 2:
             cell.span[RATE + a] = cell.rate[a] * (cell.start[a] / cell.span[a] if parameters.law == 1 else 1.0)
+    if parameters.law != 1:  # otherwise dH/dt is that of the start, as `shear` leaves it
+        cell.span[SHEAR] = cell.rate[3]
     if due:
         if parameters.law == 2:
             follow_pressure(grains, cell, cell.elapsed[0], parameters.time)
@@ -139,6 +175,6 @@ def deformation_stages(numbers: DeformationNumbers) -> HookStages:
     """All stages of a deformation."""
     return {
         Hook.LIMIT_STEP: [(limit_strain, numbers)],
-        Hook.AFTER_DRIFT: [(deform, ())],
+        Hook.AFTER_DRIFT: [(shear, ())] * numbers.sheared + [(deform, ())],
         Hook.AFTER_KICK: [(work_of_box, numbers)],
     }

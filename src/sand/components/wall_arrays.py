@@ -18,6 +18,8 @@ class WallArrays(NamedTuple):
     velocity: Annotated[np.ndarray, Array((3, "walls"), "m/s")]
     force: Annotated[np.ndarray, Array((3, "walls"), "N")]  # of the grains on the wall at the end of the last step
     impulse: Annotated[np.ndarray, Array((3, "walls"), "N s", summed=True)]  # its integral over time since the start
+    # force on a wall with a mass along its normal
+    push: Annotated[np.ndarray, Array(("walls",), "N", required=False)]
     # energy that the wall has given to grains and contacts by its motion
     work: Annotated[np.ndarray, Array(("walls",), "J")]
     # used within a step: velocity and impulse at its start

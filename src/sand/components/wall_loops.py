@@ -49,7 +49,6 @@ class WallNumbers(NamedTuple):
 
     pairings: Any  # (11, M, W) contact.law.Pairing of each material of grains with each wall
     mass: Any  # (W,) [kg]; infinite if the motion of the wall is given
-    push: Any  # (W,) force on the wall along its normal [N], for a wall with a mass
 
 
 @loop
@@ -115,7 +114,7 @@ def _start_walls(walls, numbers, dt):
     for w in range(walls.work.size):
         put(walls.velocity_before, w, load(walls.velocity, w))
         put(walls.impulse_before, w, load(walls.impulse, w))
-        along = dot(load(walls.force, w), load(walls.normal, w)) + numbers.push[w]
+        along = dot(load(walls.force, w), load(walls.normal, w)) + walls.push[w]
         accrue(walls.velocity, w, scale(0.5 * dt * along / numbers.mass[w], load(walls.normal, w)))
         accrue(walls.position, w, scale(dt, load(walls.velocity, w)))
 
@@ -138,14 +137,14 @@ def _finish_walls(walls, contacts, numbers, dt):
         impulse = sub(load(walls.impulse, w), load(walls.impulse_before, w))
         middle = load(walls.velocity, w)  # with the impulses of contacts that formed or broke in this step
         speed = dot(load(walls.velocity_before, w), n)
-        drift_speed = speed + 0.5 * dt * (dot(start, n) + numbers.push[w]) / numbers.mass[w]
-        along = dot(force, n) + numbers.push[w]
+        drift_speed = speed + 0.5 * dt * (dot(start, n) + walls.push[w]) / numbers.mass[w]
+        along = dot(force, n) + walls.push[w]
         accrue(walls.velocity, w, scale(0.5 * dt * along / numbers.mass[w], n))
         if numbers.mass[w] < math.inf:
             # kinetic energy of the motion along n; the other components of the velocity are constant
             before, after = dot(load(walls.velocity_before, w), n), dot(load(walls.velocity, w), n)
             gained = 0.5 * numbers.mass[w] * (after * after - before * before)
-            walls.work[w] += numbers.push[w] * dt * drift_speed - gained - dot(across(middle, n), impulse)
+            walls.work[w] += walls.push[w] * dt * drift_speed - gained - dot(across(middle, n), impulse)
         else:
             walls.work[w] -= dot(middle, impulse)
 
@@ -168,7 +167,7 @@ def count_new_wall_contacts(grains, walls, contacts, numbers, dt):
     found = 0
     for w in range(walls.work.size):
         n, at = load(walls.normal, w), load(walls.position, w)
-        along = dot(load(walls.force, w), n) + numbers.push[w]
+        along = dot(load(walls.force, w), n) + walls.push[w]
         at = axpy(dt, axpy(0.5 * dt * along / numbers.mass[w], n, load(walls.velocity, w)), at)
         for g in range(grains.mass.size):
             near = dot(sub(load(grains.position, g), at), n) <= grains.radius[g]

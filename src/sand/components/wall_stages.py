@@ -173,7 +173,7 @@ def bath_wall_work(s, parameters, block):
         g, w = s.wall_contacts.pair[0, c], s.wall_contacts.pair[1, c]
         n = load(s.walls.normal, w)
         of_grain, turn = accelerations(s.grains, g)
-        of_wall = (dot(load(s.walls.force, w), n) + parameters.push[w]) / parameters.mass[w]
+        of_wall = (dot(load(s.walls.force, w), n) + s.walls.push[w]) / parameters.mass[w]
         arm = scale(s.grains.radius[g], n)
         change = relative_motion(arm, sub(of_grain, scale(of_wall, n)), turn, turn, ZERO)
         record_half_kick(s.wall_contacts, s.lost, c, n, change, weight)
@@ -196,7 +196,7 @@ def bodies_at_walls(s, parameters, block):
     for w in range(walls.work.size):
         n = load(walls.normal, w)
         # as of a grain, twice the distance by its present acceleration
-        moved = abs(dot(load(walls.force, w), n) + parameters.push[w]) / parameters.mass[w] * h * h
+        moved = abs(dot(load(walls.force, w), n) + walls.push[w]) / parameters.mass[w] * h * h
         for g in range(grains.mass.size):
             gap, first = wall_height(grains, walls, g, w) - grains.radius[g], bodies.first[g]
             closing = -dot(relative_velocity(grains, walls, g, w), n)

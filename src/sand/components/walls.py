@@ -20,14 +20,15 @@ from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains
 from ..basics.initial_pairs import most_overlap
 from ..basics.material import Material, as_material
-from ..basics.ramps import ramps_of
-from ..basics.settings import Direction, Number, Reading, Settings, Vector
+from ..basics.ramps import force_at, rampable, ramps_of
+from ..basics.settings import RAMP, Direction, Number, Reading, Settings, Vector
 from ..basics.state import RECORDED, State
 from ..contact.constants_table import constant_names
 from ..contact.law import ContactLaw
 from ..contact.measure import CONTACT_ROWS, CONTACT_VECTORS
 from ..contact.model import Contact
 from ..engine.component import Component, Setup
+from ..engine.engine import Engine
 from ..integrate.hooks import HookStages
 from ..integrate.integrator import moves_bodies
 from ..integrate.parts import ContactParameters
@@ -52,6 +53,7 @@ def _name_of_columns(value: Any, name: str) -> str:
 
 
 @checked
+@rampable
 @dataclass(frozen=True)
 class Wall(Settings):
     """A plane wall to which grains stick, by the contact law of `sand.Contact` in the limit of an infinite sphere.
@@ -71,7 +73,7 @@ class Wall(Settings):
         Mass [kg] > 0 of a wall that moves along its normal by Newton's law, under the forces of the grains and `force`.
         By default the motion of the wall is given by `velocity`.
     force : float or str, optional
-        Force [N] on a wall with a mass along its normal: above 0 it presses the wall against the grains.
+        Force [N] on a wall with a mass along its normal: above 0 it presses the wall against the grains; or a `Ramp`.
     name : str, optional
         Name in the ledger's columns, made of letters, digits and "_"; "wall1", "wall2", … by default.
 
@@ -86,7 +88,7 @@ class Wall(Settings):
     material: Annotated[Any, Reading(as_material, write=lambda material: material.name)]
     velocity: Annotated[Any, Vector("m/s")] = (0.0, 0.0, 0.0)
     mass: Annotated[Any, Number("kg", above=0.0)] = None
-    force: Annotated[Any, Number("N")] = None
+    force: Annotated[Any, Number("N"), RAMP] = None
     name: Annotated[str, Reading(_name_of_columns, write=lambda name: name or None)] = ""
 
     place: ClassVar[str] = "wall"
@@ -147,7 +149,7 @@ def read_walls(value: Any) -> tuple[Wall, ...]:
     names = [one.name or f"wall{k}" for k, one in enumerate(value, 1)]
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise BadInput(f"walls: two walls have the name '{repeated[0]}'; give each its own")
-    return tuple(dataclasses.replace(one, name=name) for one, name in zip(value, names, strict=True))
+    return tuple(dataclasses.replace(one, name=name, **ramps_of(one)) for one, name in zip(value, names, strict=True))
 
 
 class Walls(Component):
@@ -193,7 +195,6 @@ class Walls(Component):
         numbers = WallNumbers(
             np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0)),
             np.array([math.inf if wall.mass is None else wall.mass for wall in self.items]),
-            np.array([wall.force or 0.0 for wall in self.items]),
         )
         return wall_stages(law, variant_of(settings), numbers, moves_bodies=moves_bodies(setup.stepping))
 
@@ -206,6 +207,20 @@ class Walls(Component):
             given = [getattr(wall, "point" if name == "position" else name) for wall in self.items]
             getattr(state.of_components["walls"], name)[...] = np.array(given).T
 
+    def begin(self, engine: Engine) -> None:
+        """Set the forces on the walls of the present intervals of their ramps."""
+        state = engine.stored_state
+        state.of_components["walls"].push[:] = [force_at(wall, state.time).force or 0.0 for wall in self.items]
+
+    def next_time(self, engine: Engine) -> float:
+        """Next time [s] at which a ramp changes a force."""
+        ramps = [ramp for wall in self.items for ramp in ramps_of(wall).values()]
+        return min((ramp.next_change(engine.stored_state.time) for ramp in ramps), default=math.inf)
+
+    def update(self, engine: Engine) -> None:
+        """As `begin`."""
+        self.begin(engine)
+
     def problems_of_arrays(self) -> list[str]:
         """As `Component.problems_of_arrays`."""
         return [
@@ -214,9 +229,9 @@ class Walls(Component):
         ]
 
     def columns(self) -> list[str]:
-        """Force of the grains on each wall [N], position along its normal [m]; number of contacts."""
-        own = ("force_x", "force_y", "force_z", "position")
-        return [*(f"{wall.name}_{key}" for wall in self.items for key in own), CONTACTS_OF_ALL]
+        """Force of the grains on each wall [N], its integral over time, position [m]; number of contacts."""
+        own = [f"{name}_{axis}" for name in ("force", "impulse") for axis in "xyz"]
+        return [*(f"{wall.name}_{key}" for wall in self.items for key in (*own, "position")), CONTACTS_OF_ALL]
 
     def whole(self) -> list[str]:
         """Numbers of contacts."""
@@ -230,7 +245,7 @@ class Walls(Component):
         """As `Component.row`."""
         arrays = state.of_components["walls"]
         along = (arrays.position * arrays.normal).sum(axis=0)
-        values = [float(v) for v in np.vstack([arrays.force, along]).T.ravel()]
+        values = [float(v) for v in np.vstack([arrays.force, arrays.impulse, along]).T.ravel()]
         found = dict(zip(self.columns(), [*values, int(state.of_components["wall_contacts"].used[0])], strict=True))
         return {LOST: -math.fsum(arrays.work)} | found
 

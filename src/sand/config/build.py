@@ -109,7 +109,7 @@ def _of_gas(case: Case) -> Start:
     }
     try:
         return gas_with_contacts(
-            section.number, case.box.periodic, seed=case.run.seed, materials=case.materials_by_name(), **given
+            section.number, case.box.space, seed=case.run.seed, materials=case.materials_by_name(), **given
         )
     except BadInput as error:
         problems = error.problems
@@ -130,9 +130,9 @@ def _of_file(case: Case) -> Start:
     there = [m.name for m in start.grains.materials]
     if "material" in section.model_fields_set and set(given) != set(there):
         raise BadInput(f"grains.material: the file has {', '.join(there)}, not {', '.join(given)}; leave material out")
-    if case.box.periodic is not None and not same_box(case.box.periodic, start.box):
+    if case.box.space is not None and not same_box(case.box.space, start.box):
         raise BadInput(
-            f"box: it is {case.box.periodic.describe()} here, but {start.box.describe()} in {section.file}; "
+            f"box: it is {case.box.space.describe()} here, but {start.box.describe()} in {section.file}; "
             "leave [box] out to use the box of the file"
         )
     return start
@@ -146,12 +146,14 @@ def _of_other(case: Case, path: Path) -> Start:
     own = library[section.material]
     one = own if "material" in section.model_fields_set else None
     given = section.radius, section.length, library, own, section.frame
-    return start_from_file(path, case.box.periodic, one, *given)
+    return start_from_file(path, case.box.space, one, *given)
 
 
 def same_box(first: Box, second: Box) -> bool:
     """Whether two boxes have the same axes, equal to the precision of a trajectory."""
     pairs = list(zip(first.lengths, second.lengths, strict=True))
+    if abs(first.tilt - second.tilt) > 1e-6 * first.shortest:
+        return False
     return all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
 
 
@@ -238,7 +240,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     if (grains.arrays.material != index).any():
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
     options |= {"out": place, "restart": (arrays, meta)}
-    simulation = simulate(case, grains, case.box.periodic, **options)
+    simulation = simulate(case, grains, case.box.space, **options)
     if case.grains.kind != "given":
         simulation.recipe = case.grains.recipe()
     end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))

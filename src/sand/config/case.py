@@ -15,7 +15,7 @@ from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, did_you_mean, naming
 from ..basics.material import NEAREST, PRESETS, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
-from ..components.deformation import Deformation, DeformedBox
+from ..components.deformation import Deformation, DeformedBox, box_columns
 from ..components.driven import Driven
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
@@ -94,6 +94,18 @@ class BoxSection(Section):
 
     periodic: Annotated[Any, Reading(_box)] = None
     """Length of a cube or list of three lengths [m], "open" for an open axis; none: open space."""
+    tilt: Annotated[Any, Number("m")] = None
+    """Displacement [m] along x of the image one length beyond along z, as shear leaves it."""
+
+    def contradictions(self) -> Iterator[str]:
+        """A tilt of a box that is not periodic along all axes."""
+        if self.tilt and (self.periodic is None or None in self.periodic.lengths):
+            yield "tilt is for a box that is periodic along x, y and z; leave it out"
+
+    @property
+    def space(self) -> Any:
+        """The box; None for open space."""
+        return self.periodic and Box(self.periodic.lengths, self.tilt or 0.0)
 
 
 @with_keys(Material, "name", optional=True)
@@ -326,8 +338,8 @@ def condition_errors(content: dict[str, Any]) -> list[str]:
         table = content.get("stepping")
         awake = isinstance(table, dict) and moves_bodies(INTEGRATORS.get(method_of(table)))
         stress = isinstance(run, dict) and run.get("stress") is True
-        box = DeformedBox(())
-        columns += [*box.columns(), *box.losses()] if "deformation" in content else []
+        if isinstance(deformation := content.get("deformation"), dict):
+            columns += [*box_columns(sheared="shear" in deformation), *DeformedBox(()).losses()]
         condition.check([*Ledger(awake=awake, stress=stress).columns, *columns, *wall_columns(content.get("walls"))])
     except BadInput as error:
         return error.at("run").problems

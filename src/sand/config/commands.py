@@ -15,6 +15,7 @@ OWN_TABLES = {
     "compress": {"compression"},
     "stretch": {"stretch"},
     "shear": {"shear"},
+    "elastic": {"elastic"},
     "collide": {"impact"},
     "run": {"run", "grains", "box", "neighbours"},
 }
@@ -22,6 +23,8 @@ OWN_TABLES = {
 sweep` those of any other command."""
 LOADINGS = ("compress", "stretch", "shear")
 """Commands that load a packing."""
+PACKINGS = (*LOADINGS, "elastic")
+"""Commands that load a packing, or measure one at rest."""
 BODIES = {"target", "projectile"}
 """Tables of the bodies of `sand collide` and `sand scatter`."""
 OF_FILES = ("grains", "aggregate", *BODIES)

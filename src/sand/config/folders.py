@@ -7,10 +7,10 @@ from pathlib import Path
 
 from ..basics.errors import BadInput
 from ..io import run_folder as files
-from .commands import LOADINGS, command_for
+from .commands import PACKINGS, command_for
 
 CONTENTS = {"run": "a run", "scatter": "a job", "collide": "collisions", "grow": "boxes", "sweep": "a sweep"}
-CONTENTS |= dict.fromkeys(LOADINGS, "packings")
+CONTENTS |= dict.fromkeys(PACKINGS, "packings")
 """What commands leave in a folder."""
 
 

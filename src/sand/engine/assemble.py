@@ -28,7 +28,7 @@ from ..neighbours.search import Neighbours
 from .component import Component, Setup
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps, with_contacts
-from .input_checks import check_system
+from .input_checks import check_system, problems_of_tilt
 from .kinds import Kind
 from .new_state import new_state
 from .rigid.assembly import BodiesKind
@@ -88,6 +88,8 @@ def build_engine(
     warnings = errors.take(check_system, grains, forces, box, fresh=fresh, instead=[])
     warnings += errors.take(kind.check, forces, neighbours, instead=[])
     errors.problems += [line for each in extra for line in each.problems(setup)]
+    if box.tilt and not any(each.moves_box for each in extra):
+        errors.problems += problems_of_tilt(by_type, stepping)
     errors.done()
     wrapped = _wrapped(grains, box, fresh=fresh)
     for each in extra:
@@ -113,7 +115,7 @@ def build_engine(
         force_dependent, kind=kind, verlet=verlet, seed=seed, pair_gap=pair_gap, uniform=uniform, limits=limits
     )
     parameters = StepParameters(
-        span=box.moving_span if any(each.moves_box for each in extra) else box.span,
+        span=next((each.span(box) for each in extra if each.moves_box), box.span),
         search=found.search,
         respa=respa_settings(by_type, verlet, long_range, every_step=any(each.every_step for each in extra)),
         external_work=external_work(by_type.external, box),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..basics.arrays import OVER_ALLOCATION
-from ..basics.box import MovingSpan
+from ..basics.box import Span
 from ..basics.state import CONTACTS, PAIRS, State
 from ..basics.threads import cores, threads
 from ..compiler.ahead import compile_ahead
@@ -55,7 +55,7 @@ def _set_arrays(table: Table, state: State, present: tuple) -> None:
     """Give a table the arrays of a state, and its box if that is deformed."""
     for name, value in zip(_names(state), present, strict=True):
         table.set(name, value)
-    if state.cell is not None and isinstance(table["span"], MovingSpan):
+    if state.cell is not None and not isinstance(table["span"], Span):
         table.share("span", state.cell.span)
 
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from ..basics.box import Box
+from ..basics.box import Box, MovingSpan, Span, TiltedSpan
 from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.state import State
@@ -68,7 +68,7 @@ class Component:
         Whether `contacts_changed` is called; the driver then returns after each step in which a contact formed or
         broke.
     moves_box : bool
-        Whether it deforms the box, whose `Span` is then a `MovingSpan` in `State.cell`.
+        Whether it deforms the box, whose `span` is then that of the component, in `State.cell`.
     in_parts : bool
         Whether it also acts on grains of awake clusters within a step of rigid bodies.
     last_action : int or None
@@ -118,6 +118,10 @@ class Component:
     def at_start(self, forces: ForcesByType, setup: Setup) -> ForcesByType:
         """The forces as they act at first."""
         return forces
+
+    def span(self, box: Box) -> Span | MovingSpan | TiltedSpan:
+        """The box as a tuple for kernels, if the component moves it."""
+        return box.span
 
     def stages(self, setup: Setup, law: ContactLaw, settings: ContactParameters) -> HookStages:
         """Stages that the driver calls at each place of a step, with their parameters: by default, `own_stages`."""

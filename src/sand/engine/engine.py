@@ -343,14 +343,15 @@ class Engine(CompiledState):
             each.begin(self)
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
-            state.long_range.built[...] = [length or 0.0 for length in state.box.lengths]
+            state.long_range.built[...] = [*state.box.span[:3], state.box.tilt]
         self.rebuild_list()
         self.stepper.loaded(self)
 
     def rebuild_list(self) -> None:
         """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
         state, search = self.stored_state, self.parameters.search
-        span = state.box.span if state.cell is None else box_of(state.long_range.built).span
+        built = state.long_range.built
+        span = state.box.span if state.cell is None else box_of(built, built[3]).span
         while search.listed and rebuild_verlet_list(state.long_range, span, search.reach) == FULL:
             state.grow_rows()
 
@@ -359,7 +360,7 @@ class Engine(CompiledState):
         state = self.stored_state
         if not np.isfinite(state.long_range.anchor).all():
             return False
-        if state.cell is not None and (state.box != box_of(state.long_range.built)):
+        if state.cell is not None and (state.box != box_of(built := state.long_range.built, built[3])):
             return True  # `neighbours.skin` looks at it before the next sum
         moved = state.box.nearest((state.grains.arrays.position - state.long_range.anchor).T)
         return bool((moved**2).sum(axis=1).max() <= (0.5 * self.parameters.search.margin) ** 2)

@@ -15,9 +15,11 @@ from ..contact.model import Contact
 from ..forces.base import Force, LongRangeForce
 from ..forces.pair.inverse_square import Charges
 from ..forces.pair.screened_charges import ScreenedCharges
+from ..integrate.integrator import Integrator
 from ..limits.model_limits import limit_warnings
 from ..limits.solid_limits import fast_settling, grain_warnings
 from ..limits.truncation import truncation_warnings
+from .step_parameters import ForcesByType
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
@@ -73,6 +75,14 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
         )
     errors.done()
     return warnings + (_start_warnings(grains, forces, box) if fresh else [])
+
+
+def problems_of_tilt(forces: ForcesByType, stepping: Integrator) -> list[str]:
+    """What cannot be used in a tilted box that keeps its shape."""
+    others = [each.name for each in forces.long_range]
+    others += [each.name for each in forces.external if getattr(each, "position_dependent", False)]
+    found = [f"the force '{name}'" for name in others] + [f"stepping = '{stepping.name}'"] * (stepping.name != "verlet")
+    return [f"box: {other} cannot be used in a tilted box; leave one of them out" for other in found]
 
 
 def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
@@ -140,6 +150,8 @@ def _nearest(grains: Grains, box: Box) -> np.ndarray:
     count = len(grains)
     if count == 1:
         return np.zeros((0, 2), np.int64)
+    if box.tilt:
+        return box.close_pairs(grains.position, 2.0 * float(grains.radius.max()))
     tree = box.tree(grains.position)
     _, others = tree.query(tree.data, min(count, NEAREST))
     pairs = np.stack([np.repeat(np.arange(count), others.shape[1]), others.ravel()], axis=1)

@@ -25,6 +25,7 @@ from ..integrate.integrator import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..setup.checks import pairs_in_contact, refuse_pieces
 from ..setup.from_frame import Start
+from ..simulation.condition import EVERY
 from ..simulation.simulation import Simulation
 from ..theory.compression import CLOSEST, PackingScales, packing_scales
 from .laboratory_table import Percolation, shares, table_of
@@ -33,9 +34,13 @@ WAYS = ("box", "walls")
 """By what a packing is loaded: its periodic box, or one of two walls. The functions of each are in laboratory_WAY."""
 OF_STATE = (
     *("contacts", "made", "moved", "broken", "clusters", "translation", "rotation"),
-    *("normal", "sliding", "rolling", "twisting", "total"),
+    *("normal", "sliding", "rolling", "twisting", "total", "tilt"),
 )
 """Columns of the ledger that the table repeats, besides pressures and losses."""
+
+
+REST = 1e-4
+"""Relative change of the filling factor below which a packing under a constant pressure is at rest."""
 
 
 class Rate(NamedTuple):
@@ -71,6 +76,16 @@ def read_rate(value: Any, name: str) -> Rate:
     raise BadInput(f"{name} = {shown(value)} is no rate of strain; {advice}")
 
 
+def read_load(value: Any, name: str) -> tuple[float, ...]:
+    """Read a pressure [Pa] > 0, or several that follow one another.  Raises BadInput."""
+    if not isinstance(value, (list, tuple)):
+        return (si(value, "Pa", name, above=0.0),)
+    if not value:
+        raise BadInput(f"{name} = [] has no pressure; give one such as '1 kPa', or several")
+    return tuple(si(one, "Pa", f"{name}[{k}]", above=0.0) for k, one in enumerate(value))
+
+
+LOAD = Reading(read_load, write=lambda load: load[0] if len(load) == 1 else list(load), unit="Pa")
 BOX = Reading(lambda value, name: as_box(value), write=lambda box: list(box.lengths))
 
 
@@ -83,24 +98,33 @@ class Loading(Settings):
     ----------
     kind : str
         "compress", "stretch" or "shear".
-    rate : float or str
-        Rate of strain > 0: in units of the time t_c = √(m̄ δ_c/F_c) of a contact of two mean grains, "1e-5 /t_c", or
-        "1e4 1/s". The box shrinks or grows exponentially, dL/dt = ∓rate × L. A wall moves with a constant speed: rate
-        times the distance of the walls at the start, or a speed, "10 cm/s".
-    to : float
-        Where it ends: of "compress" a filling factor φ, at most 0.74; of "stretch" the strain L/L₀ − 1, and of "shear"
-        the strain, the distance that the faces have slid over the distance between them.
+    rate : float or str, optional
+        Rate of strain > 0, needed unless a packing is compressed by a pressure: in units of the time t_c = √(m̄ δ_c/F_c)
+        of a contact of two mean grains, "1e-5 /t_c", or "1e4 1/s". The box shrinks or grows exponentially,
+        dL/dt = ∓rate × L. A wall moves with a constant speed: rate times the distance of the walls at the start, or a
+        speed, "10 cm/s".
+    to : float, optional
+        Where it ends, needed with a rate: of "compress" a filling factor φ, at most 0.74; of "stretch" the strain
+        L/L₀ − 1, and of "shear" the strain, the distance that the faces have slid over the distance between them.
     by : str, optional
-        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y; "shear"
-        needs walls.
+        What moves: the periodic "box", or one of two "walls" normal to z, the box being periodic along x and y. "shear"
+        slides the images above and below along x, or the lid.
     along : str, optional
         Axis of the strain, "x", "y" or "z"; "all" for equal strains of a box that is compressed. "auto", the default:
-        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear moves the lid along x.
+        "all" for a box that is compressed, x for one that is stretched, z between walls. Shear is along x, and grows
+        along z.
     box : float or str or sequence, optional
         Sides of the box at the start [m], one or three; between walls those along x and y count. By default those of a
         frame, or of a cube that holds the body with a gap of a tenth of a radius.
     every : float, optional
-        Change of ln φ, or strain, from row to row of the table, 0.02 by default.
+        Change of ln φ, or strain, from row to row of the table, 0.02 by default; of a packing compressed by a pressure
+        the part of its time.
+    pressure : float or str or sequence, optional
+        Between walls: the force on the lid over its area [Pa] > 0, with which it moves freely along z; its mass is that
+        of all grains. "compress" by one pressure ends when the packing is at rest; several follow one another, the load
+        growing or falling exponentially in equal times. "shear" takes one.
+    until : float or str, optional
+        Time [s] > 0 at which a compression by a pressure ends at the latest; with several, that of the last one.
 
     Raises
     ------
@@ -109,23 +133,25 @@ class Loading(Settings):
     """
 
     kind: Annotated[str, Word(*LOADINGS)]
-    rate: Annotated[Any, Reading(read_rate, write=str)]
-    to: Annotated[Any, Number(above=0.0)]
+    rate: Annotated[Any, Reading(read_rate, write=str)] = None
+    to: Annotated[Any, Number(above=0.0)] = None
     by: Annotated[str, Word(*WAYS)] = "box"
     along: Annotated[str, Word("auto", "all", "x", "y", "z")] = "auto"
     box: Annotated[Any, BOX] = None
     every: Annotated[Any, Number(least=1e-4, most=0.5)] = 0.02
+    pressure: Annotated[Any, LOAD] = None
+    until: Annotated[Any, Number("s", above=0.0)] = None
 
     place: ClassVar[str] = ""
 
     def contradictions(self, wrong: Set[str]) -> Iterator[str]:
         """Keys that are for another kind of test."""
-        if not {"kind", "to"} & wrong and self.kind == "compress" and self.to > CLOSEST:
+        if not {"kind", "to"} & wrong and self.kind == "compress" and self.to is not None and self.to > CLOSEST:
             yield f"to = {self.to:g} is above {CLOSEST}, the filling factor of the closest packing of equal grains"
-        if wrong & {"kind", "rate", "by", "along"}:
+        if wrong & {"kind", "rate", "by", "along", "pressure", "until", "to"}:
             return
-        if (self.kind, self.by) == ("shear", "box"):
-            yield "by = 'box' is for a box that is compressed or stretched; shear needs by = 'walls'"
+        if problems := list(self._load_problems()):
+            yield from problems
             return
         if self.by == "box" and self.rate.unit == "m/s":
             yield "rate is a speed, which is for by = 'walls'; give a rate such as '1e-5 /t_c'"
@@ -133,6 +159,35 @@ class Loading(Settings):
         if self.along not in ("auto", *allowed):
             advice = f"give {' or '.join(map(repr, allowed))}" if allowed else "leave it out"
             yield f"along = {self.along!r} is not for {self.kind} with by = {self.by!r}; {advice}"
+
+    def _load_problems(self) -> Iterator[str]:
+        """Keys of a given load without those of a given strain, or the reverse."""
+        if self.pressure is not None and self.by == "box":
+            yield (
+                "pressure is for by = 'walls'; a periodic box follows a pressure in a case of `sand run`, with "
+                "law = 'pressure' in [deformation]"
+            )
+            return
+        if self.pressure is not None and self.kind == "stretch":
+            yield "pressure presses the lid against the packing, which is for compress and shear; leave it out"
+        if self.pressure is not None and self.kind == "shear" and len(self.pressure) > 1:
+            yield "pressure has several values, which are for compress; shear takes one"
+        examples = {"rate": "'1e-5 /t_c'", "to": "0.4", "until": "'100 us'"}
+        of_rate, of_load = ("rate", "to"), ("until",)
+        needed, unused = (of_load, of_rate) if self.load_is_given else (of_rate, of_load)
+        by = "a pressure" if self.load_is_given else "a rate"
+        for name in needed:
+            if getattr(self, name) is None:
+                yield f"{name} is missing; add it, for example {name} = {examples[name]}"
+        for name in unused:
+            if getattr(self, name) is not None:
+                ends = " and ".join(needed)
+                yield f"{name} is not used by {self.kind} with {by}, which has {ends}; leave it out"
+
+    @property
+    def load_is_given(self) -> bool:
+        """Whether the load is given, and the strain is measured."""
+        return self.kind == "compress" and self.pressure is not None
 
     @property
     def axes_allowed(self) -> tuple[str, ...]:
@@ -171,10 +226,11 @@ class Plan(NamedTuple):
         """Filling factor φ in a box of these lengths (3,) [m]."""
         return filling_factor(self.start.grains.radius, sides)
 
-    def rate_ratio(self, sides: np.ndarray) -> float:
+    def rate_ratio(self, sides: np.ndarray, rate: float | None = None) -> float:
         """The rate over the largest one that is slow enough at these lengths, see `PackingScales.largest_rate`."""
         moved = ["xyz".index(axis) for axis in self.loading.axes]
-        speeds = self.rate * (self.sides if self.loading.by == "walls" else sides)[moved]  # that of a wall is constant
+        lengths = (self.sides if self.loading.by == "walls" else sides)[moved]  # the speed of a wall is constant
+        speeds = (self.rate if rate is None else rate) * lengths
         return float(speeds.max()) / self.scales.largest_rate(self.filling(sides), 1.0)
 
     def rate_text(self, rate: float) -> str:
@@ -188,6 +244,10 @@ class Plan(NamedTuple):
         filling = self.filling(sides)
         axis = "xyz".index(self.loading.axes[0])
         sheared = self.loading.kind == "shear"
+        rate = None
+        if self.loading.load_is_given and before is not None:
+            moved = sides[axis] - way.sides(self, before)[axis]
+            rate = abs(float(moved)) / (row["time"] - before["time"]) / float(self.sides[axis])
         known = {
             "time": row["time"],
             "step": row["step"],
@@ -195,9 +255,9 @@ class Plan(NamedTuple):
             "mean_filling": math.nan if before is None else math.sqrt(filling * self.filling(way.sides(self, before))),
             "strain": self.rate * row["time"] if sheared else float(sides[axis] / self.sides[axis]) - 1.0,
             **{f"side_{name}": float(side) for name, side in zip("xyz", sides, strict=True)},
-            "stress": math.nan if before is None else way.stress(self, before, row),
+            **way.means(self, before, row),
             "coordination": 2.0 * row["contacts"] / grains,
-            "rate_ratio": self.rate_ratio(sides),
+            "rate_ratio": self.rate_ratio(sides, rate),
         }
         parts = ("pressure", "mean_pressure", "lost_")
         more = {name: row[name] for name in row if name in OF_STATE or name.startswith(parts)}
@@ -205,8 +265,16 @@ class Plan(NamedTuple):
 
 
 def _way(loading: Loading) -> Any:
-    """The module of the box or of the walls, with the functions `placed`, `moved`, `times`, `sides` and `stress`."""
+    """The module of the box or of the walls, with the functions that both have, such as `placed` and `means`."""
     return importlib.import_module(f".laboratory_{loading.by}", __package__)
+
+
+def contact_of(forces: Sequence[Force] | None) -> Contact:
+    """The contact model among the forces, the default one if there are none.  Raises BadInput."""
+    contact = next((one for one in forces or () if isinstance(one, Contact)), None) if forces else Contact()
+    if contact is None:
+        raise BadInput("forces: there is no sand.Contact(), by which grains touch; add it")
+    return contact
 
 
 def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None = None) -> Plan:
@@ -227,24 +295,25 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
         If the body is not in one piece, or does not fit into the box, or its end has been reached.
     """
     given = body if isinstance(body, Start) else Start(body, None, Box.open(), "")
-    contact = next((one for one in forces or () if isinstance(one, Contact)), None) if forces else Contact()
-    if contact is None:
-        raise BadInput("forces: there is no sand.Contact(), by which grains touch; add it")
+    contact = contact_of(forces)
     if given.contacts is not None and not len(given.contacts.pair):
         raise BadInput(f"the frame has no contacts, and nothing to {loading.kind}; take an earlier or a later one")
     pairs = pairs_in_contact(given.grains, given.box)[0] if given.contacts is None else given.contacts.pair
-    refuse_pieces(given.grains, np.asarray(pairs, np.int64), given.box, "the body")
     way, grains = _way(loading), given.grains
     start, sides = way.placed(loading, given, contact)
+    joined = [np.asarray(one, np.int64) for one in (pairs, way.joined(given, contact))]
+    refuse_pieces(grains, np.concatenate(joined), given.box, "the body")
     settings = {name: getattr(contact, name) for name in ("roll_factor", "rolling_limit", "surface_energy_factor")}
     scales = packing_scales(grains.materials[int(grains.material[0])], float(grains.radius.mean()), **settings)
-    unit = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}[loading.rate.unit]
-    found = Plan(loading, start, {}, sides, loading.rate.value / unit, 0.0, 0.0, scales)
+    units = {"1/s": 1.0, "/t_c": scales.time, "m/s": float(sides[2])}
+    rate = math.nan if loading.load_is_given else loading.rate.value / units[loading.rate.unit]
+    found = Plan(loading, start, {}, sides, rate, 0.0, 0.0, scales)
     filling = found.filling(sides)
-    if loading.kind == "compress" and loading.to <= filling:
+    if loading.kind == "compress" and loading.to is not None and loading.to <= filling:
         raise BadInput(f"to = {loading.to:g} is not above the filling factor at the start, {filling:.3g}")
-    until, row_every = way.times(loading, filling, found.rate)
-    found = found._replace(moved=way.moved(found, contact), until=until, row_every=row_every)
+    until, row_every = way.times(loading, filling, rate)
+    found = found._replace(until=until, row_every=row_every)
+    found = found._replace(moved=way.moved(found, contact))
     smallest, needed = float(way.last_sides(found).min()), least_side(grains.radius)
     if loading.by == "box" and smallest < needed <= sides.min():
         first, least = (format_quantity(float(f"{side:.3g}"), "m") for side in (smallest, needed))
@@ -256,7 +325,12 @@ def plan(body: Grains | Start, loading: Loading, forces: Sequence[Force] | None 
 
 
 def slow_from(planned: Plan) -> str:
-    """The largest rate at the start of a plan that is slow enough; warns if no part of the plan is."""
+    """The largest rate at the start of a plan that is slow enough; warns if no part of the plan is.
+
+    Empty for a given load.
+    """
+    if planned.loading.load_is_given:
+        return ""
     first, last = (planned.rate_ratio(sides) for sides in (planned.sides, _way(planned.loading).last_sides(planned)))
 
     good = f"{planned.rate_text(planned.rate / first)}, at the start"
@@ -282,6 +356,7 @@ class Loaded(NamedTuple):
         return {
             "kind": planned.loading.kind,
             "by": planned.loading.by,
+            "largest_load": max(planned.loading.pressure or (0.0,)),
             "grains": len(planned.start.grains),
             "radius": float(planned.start.grains.radius.mean()),
             "filling_at_start": planned.filling(planned.sides),
@@ -331,13 +406,25 @@ def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
     simulation.observers = [*simulation.observers, seen]
     if simulation.writer is not None:
         simulation.writer.draws = False  # the figure of the table is drawn by the job
-    result = simulation.run(max(planned.until, simulation.time))
-    if result.outcome.is_physics:
-        raise BadInput(f"the {planned.loading.kind} test cannot be computed to its end: {result}")
+    steady = planned.loading.load_is_given and len(planned.loading.pressure) == 1
+    stop = (lambda running: at_rest(planned, running.ledger.rows)) if steady else None
+    if stop is None or simulation.steps % EVERY or not stop(simulation):  # else it had ended before it was resumed
+        result = simulation.run(max(planned.until, simulation.time), stop=stop)
+        if result.outcome.is_physics:
+            raise BadInput(f"the {planned.loading.kind} test cannot be computed to its end: {result}")
     rows = simulation.ledger.rows
     if simulation.writer is not None:
         seen.see_frames(simulation.writer.folder / TRAJECTORY, rows)
     return Loaded(planned, table_of(planned, rows, seen), simulation)
+
+
+def at_rest(planned: Plan, rows: Sequence[dict[str, float]]) -> bool:
+    """Whether the filling factor has changed by less than REST in the last tenth of the time of a plan."""
+    recent = [row for row in rows if row["time"] >= rows[-1]["time"] - 0.1 * planned.until - 0.5 * planned.row_every]
+    if len(recent) in (len(rows), 1):
+        return False
+    found = [planned.filling(_way(planned.loading).sides(planned, row)) for row in recent]
+    return max(found) < min(found) * (1.0 + REST)
 
 
 @checked

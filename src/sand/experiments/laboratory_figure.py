@@ -33,6 +33,8 @@ def curve_of(tables: Sequence[Columns], x: str, y: str, label: str) -> Curve:
     Points are `weak` where a packing was loaded too fast.
     """
     logarithmic = x == "mean_filling"
+    if logarithmic:
+        tables = [_rising(table, x) for table in tables]
     low, high = max(table[x].min() for table in tables), min(table[x].max() for table in tables)
     number = min(POINTS, *(len(table[x]) for table in tables))
     places = np.geomspace(low, high, number) if logarithmic else np.linspace(low, high, number)
@@ -87,8 +89,19 @@ def laboratory_figure(runs: Sequence[dict[str, Any]], column: str | None = None)
         Panel(label, "share of what is dissipated", shares_of(tables, x), (), log, legend=first_name),
         Panel(label, "coordination number $Z$", number, numbers, log),
     ]
+    if first["largest_load"]:  # one pressure does not show how the packing yields
+        over, unit = ("time", " [s]") if compressed else ("strain", "")
+        free = [Curve("each seed" * (k == 0), one[over], one["filling"]) for k, one in enumerate(tables)]
+        panels.insert(0, Panel(over + unit, FILLING, free, log=""))
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
     return panels_figure(panels, f"{title}; {energy}")
+
+
+def _rising(table: Columns, name: str) -> Columns:
+    """Rows in which a column is larger than in all before; under a given load a packing may also expand."""
+    column = table[name]
+    larger = column > np.maximum.accumulate(np.concatenate([[-np.inf], column[:-1]]))
+    return {key: values[larger] for key, values in table.items()}
 
 
 def _laws(run: dict[str, Any], x: np.ndarray) -> tuple[list[Guide], list[Guide]]:

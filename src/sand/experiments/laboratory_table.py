@@ -62,13 +62,16 @@ def shares(before: dict[str, float] | None, row: dict[str, float]) -> dict[str, 
 
 
 def table_of(planned: Plan, rows: Sequence[dict[str, float]], seen: Percolation) -> list[dict[str, Any]]:
-    """Rows of the table: those of the ledger between which ln φ or the strain changes by `Loading.every`."""
+    """Rows of the table: those of the ledger between which ln φ or the strain changes by `Loading.every`.
+
+    With a given load all rows of the ledger.
+    """
     kept, table = rows[0], [planned.row(None, rows[0]) | seen.found.get(rows[0]["time"], {})]
     compressed, least = planned.loading.kind == "compress", planned.loading.every * (1.0 - 1e-3)
     for row in rows[1:]:
         new, last = planned.row(kept, row), table[-1]
         change = math.log(new["filling"] / last["filling"]) if compressed else abs(new["strain"] - last["strain"])
-        if change >= least or row is rows[-1]:
+        if change >= least or row is rows[-1] or planned.loading.load_is_given:
             table.append(new | seen.found.get(row["time"], {}))
             kept = row
     return table

@@ -18,7 +18,7 @@ from ..io.table import write_table
 from ..plotting.papers import panels_figure
 from ..plotting.run_figure import save
 from ..theory import contact
-from . import paper_chain, paper_compression, paper_growth, paper_packings
+from . import paper_cake, paper_chain, paper_compression, paper_growth, paper_packings
 from .job import Progress, ignored
 from .laboratory_case import LaboratoryCase
 from .laboratory_job import LaboratoryJob
@@ -29,7 +29,9 @@ from .sweep_job import ROW_BYTES, SweepJob
 from .sweep_row import Row as Run
 
 FIGURES: dict[str, PaperFigure] = {
-    one.name: one for module in (paper_growth, paper_compression, paper_chain, paper_packings) for one in module.FIGURES
+    one.name: one
+    for module in (paper_growth, paper_compression, paper_chain, paper_packings, paper_cake)
+    for one in module.FIGURES
 }
 """Figures by name; a further one is a `PaperFigure` in `FIGURES` of a module named here."""
 NAMES = {name: one for one in FIGURES.values() for name in (one.name, *one.also)}

@@ -21,10 +21,11 @@ from ..simulation.outcome import Outcome
 from ..simulation.run_writer import summary_of
 from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
+from .elastic_job import measured
 from .growth_case import GrowSection
 from .laboratory import simulation_of as simulation_of_plan
 from .laboratory import slow_from
-from .laboratory_case import OF_COMMAND, LaboratoryCase, check_laboratory, model_of
+from .laboratory_case import OF_COMMAND, check_laboratory, model_of
 from .laboratory_job import loaded
 from .sequential import SequenceCase
 
@@ -278,7 +279,7 @@ class SweptLoading(SweptCase):
     GIVEN = tuple(f"{table}.{key}" for table in OF_COMMAND.values() for key in ("seeds", "out"))
 
     def __init__(self, content: dict[str, Any], name: str):
-        self.case: LaboratoryCase = check_laboratory(content, name)
+        self.case = check_laboratory(content, name)
         self.seeds = list(self.case.section.seeds)
 
     @staticmethod
@@ -298,6 +299,23 @@ class SweptLoading(SweptCase):
     def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
         """Load the packing."""
         return loaded(self.case, seed, folder, observers, resumed=True)
+
+
+class SweptElastic(SweptLoading):
+    """A case of `sand elastic`; see `SweptCase`."""
+
+    NAME = "packings at rest"
+
+    def expected(self, seed: int) -> Expected:
+        """Set up the packing, and estimate its cost."""
+        begun = self.case.plan(seed)
+        cost = begun.simulation.expected_cost(begun.until)
+        return Expected(_without_figure(cost), cost.memory, 0.0)
+
+    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
+        """Measure the packing; its waves and matrices are left out."""
+        found = measured(self.case, seed, observers)
+        return {name: value for name, value in found.items() if name == TABLE or not isinstance(value, list)}
 
 
 def _resumed(folder: Path | None, make: Callable[[], Any]) -> Any:
@@ -327,5 +345,6 @@ CASES: dict[str, type[SweptCase]] = {
     "sequence": SweptSequence,
     "scatter": SweptScattering,
     **dict.fromkeys(OF_COMMAND, SweptLoading),
+    "elastic": SweptElastic,
 }
 """The cases that a sweep can vary, by the command that reads them: one line for each."""

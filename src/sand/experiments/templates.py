@@ -60,8 +60,13 @@ LOADINGS: dict[str, Values] = {
         "shear": {"rate": "1e-4 /t_c", "to": 1.0, "by": "walls", "seeds": [1, 2]},
         "forces.contact": DAMPED,
     },
+    "elastic": {
+        "aggregate": {"kind": "bcca", "grains": 64, "radius": "0.1 um", "material": "ice"},
+        "elastic": {"strains": [1e-6, 1e-4], "compress_to": 0.3, "copies": 3, "seeds": [1]},
+        "forces.contact": DAMPED,
+    },
 }
-"""Keys in use of `sand compress`, `sand stretch` and `sand shear`: aggregates of ice, slightly damped."""
+"""Keys in use of `sand compress`, `stretch`, `shear` and `elastic`: aggregates of ice, slightly damped."""
 SWEEP = {"vary": {"impact.speed": "log(0.3 m/s, 3 m/s, 4)", "impact.impact_parameter": ["0 b", "0.5 b"]}, "seeds": 2}
 """Keys in use of [sweep], for the collisions above."""
 

@@ -8,7 +8,8 @@ import numpy as np
 from ..basics.box import Span
 from ..compiler.jit import formula, loop
 from ..contact.gather import GRAINS_AT_ONCE, gather
-from ..numerics.flow import after_step, drifted_with_flow, slowed, unless_still
+from ..numerics.flow import after_step, drifted_with_flow, slowed
+from ..numerics.kinds_of_box import unless_still, unless_straight
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import axpy, dot, load, load4, nearest_image, put, put4, scale
@@ -68,10 +69,16 @@ def _no_moment(grains, i, q):
     """For grains without moments."""
 
 
+@unless_straight(lambda position, span: position[0])
+def across_upper_faces(position, span):
+    """Coordinate [m] along x of a position, brought within the lengths of the box along z."""
+    return position[0] - span.tilt * np.rint(position[2] * span.inverse_z)
+
+
 @formula
 def count_crossings(grains, i, position, span):
     """Count how often grain i crosses the periodic box before `nearest_image` brings `position` [m] back into it."""
-    grains.image[0, i] += np.int32(np.rint(position[0] * span.inverse_x))
+    grains.image[0, i] += np.int32(np.rint(across_upper_faces(position, span) * span.inverse_x))
     grains.image[1, i] += np.int32(np.rint(position[1] * span.inverse_y))
     grains.image[2, i] += np.int32(np.rint(position[2] * span.inverse_z))
 
@@ -87,7 +94,7 @@ def drifted(grains, i, v, dt, span):
     In a box that is deformed, the velocity becomes that relative to the flow at the end.
     """
     put(grains.velocity, i, slowed(v, span, dt))
-    return drifted_with_flow(load(grains.position, i), v, span, dt), after_step(span, dt)
+    return drifted_with_flow(load(grains.position, i), v, span, dt), after_step(dt, span)
 
 
 @unless_still(lambda wrapped_later, span: UNBOUNDED if wrapped_later else span)

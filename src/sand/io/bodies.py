@@ -164,9 +164,9 @@ def _box_of(data: GrainData, unit: float) -> tuple[Box, np.ndarray | None]:
     """The box that the file states [m], and its centre (3,)."""
     if data.box is None:
         return Box.open(), None
-    low, high, periodic = data.box
+    low, high, periodic, tilt = data.box
     x, y, z = (float(v) * unit if on else None for v, on in zip(high - low, periodic, strict=True))
-    return Box((x, y, z)), 0.5 * (low + high) * unit
+    return Box((x, y, z), tilt * unit), 0.5 * (low + high) * unit
 
 
 def read_body(path: str | Path, *arguments: Any, **named: Any) -> Grains:
@@ -219,7 +219,7 @@ def _read_own_gsd(path: Path, number: int) -> tuple[GrainData, tuple[np.ndarray,
     )
     lengths = np.array(frame.drawn)
     x, y, z = (length is not None for length in frame.box.lengths)
-    data.box = FileBox(-0.5 * lengths, 0.5 * lengths, (x, y, z))
+    data.box = FileBox(-0.5 * lengths, 0.5 * lengths, (x, y, z), frame.box.tilt)
     return data, (np.asarray(frame.pair, np.int64), frame.overlap)
 
 

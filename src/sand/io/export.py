@@ -56,9 +56,10 @@ def to_xyz(one: Exported) -> str:
     frame = one.frame
     periodic = " ".join("T" if v is not None else "F" for v in frame.box.lengths)
     own, units = own_columns(frame.own)
-    x, y, z = (v / ANGSTROM for v in frame.drawn)
+    x, y, z, tilt = (v / ANGSTROM for v in (*frame.drawn, frame.box.tilt))
     head = (
-        f'Lattice="{x:.17g} 0 0 0 {y:.17g} 0 0 0 {z:.17g}" Origin="{-x / 2:.17g} {-y / 2:.17g} {-z / 2:.17g}" '
+        f'Lattice="{x:.17g} 0 0 0 {y:.17g} 0 {tilt:.17g} 0 {z:.17g}" '
+        f'Origin="{-(x + tilt) / 2:.17g} {-y / 2:.17g} {-z / 2:.17g}" '
         "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:moment:R:3:spin:R:3:mass:R:1:charge:R:1"
         f"{own}:material:I:1:id:I:1:images:I:3:cluster:I:1{':virial:R:9' * len(one.virial)} "
         f'Time={frame.time!r} Step={frame.step} materials="{listed(one.materials)}" pbc="{periodic}" '
@@ -95,6 +96,9 @@ def to_lammps_dump(one: Exported) -> str:
     boundary = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     virial = "".join(f" d2_virial[{k}]" for k in range(1, 9 * len(one.virial) + 1))
     box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
+    if tilt := frame.box.tilt:  # the bounds of the parallelepiped, and its tilts
+        ends, boundary = 0.5 * (np.array(frame.drawn) + np.array([abs(tilt), 0.0, 0.0])), f"xy xz yz {boundary}"
+        box = "".join(f"{-v:.17g} {v:.17g} {own:.17g}\n" for v, own in zip(ends, (0.0, tilt, 0.0), strict=True))
     head = (
         f"ITEM: TIMESTEP\n{one.number}\n"
         f"ITEM: NUMBER OF ATOMS # {listed(one.materials)}\n{len(frame)}\n"
@@ -117,8 +121,10 @@ def to_lammps_data(one: Exported) -> str:
     """
     frame = one.frame
     box = "".join(
-        f"{-0.5 * v:.17g} {0.5 * v:.17g} {axis}lo {axis}hi\n" for v, axis in zip(frame.drawn, "xyz", strict=True)
+        f"{-0.5 * v - at:.17g} {0.5 * v - at:.17g} {axis}lo {axis}hi\n"
+        for v, at, axis in zip(frame.drawn, (0.5 * frame.box.tilt, 0.0, 0.0), "xyz", strict=True)
     )
+    box += f"0 {frame.box.tilt:.17g} 0 xy xz yz\n" if frame.box.tilt else ""
     density = np.asarray(frame.mass, np.float64) / (4.0 / 3.0 * np.pi * frame.radius**3)
     atoms = [one.material + 1, frame.position, 2.0 * frame.radius, density, frame.charge, frame.moment, frame.image]
     boundary = " ".join("p" if v is not None else "f" for v in frame.box.lengths)

@@ -62,9 +62,9 @@ class Frame:
             for name in ("overlap", "formed", "force", "slide", "roll", "twist", "share")
         )
         periodic, lengths = stored.log["periodic"].astype(bool), stored.log["lengths"]
-        x, y, z = (float(v) if on else None for v, on in zip(lengths, periodic, strict=True))
-        self.box = Box((x, y, z))
-        self.drawn = tuple(float(v) for v in lengths)
+        x, y, z = (float(v) if on else None for v, on in zip(lengths[:3], periodic, strict=True))
+        self.box = Box((x, y, z), float(lengths[3]) if len(lengths) > 3 else 0.0)  # the tilt, of a tilted box
+        self.drawn = tuple(float(v) for v in lengths[:3])
         """Side lengths of the box as drawn [m], open axes included."""
 
     def __getattr__(self, name: str) -> np.ndarray:
@@ -77,8 +77,7 @@ class Frame:
     @property
     def unwrapped(self) -> np.ndarray:
         """Positions (N, 3) [m] that jump at no periodic boundary, for displacements: position + image × length."""
-        lengths = [0.0 if length is None else length for length in self.box.lengths]
-        return self.position + self.image * np.array(lengths)
+        return self.position + self.box.shift(self.image)
 
     @property
     def virial(self) -> np.ndarray:

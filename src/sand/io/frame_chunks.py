@@ -112,7 +112,7 @@ def stored_frame(
         "bonds/overlap": contacts["overlap"],
         "bonds/formed": contacts["formed"],
         "bonds/force": np.ascontiguousarray(contacts["force"], np.float32),
-        "lengths": np.array(lengths, dtype=np.float64),
+        "lengths": np.array([*lengths, *[box.tilt] * bool(box.tilt)], dtype=np.float64),
         "bonds/slide": np.ascontiguousarray(contacts["slide_vector"], np.float32),
         "bonds/roll": np.ascontiguousarray(contacts["roll_vector"], np.float32),
         "bonds/twist": contacts["twist"].astype(np.float32),
@@ -129,7 +129,7 @@ def stored_frame(
         log[f"particles/{VIRIAL}"] = np.ascontiguousarray(virial.reshape(-1, 9), np.float32)
     if exact:
         log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
-    sides = np.array([*(np.array(lengths) / scale), 0.0, 0.0, 0.0], np.float32)
+    sides = np.array([*(np.array(lengths) / scale), 0.0, box.tilt / lengths[2], 0.0], np.float32)
     frame = SimpleNamespace(
         configuration=SimpleNamespace(step=step, box=sides),
         particles=particles,

@@ -139,8 +139,8 @@ def _check_array(name: str, array: np.ndarray, each: Array, sizes: dict[str, Any
                 sizes |= {USED: number, SIDES: 2 * number} if size == USED else {size: number}
     wanted = [sizes.get(size, "any") if isinstance(size, str) else size for size in shape]
     allowed = [size if isinstance(size, tuple) else (size,) for size in wanted]
-    if each.fewer is not None:
-        allowed[-1] = (each.fewer, *allowed[-1])
+    for other in (each.fewer, each.earlier):
+        allowed[-1] = allowed[-1] if other is None else (other, *allowed[-1])
     if len(array.shape) != len(shape) or any(n not in one for n, one in zip(array.shape, allowed, strict=True)):
         text = ", ".join(" or ".join(map(str, dict.fromkeys(one))) for one in allowed)
         raise BadInput(f"{name!r} has shape {array.shape}, not ({text})")

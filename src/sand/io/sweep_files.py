@@ -72,7 +72,7 @@ def cell_of(value: Any) -> Any:
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Names of the columns of rows that may have different ones, the last of which are `LAST`."""
-    names = dict.fromkeys(name for row in rows for name in row)
+    names = dict.fromkeys(name for row in rows for name in row) or [STATE]
     return [*(name for name in names if name not in LAST), *LAST]
 
 

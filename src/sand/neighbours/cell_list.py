@@ -19,7 +19,8 @@ from ..basics.arrays import CELLS_PER_GRAIN
 from ..basics.state import LISTED
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
-from ..numerics.flow import store_lengths
+from ..numerics.flow import store_box
+from ..numerics.kinds_of_box import unless_straight
 from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import dot, load, nearest_image, put, sub
 
@@ -86,6 +87,12 @@ def on_spacings(x, spacings):
     )
 
 
+@unless_straight(lambda nx, px, nz, span: (nx, px))
+def cells_along_x(nx, px, nz, span):
+    """Number of cells along x and cells per metre; one cell where images along z, displaced by the tilt, share one."""
+    return (nx, px) if nz > 1 else (1, span.inverse_x)
+
+
 @loop
 def choose_grid(anchor, span, reach):
     """Grid of cells at least `reach` wide, with at most CELLS_PER_GRAIN · N + 27 cells.
@@ -103,6 +110,7 @@ def choose_grid(anchor, span, reach):
         nx, lx, px = cells_on_axis(low[0], high[0], span.x, x)
         ny, ly, py = cells_on_axis(low[1], high[1], span.y, y)
         nz, lz, pz = cells_on_axis(low[2], high[2], span.z, z)
+        nx, px = cells_along_x(nx, px, nz, span)
         if nx * ny * nz <= CELLS_PER_GRAIN * anchor.shape[1] + 27 or max(nx, ny, nz) <= 3:
             subdivision = max(1, min(anchor.shape[1] // (nx * ny * nz), MAX_SUBDIVISION))
             width_y, width_z = 1.0 / py if py > 0.0 else 0.0, 1.0 / pz if pz > 0.0 else 0.0
@@ -187,6 +195,24 @@ def gap_on_axis(x, c, step, width):
     """Lower bound of the distance [m] between a coordinate, in units of cells, and the cell at distance `step`."""
     gap = c + 1.0 - x if step > 0 else x - c
     return max(0.0, gap - CELL_TOLERANCE) * width if step != 0 else 0.0
+
+
+def _moved(position, x, shifts, grid, span):
+    return (position[0], position[1] - shifts[0], position[2] - shifts[1]), x
+
+
+@unless_straight(_moved)
+def beside_neighbours(position, x, shifts, grid, span):
+    """Position [m], and coordinate x in units of cells, of a grain beside neighbours beyond faces; `shifts` along y, z.
+
+    In a tilted box, images beyond a face along z are displaced along x by the tilt, which is on the spacings as
+    coordinates are.  Where x is divided, the position is wrapped.
+    """
+    steps = np.rint(shifts[1] * span.inverse_z)
+    along = position[0] - steps * np.rint(span.tilt / grid.spacings[0]) * grid.spacings[0]
+    if grid.counts[0] > grid.subdivision:
+        along -= grid.periods[0] * np.rint(along * span.inverse_x)
+    return (along, position[1] - shifts[0], position[2] - shifts[1]), (along - grid.low[0]) * grid.per_length[0]
 
 
 class Centre(NamedTuple):
@@ -312,8 +338,8 @@ def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
             gap_y = gap_on_axis(x[1], cy, dy, grid.width_y)
             squared_half_width = squared_reach - gap_y * gap_y - gap_z * gap_z
             if ty >= 0 and tz >= 0 and squared_half_width > 0.0:
-                row = CellRow(x[0], (tz * ny + ty) * nx, squared_half_width)
-                shifted = position[0], position[1] - shift_y, position[2] - shift_z
+                shifted, along = beside_neighbours(position, x[0], (shift_y, shift_z), grid, span)
+                row = CellRow(along, (tz * ny + ty) * nx, squared_half_width)
                 centre = Centre(np.uint64(s), shifted, reach * reach)
                 used = append_cell_row(long_range, sorted_position, span, grid, centre, row, used)
                 if used == FULL:
@@ -344,7 +370,7 @@ def build_verlet_list(grains, long_range, count, span, search):
     """Build the Verlet list from the present positions; returns 0, or FULL."""
     for i in range(grains.mass.size):
         put(long_range.anchor, i, load(grains.position, i))
-    store_lengths(long_range.built, span)
+    store_box(long_range.built, span)
     if list_from_anchors(long_range, span, search.reach) == FULL:
         long_range.anchor[0, 0] = math.inf
         return FULL

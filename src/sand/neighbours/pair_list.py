@@ -11,7 +11,7 @@ from ..basics.state import INNER_COUNT, INNER_SKIN, PAIRS, REBUILT
 from ..compiler.jit import loop, rare
 from ..contact.law import ContactLaw
 from ..contact.pair_types import NO_PAIR_TYPE, pair_type_index, pair_type_loop
-from ..numerics.flow import store_lengths
+from ..numerics.flow import store_box
 from ..numerics.vec import dot, load, nearest_image, put, sub
 from .cell_list import FULL, Grid, append_neighbours, build_grid
 from .skin import SKIN_SAFETY
@@ -114,7 +114,7 @@ def pair_list_loop(law: ContactLaw, celled: bool) -> Callable:
             return FULL
         for i in range(grains.mass.size):
             put(pair_list.anchor, i, load(grains.position, i))
-        store_lengths(pair_list.built, span)
+        store_box(pair_list.built, span)
         count[REBUILT] += 1
         return found
 

@@ -85,7 +85,7 @@ def update_speeds(grains, pair_list):
 def largest_displacement(grains, anchor, built, span):
     """Largest distance [m] of a grain from its anchor; NaN for an anchor at infinity.
 
-    In a box that is deformed, the flow carries the anchors since the lengths of the box were `built`.  The displacement
+    In a box that is deformed, the flow carries the anchors since the box was `built` (lengths, tilt).  The displacement
     counts, not the length of the path: a grain that oscillates in an aggregate does not invalidate a list.
     """
     largest = float_bits(0.0)
@@ -105,7 +105,7 @@ def list_is_stale(grains, listed, span, limit, reach, skin, skin_index):
     Parameters
     ----------
     listed : PairList or LongRangeArrays
-        Its anchors (3, N) [m], and the lengths `built` (3,) of the box [m], are those when the list was built.
+        Its anchors (3, N), and the lengths and tilt `built` (4,) of the box [m], are those when the list was built.
     skin : ndarray
         Remaining skins; that of this list, with the index `skin_index`, is updated.
     """

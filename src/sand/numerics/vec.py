@@ -7,8 +7,10 @@ import math
 
 from ..basics import box
 from ..compiler.jit import formula
+from .kinds_of_box import unless_straight
 
-nearest_image = formula(box.nearest_image)  # `basics` does not need the compiler
+# `basics` does not need the compiler
+nearest_image = unless_straight(box.nearest_image)(box.nearest_image_tilted)
 
 
 @formula

@@ -139,6 +139,8 @@ def headline(grains: Any, box: Box, time: float, title: str = "") -> str:
 def _describe_box(box: Box) -> str:
     if box.is_open:
         return "open space"
+    if box.tilt:
+        return f"{_describe_box(Box(box.lengths))}, tilted by {format_si(box.tilt, 'm')}"
     if len(set(box.lengths)) == 1:
         return f"periodic cube of {format_si(box.shortest, 'm')}"
     return "periodic " + " × ".join("open" if v is None else format_si(v, "m") for v in box.lengths)

@@ -3,7 +3,7 @@
 from ..basics.initial_pairs import StrainedContacts
 from ..neighbours.spatial_sort import in_space_order
 from .aggregates import KINDS, build, chain, grain, hexagonal, lattice
-from .deposit import rbd
+from .deposit import deposit, rbd
 from .encounters import Encounter, encounter, turned, turned_at_random
 from .fractal import fractal
 from .from_frame import Start, from_frame
@@ -25,6 +25,7 @@ __all__ = [
     "bpca",
     "build",
     "chain",
+    "deposit",
     "dla",
     "dlca",
     "encounter",

@@ -1,4 +1,4 @@
-"""Compact spherical aggregates cut from a random ballistic deposit (RBD)."""
+"""Random ballistic deposits in a periodic column, and compact spherical aggregates cut from them (RBD)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.box import Box
+from ..basics.box import Box, least_side
 from ..basics.errors import BadInput
 from ..basics.grains import Grains
 from ..basics.material import Material
-from ._kernels.deposition import deposit
+from ..basics.units import format_quantity, si, whole_number
+from ..contact.jkr import rest_overlap, rest_radius
+from ._kernels.deposition import Ground, drop
 from .checks import largest_cluster
+from .from_frame import Start
 from .growing import CELL, empty_hash_grid, require_all_placed
 from .moments import assign_moments
 from .population import (
@@ -70,18 +73,94 @@ def rbd(
     for doublings in range(DOUBLINGS):
         spare = SPARE * 2**doublings
         heap, side = _deposit_grains(count, distribution, material, rng.population, spare)
-        columns = max(3, int(side / (CELL * heap.grain_set.largest)))
-        position, grid = np.zeros((3, len(heap.radius))), empty_hash_grid(heap.grain_set, side / columns)
-        done = deposit(grid, position, heap.grain_set, side, columns, rng.positions)
-        require_all_placed(done, len(heap.radius), f"grain {done} of the deposit")
-        kept = cut_sphere(position.T, heap.radius, count)
+        position = dropped(heap, side, heap.radius, 2, rng.positions)
+        kept = cut_sphere(position, heap.radius, count)
         if len(kept):
             break
     else:
         raise BadInput(f"no deposit contained a connected cluster of {count} grains; try another seed")
     kinds = [heap.material[k] for k in kept]
     cut = Population(heap.radius[kept], kinds, grain_set_of(heap.radius[kept], kinds))
-    return assign_moments(centred_grains(position.T[kept], cut), moment, moments, magnetic, rng.moments)
+    return assign_moments(centred_grains(position[kept], cut), moment, moments, magnetic, rng.moments)
+
+
+@checked
+def deposit(
+    grains: int, *, width: Any, radius: Any, material: Any, contacts: int = 1, moment: Any = None,
+    moments: str = "random", magnetic: Any = 1.0, seed: int = 0,
+) -> Start:  # fmt: skip
+    """A cake: a random ballistic deposit on a floor at z = 0, in a column that is periodic along x and y.
+
+    Grains fall along −z, one after another, and stick at the first touch of the floor or of another grain, periodic
+    images included; all contacts are at the equilibrium distance. Equal grains have a filling factor of about 0.15.
+    Grains that roll on after their first touch, `contacts` = 2 or 3, make denser deposits, of about 0.23 and 0.33, as
+    the aggregates BAM1 and BAM2 of Shen, Draine & Johnson (2008). The cake is one body by its floor alone.
+
+    Parameters
+    ----------
+    grains, radius, material, moment, moments, magnetic, seed
+        As for `bpca`.
+    width : float or str
+        Side of the column [m]; at least two diameters of the largest grain and one of the smallest.
+    contacts : int, optional
+        Number of contacts to which a grain that lands on another one rolls, if it can: 1, without rolling, 2 or 3.
+
+    Returns
+    -------
+    Start
+        Grains, and the box, which is open along z: arguments of `sand.Simulation`.
+
+    Raises
+    ------
+    BadInput
+        If an argument is invalid, or the column is too narrow.
+    """
+    side, rng = si(width, "m", "width", above=0.0), random_streams(seed)
+    most = whole_number(contacts, "contacts", 1, 3)
+    cake = population(grain_count(grains, "grains of a deposit"), radius, material, rng.population)
+    if side < (least := least_side(cake.radius)):
+        given, needed = (format_quantity(float(f"{v:.3g}"), "m") for v in (side, least))
+        raise BadInput(f"width = {given} is so narrow that grains could touch through two images; at least {needed}")
+    position = dropped(cake, side, _rest_heights(cake), most, rng.positions) - [0.5 * side, 0.5 * side, 0.0]
+    body = assign_moments(Grains(position, cake.radius, cake.material), moment, moments, magnetic, rng.moments)
+    return Start(body, None, Box((side, side, None)), f"a ballistic deposit on a floor at z = 0, seed {seed}")
+
+
+def _rest_heights(cake: Population) -> np.ndarray:
+    """Heights (N,) [m] at which grains rest on a floor of their own material, in the limit of an infinite sphere."""
+    of, radius = cake.grain_set, cake.radius
+    own = [(of.surface_energy[k, k], of.modulus[k, k]) for k in of.material]
+    return np.array(
+        [r - rest_overlap(rest_radius(gamma, r, modulus), r) for r, (gamma, modulus) in zip(radius, own, strict=True)]
+    )
+
+
+def dropped(heap: Population, side: float, floor: np.ndarray, contacts: int, seed: np.uint64) -> np.ndarray:
+    """Positions (N, 3) [m] of grains that fall on a periodic square 0 … `side`.
+
+    Parameters
+    ----------
+    heap : Population
+        The grains, in the order in which they fall.
+    side : float
+        Side of the square [m].
+    floor : ndarray
+        Heights (N,) at which they rest on the floor [m].
+    contacts : int
+        Number of contacts to which they roll.
+    seed : int
+        Seed of the random numbers.
+
+    Raises
+    ------
+    BadInput
+        If a grain finds no place.
+    """
+    columns, position = max(3, int(side / (CELL * heap.grain_set.largest))), np.zeros((3, len(heap.radius)))
+    grid = empty_hash_grid(heap.grain_set, side / columns)
+    done = drop(grid, position, heap.grain_set, Ground(side, columns, floor), contacts, seed)
+    require_all_placed(done, len(heap.radius), f"grain {done} of the deposit")
+    return position.T
 
 
 def _deposit_grains(

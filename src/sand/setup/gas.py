@@ -188,6 +188,8 @@ def gas_with_contacts(
 
 def _region(box: Box, extent: Any) -> Box:
     """Region that a gas fills: the box, with `extent` along its open axes.  Raises BadInput."""
+    if box.tilt:
+        raise BadInput("box: a gas cannot be placed in a tilted box; leave tilt out, and shear the box")
     if isinstance(extent, (list, tuple)) or dimensions(extent) == 1:
         given = [None if is_word(own, "periodic") else own for own in extent]
     else:
@@ -336,7 +338,7 @@ def scatter(radius: np.ndarray, region: Box, box: Box, rng: np.random.Generator)
         most = [0.5 * v - own - gap if opened else math.inf for v, opened in zip(lengths, is_open, strict=True)]
         for position, cell in itertools.islice(attempts, TRIES):
             inside = all(abs(x) <= end for x, end in zip(position, most, strict=True))
-            if inside and _is_free(position, own, gap, near.get(cell, ()), box.span):
+            if inside and _is_free(position, own, gap, near.get(cell, ()), Span(*box.span[:6])):
                 placed[i] = position
                 around = itertools.product(
                     *({(c + k) % m for k in (-1, 0, 1)} for c, m in zip(cell, sides, strict=True))

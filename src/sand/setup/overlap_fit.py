@@ -66,7 +66,7 @@ def fit_overlaps(position: np.ndarray, radius: np.ndarray, box: Box, pair: np.nd
 def scaled_box(box: Box, unit: float) -> Box:
     """The box with lengths in `unit` [m]."""
     x, y, z = (None if v is None else v / unit for v in box.lengths)
-    return Box((x, y, z))
+    return Box((x, y, z), box.tilt / unit)
 
 
 def deficit(place: np.ndarray, pair: np.ndarray, wanted: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray]:

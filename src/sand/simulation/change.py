@@ -240,7 +240,7 @@ class Change:
             raise BadInput("scale_box: the box is open")
         lengths = tuple(None if length is None else value * length for length in self.box.lengths)
         factors = np.array([1.0 if length is None else value for length in lengths])
-        moved, box = self.grains.copy(), Box(lengths)  # type: ignore[arg-type]
+        moved, box = self.grains.copy(), Box(lengths, value * self.box.tilt)  # type: ignore[arg-type]
         position = scaled_positions(self.grains, self._pairs(), self.box, factors)
         moved.arrays.position[...] = box.wrap(position).T
         # grains of clusters that lie across a boundary may come to lie on its other side

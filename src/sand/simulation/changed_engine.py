@@ -141,6 +141,12 @@ def changed_engine(
             f"forces: the ledger of this run has no column for {', '.join(without)}; give the force at the start, such "
             "as with a strength of 0, and change it then"
         )
+    for each in in_use(given):
+        if lacking := [name for name in each.columns() if name not in columns]:
+            raise BadInput(
+                f"{each.name}: the ledger of this run has no column for {', '.join(lacking)}; give it at the start, "
+                "such as shear = 0, and change it then"
+            )
     grains.arrays.material[...] = same.arrays.material  # materials are numbered anew
     # shapes of long-range arrays change if a force begins or ceases to act
     shapes = [[getattr(each.long_range, name).shape for name in SAVED_LONG_RANGE] for each in (state, new.state)]

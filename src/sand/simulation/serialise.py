@@ -53,7 +53,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
     lengths = ["open" if v is None else v for v in box.lengths]
     return {
         "run": {k: v for k, v in run.items() if v is not None and v != float("inf")},
-        "box": {} if box.is_open else {"periodic": lengths},
+        "box": {} if box.is_open else {"periodic": lengths} | ({"tilt": box.tilt} if box.tilt else {}),
         "grains": recipe,
         "materials": {
             m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials

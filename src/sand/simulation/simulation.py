@@ -317,8 +317,10 @@ class Simulation(ReadOnlySettings):
     @exclusive
     def strain_rate(self) -> np.ndarray:
         """Present rates of strain A (3, 3) [1/s] of the box: velocities in the laboratory are velocity + A position."""
-        cell = self.state.cell
-        return np.zeros((3, 3)) if cell is None else np.diag(cell.span[6:])
+        rates, cell = np.zeros((3, 3)), self.state.cell
+        if cell is not None:
+            rates[(0, 1, 2, 0), (0, 1, 2, 2)] = cell.span[[6, 7, 8, 10]]
+        return rates
 
     @property
     @exclusive

@@ -120,6 +120,7 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
         "step": frame.step,
         "time": frame.time,
         "box": [float(length / unit) for length in frame.drawn],
+        **({"tilt": frame.box.tilt / unit} if frame.box.tilt else {}),
     }
     arrays = {
         "position": frame.position / unit,

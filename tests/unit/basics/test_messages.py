@@ -78,6 +78,16 @@ to = 0.6
 by = "walls"
 [forces.contact]
 """
+ELASTIC = """
+[aggregate]
+kind = "lattice"
+shape = [4, 4, 4]
+radius = "0.1 um"
+material = "ice"
+[elastic]
+box = "800 nm"
+[forces.contact]
+"""
 SCATTERING = """
 [projectile]
 radius = "10 nm"
@@ -111,6 +121,7 @@ KINDS |= {
     table: (command, LOADING.replace("TABLE", table))
     for command, table in {"compress": "compression", "stretch": "stretch", "shear": "shear"}.items()
 }
+KINDS["elastic"] = ("elastic", ELASTIC)
 KINDS |= {"flight": ("scatter", SCATTERING), "measure": ("scatter", SCATTERING), "method": ("grow", ENCOUNTERS)}
 """Command and case of a use that begins with a change of this section; of other sections: `sand run` and CASE."""
 

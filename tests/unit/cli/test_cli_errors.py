@@ -42,7 +42,7 @@ def test_options_are_the_same_everywhere(name):
     assert ({"--json", "--quiet"} <= own.keys()) is (name not in WITHOUT_RESULTS)
     assert all(param.help for param in command.params if isinstance(param, click.Option))
     writes = {"new", "run", "build", "collide", "scatter", "analyse", "plot", "view", "export"}
-    writes |= {"compress", "stretch", "shear"}
+    writes |= {"compress", "stretch", "shear", "elastic"}
     assert ("--overwrite" in own) is (name in writes)  # grow and resume continue what is there
     if "--workers" in own:
         assert own["--workers"] is not None and "Number of worker processes" in str(own["--workers"].help)

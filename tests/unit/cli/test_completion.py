@@ -43,7 +43,10 @@ def completed(words, capsys, monkeypatch):
         (["run", "first/"], ["first/case.toml"]),
         (["info", ""], ["first", "first-again", "gas.toml", "other/"]),
         (["analyse", "first", "fi"], ["first", "first-again"]),
-        (["new", "x", "--for", ""], ["run", "collide", "scatter", "grow", "compress", "stretch", "shear", "sweep"]),
+        (
+            ["new", "x", "--for", ""],
+            ["run", "collide", "scatter", "grow", "compress", "stretch", "shear", "elastic", "sweep"],
+        ),
         (["plot", "first", "--dp"], ["--dpi"]),
         (["run", "x", "--until", "1kg", "--import", "nowhere", "--over"], ["--overwrite"]),
         (["completion", ""], list(SHELLS)),

@@ -107,6 +107,11 @@ EXPECTED = {
 for _table, _kind in (("compression", "compress"), ("shear", "shear")):
     _case, _results = FOLDERS["stretch"]
     FOLDERS[_kind], EXPECTED[_kind] = (_case.replace("[stretch]", f"[{_table}]"), _results), EXPECTED["stretch"]
+NOTHING = "holds nothing that was computed by sand run, collide, grow, scatter,"
+_case, _results = FOLDERS["stretch"]
+_elastic = _case.partition("[stretch]")[0] + f"[elastic]\ncompress_to = 0.5\nseeds = [1, 2, 3]\n{CONTACT}"
+FOLDERS["elastic"] = _elastic, _results
+EXPECTED["elastic"] = [*EXPECTED["stretch"][:2], "compress to = 0.5", "density = 7874 kg/m^3"]
 OF_FORCES = [
     "the JKR law (Johnson et al. 1971), with critical damping",
     "slide factor = 2.5, roll factor = 8",
@@ -227,11 +232,11 @@ def test_settings_of_every_force():
         (lambda place: place / "none", "there is no folder"),
         (
             lambda place: place,
-            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
+            f"{NOTHING} compress, stretch, shear, elastic, sweep",
         ),
         (
             lambda place: (place / "case.toml").write_text(RUN, "utf-8") and place,
-            "holds nothing that was computed by sand run, collide, grow, scatter, compress, stretch, shear, sweep",
+            f"{NOTHING} compress, stretch, shear, elastic, sweep",
         ),
         (
             lambda place: folder_of(place / "x", "[sweep]\nseeds = 1", {}),

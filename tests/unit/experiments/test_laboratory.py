@@ -1,6 +1,7 @@
 """Packings that are compressed, stretched and sheared: start, rates, table, figure and jobs."""
 
 import csv
+import itertools
 import json
 import math
 from types import SimpleNamespace
@@ -82,6 +83,18 @@ def test_the_lid_moves_as_it_is_told():
         assert found.until == pytest.approx(0.5 * found.sides[2], rel=1e-12, abs=0.0)
 
 
+def test_a_box_that_is_sheared():
+    """Images above slide at the rate times the side along z; the sides stay, and rows are 0.02 of strain apart."""
+    found = plan(PACKING, Loading("shear", "1e4 1/s", to=1.5))
+    law = found.moved["deformation"]
+    assert law.shear == 1e4 and set(law.rate) == {0.0}
+    assert found.until == pytest.approx(1.5e-4, rel=1e-12, abs=0.0)
+    assert found.row_every == pytest.approx(2e-6, rel=1e-12, abs=0.0)
+    assert found.rate_ratio(found.sides) == pytest.approx(
+        1e4 * found.sides[2] / found.scales.largest_rate(found.filling(found.sides), 1.0), rel=1e-12, abs=0.0
+    )
+
+
 def test_ratio_to_the_largest_rate():
     """Rate × L / (0.3 √(3E_roll/(r³ρ)) φ) at the start; between walls the speed stays, so that it falls as 1/φ."""
     found, scales = plan(PACKING, walls()), packing_scales(ICE, 1e-7)
@@ -97,7 +110,7 @@ def test_ratio_to_the_largest_rate():
 
 
 def test_rows_of_a_constant_pressure():
-    """Work P A Δz of the lid between two rows is the stress P; rows are kept where ln φ has grown by 0.02."""
+    """The impulse P A Δt on a wall between two rows is the stress P; rows are kept where ln φ has grown by 0.02."""
     found = plan(PACKING, walls(rate="0.1 m/s"))
     area, gap, pressure = 1e-12, float(found.sides[2]), 700.0
     floor = found.moved["walls"][0].point[2]
@@ -105,11 +118,14 @@ def test_rows_of_a_constant_pressure():
     for k in range(40):
         height = gap * (1 - 0.01 * k)
         row = {"time": 0.01 * k * gap / 0.1, "step": k, "contacts": 54 + k, "lost_rolling": 0.0, "lost_walls": 0.0}
-        row |= {"lost_walls": -pressure * area * (gap - height), "floor_position": floor}
-        ledger.append(row | {"lid_position": -(floor + height)})
+        impulse = pressure * area * row["time"]
+        row |= {"lid_impulse_x": 0.0, "lid_impulse_z": impulse, "floor_impulse_z": -1.01 * impulse}
+        ledger.append(row | {"floor_position": floor, "lid_position": -(floor + height)})
     table = table_of(found, ledger, Percolation())
     assert math.isnan(table[0]["stress"]) and len(table) > 10
     assert [row["stress"] for row in table[1:]] == pytest.approx([pressure] * (len(table) - 1), rel=1e-9, abs=0.0)
+    for name, factor in (("mean_pressure_lid", 1.0), ("mean_pressure_floor", 1.01)):
+        assert table[5][name] == pytest.approx(factor * pressure, rel=1e-9, abs=0.0)
     assert (np.diff(np.log([row["filling"] for row in table]))[:-1] >= 0.02 * (1 - 1e-3)).all()
     assert table[-1]["step"] == 39
     assert table[3]["coordination"] == pytest.approx(2 * (54 + table[3]["step"]) / 27, rel=1e-12, abs=0.0)
@@ -138,32 +154,18 @@ def test_the_cluster_that_percolates():
 # --- runs ------------------------------------------------------------------------------------------------------------
 
 
-class Impulses(sand.Observer):
-    """Impulse that the lid has received, by time."""
-
-    def __init__(self):
-        self.found = {}
-
-    def see(self, simulation, row):
-        self.found[row["time"]] = simulation.walls[1].impulse
-
-
 @pytest.mark.compiled("contacts")
 @pytest.mark.filterwarnings("ignore:the rate,")
-@pytest.mark.parametrize(
-    ("kind", "to", "axis", "sign"), [("compress", 0.3, 2, 1), ("stretch", 0.4, 2, -1), ("shear", 0.4, 0, -1)]
-)
-def test_stress_between_walls_is_the_impulse_of_the_lid(kind, to, axis, sign):
-    """Work over way is, at constant speed, the mean force: the impulse of the grains on the lid over the time.
+@pytest.mark.parametrize(("kind", "to"), [("compress", 0.3), ("stretch", 0.4), ("shear", 0.4)])
+def test_stress_between_walls_is_the_work_of_the_lid(kind, to):
+    """The mean force, impulse over time, is at constant speed the work of the lid over its way.
 
     Both are sums over the same steps, by another road: rounding alone is left.
     """
-    seen = Impulses()
     body = sand.setup.rbd(12, radius="0.1 um", material="ice", seed=1)
-    found = load(body, Loading(kind, "1 m/s", to, by="walls"), observers=[seen], seed=1)
-    times = [row["time"] for row in found.table]
-    impulse = np.array([seen.found[time] for time in times])[:, axis]
-    mean = sign * np.diff(impulse) / np.diff(times) / (found.plan.sides[0] * found.plan.sides[1])
+    found = load(body, Loading(kind, "1 m/s", to, by="walls"), seed=1)
+    work, times = (np.array([row[name] for row in found.table]) for name in ("lost_walls", "time"))
+    mean = -np.diff(work) / np.diff(times) / (found.plan.sides[0] * found.plan.sides[1])
     stress = np.array([row["stress"] for row in found.table[1:]])
     assert len(stress) > 5
     assert stress == pytest.approx(mean, rel=1e-9, abs=1e-9 * np.abs(mean).max())
@@ -174,6 +176,150 @@ def test_stress_between_walls_is_the_impulse_of_the_lid(kind, to, axis, sign):
     content = found.to_dict()
     assert content["stress"] == last["stress"] and len(content["table"]["filling"]) == len(found.table)
     assert abs(content["drift"]) < 1e-3
+
+
+# --- a cake, and a lid with a pressure -------------------------------------------------------------------------------
+
+
+DAMPED = [sand.Contact(damping="critical")]
+
+
+def cake(grains=12):
+    """A deposit of grains of ice on a floor."""
+    return sand.setup.deposit(grains, width="0.7 um", radius="0.1 um", material="ice", seed=3)
+
+
+def pressed(pressure="10 kPa", until="1 us", kind="compress", **changes):
+    """How a cake is loaded by a pressure."""
+    return Loading(kind, by="walls", pressure=pressure, until=until, **changes)
+
+
+@pytest.mark.compiled("small")
+def test_a_cake_is_one_body_by_the_floor():
+    """Trees of a deposit stand on the floor, which is at z = 0; a grain that touches neither is named."""
+    start = cake(40)
+    found = plan(start, pressed())
+    assert found.moved["walls"][0].point[2] == pytest.approx(0.0, abs=1e-18)
+    assert found.start is start and found.sides[:2] == pytest.approx([7e-7, 7e-7], rel=1e-12, abs=0.0)
+    between = start.grains.copy()
+    between.arrays.position[2, np.argsort(between.position[:, 2])[20:]] += 5e-8
+    with pytest.raises(sand.BadInput, match=r"the body: grain \d+ .*has no contact with the rest"):
+        plan(start._replace(grains=between), pressed())
+    with pytest.raises(sand.BadInput, match="open along z; it must be periodic along x, y, z; by = 'walls' loads"):
+        plan(start, Loading("compress", "1e-4 /t_c", 0.4))
+    with pytest.raises(sand.BadInput, match=r"box: the packing has its own, .*; leave box out"):
+        plan(start, pressed(box="2 um"))
+
+
+@pytest.mark.compiled("small")
+def test_loads_that_follow_one_another():
+    """P(t) = P₀ (P₁/P₀)^(t/T) between two pressures, to half of the largest step of the ramp, 5 %/20, and its chord.
+
+    The chord of an exponential over ln 1.05 is above it by (ln 1.05)²/8 = 0.03 %.  The mass is that of all grains.
+    """
+    found = plan(cake(), pressed(["1 kPa", "20 kPa", "5 kPa"], "4 us"))
+    lid, area = found.moved["walls"][1], 4.9e-13
+    assert lid.mass == pytest.approx(float(found.start.grains.mass.sum()), rel=1e-12, abs=0.0)
+    assert lid.velocity == (0.0, 0.0, 0.0)
+    for time in np.linspace(0.0, 3.999e-6, 30):
+        wanted = 1e3 * 20 ** (time / 2e-6) if time < 2e-6 else 2e4 * 0.25 ** ((time - 2e-6) / 2e-6)
+        assert lid.ramps["force"].at(time) == pytest.approx(wanted * area, rel=0.002, abs=0.0)
+    assert found.until == 4e-6 and found.row_every == pytest.approx(8e-8, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.compiled("small")
+def test_rest_under_a_constant_load():
+    """At rest once φ has changed by less than 1e-4 in a tenth of the time; not in the first rows, nor as it grows."""
+    found = plan(cake(), pressed("10 kPa", "10 us"))
+    floor, gap = found.moved["walls"][0].point[2], float(found.sides[2])
+
+    def rows(ends):
+        return [
+            {"time": 2e-7 * k, "floor_position": floor, "lid_position": -floor - gap * end}
+            for k, end in enumerate(ends)
+        ]
+
+    falling, still = list(np.linspace(1.0, 0.9, 20)), [0.9 - 1e-5 * (k % 3) for k in range(9)]
+    assert not laboratory.at_rest(found, rows(still[:4]))
+    assert not laboratory.at_rest(found, rows(falling)) and not laboratory.at_rest(found, rows(falling + still[:4]))
+    assert laboratory.at_rest(found, rows(falling + still))
+
+
+@pytest.mark.compiled("contacts")
+def test_a_constant_load_ends_at_rest():
+    """Before `until` the grains bear the load, to 1 %; a run that had ended takes no step if it is continued."""
+    found = load(cake(), pressed("10 kPa", "10 us"), forces=DAMPED, seed=1)
+    steps = found.simulation.steps
+    assert found.simulation.time < 1e-5 and laboratory.at_rest(found.plan, found.simulation.ledger.rows)
+    assert found.table[-2]["mean_pressure_floor"] == pytest.approx(1e4, rel=0.01, abs=0.0)
+    again = laboratory.run_to_end(found.plan, found.simulation)
+    assert again.simulation.steps == steps and len(again.table) == len(found.table)
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.parametrize("pressure", ["10 kPa", ["5 kPa", "20 kPa"]])
+def test_work_and_momentum_of_a_lid_with_a_pressure(pressure):
+    """A lid pressed by P A: its momentum gives the mean pressure of the grains on it, the way of the lid the work.
+
+    M v = ∫(P_lid − P) A dt along +z, for constant P; the work of the force less the kinetic energy of the lid is
+    −lost_walls, P A (z₀ − z) for constant P, and between the extreme pressures for a ramp.
+    """
+    found = load(cake(30), pressed(pressure), forces=DAMPED, seed=1)
+    table, last, lid = found.table, found.table[-1], found.simulation.walls[1]
+    area, loads = found.plan.sides[0] * found.plan.sides[1], found.plan.loading.pressure
+    mass = float(found.simulation.grains.mass.sum())
+    times = np.diff([row["time"] for row in table])
+    impulse = area * float(times @ [row["mean_pressure_lid"] for row in table[1:]])
+    kinetic, way = 0.5 * mass * lid.velocity[2] ** 2, float(found.plan.sides[2] - last["side_z"])
+    assert way > 1e-8 and last["filling"] > table[0]["filling"] and abs(found.to_dict()["drift"]) < 1e-3
+    work = -last["lost_walls"] + kinetic
+    if len(loads) == 1:
+        given = loads[0] * area * last["time"]
+        assert impulse - given == pytest.approx(mass * lid.velocity[2], abs=1e-9 * given)
+        assert work == pytest.approx(loads[0] * area * way, rel=1e-9, abs=0.0)
+    else:
+        assert loads[0] * area * way < work < loads[1] * area * way
+        assert last["mean_pressure_lid"] == pytest.approx(loads[1], rel=0.05, abs=0.0)
+    assert [row["stress"] for row in table[1:]] == [row["mean_pressure_lid"] for row in table[1:]]
+
+
+@pytest.mark.compiled("contacts")
+@pytest.mark.filterwarnings("ignore:the rate,")
+def test_shear_under_a_pressure():
+    """The lid slides with its speed v_x while P holds it: −lost_walls = Σ τ A v_x Δt + P A (z₀ − z) − ½ M v_z².
+
+    τ comes from the impulse along x, the work from the sum over steps; its height is free.
+    """
+    found = load(cake(30), pressed("10 kPa", None, "shear", rate="1 m/s", to=0.3), forces=DAMPED, seed=1)
+    table, last, lid = found.table, found.table[-1], found.simulation.walls[1]
+    area, mass = found.plan.sides[0] * found.plan.sides[1], float(found.simulation.grains.mass.sum())
+    times = np.diff([row["time"] for row in table])
+    sheared = float(times @ [row["stress"] for row in table[1:]]) * area * 1.0
+    along = 1e4 * area * float(found.plan.sides[2] - last["side_z"]) - 0.5 * mass * lid.velocity[2] ** 2
+    assert -last["lost_walls"] == pytest.approx(sheared + along, rel=1e-9, abs=1e-9 * abs(along))
+    assert last["strain"] == pytest.approx(0.3, rel=1e-9, abs=0.0)
+    assert last["filling"] != table[0]["filling"] and sheared != 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"by": "box"}, "pressure is for by = 'walls'; a periodic box follows a pressure in a case of `sand run`"),
+        ({"kind": "stretch", "rate": "1 m/s", "to": 0.1}, "pressure presses the lid"),
+        ({"kind": "shear", "pressure": ["1 kPa", "2 kPa"], "until": None, "rate": "1 m/s", "to": 1}, "shear takes one"),
+        ({"until": None}, "until is missing; add it, for example until = '100 us'"),
+        ({"to": 0.4}, "to is not used by compress with a pressure, which has until; leave it out"),
+        ({"pressure": 1e3, "rate": "1 m/s"}, "rate is not used by compress with a pressure"),
+        ({"pressure": None, "rate": "1 m/s"}, "to is missing; add it, for example to = 0.4"),
+        ({"pressure": "5 N"}, "pressure = '5 N'"),
+        ({"pressure": []}, r"pressure = \[\] has no pressure"),
+        ({"pressure": ["1 kPa", -1]}, r"pressure\[1\] = -1 must be above 0"),
+    ],
+)
+def test_errors_of_a_pressure(given, message):
+    """One line each: what is not used or missing, and what to do."""
+    with pytest.raises(sand.BadInput, match=message):
+        Loading(**({"kind": "compress", "by": "walls", "pressure": "1 kPa", "until": "1 us"} | given))
 
 
 @pytest.mark.draws
@@ -199,6 +345,25 @@ def test_stress_in_a_box_is_the_mean_of_its_axes(kind):
     assert last["filling" if compressed else "strain"] == pytest.approx(0.2, rel=1e-4, abs=0.0)
     factors = [last[f"side_{axis}"] / side for axis, side in zip("xyz", sides, strict=True)]
     assert factors[1:] == pytest.approx([factors[0]] * 2 if compressed else [1.0] * 2, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.compiled("shear")
+@pytest.mark.filterwarnings("ignore:the rate,")
+def test_shear_stress_of_a_box():
+    """Σ τ V Δγ over the rows is what the packing gained and lost: by energies alone, without the work of the box.
+
+    The ledger closes to 1 %: the flow meets the dashpots of a body that begins at rest within one step. The strain is
+    rate × time.
+    """
+    body = sand.setup.rbd(12, radius="0.1 um", material="ice", seed=1)
+    found = load(body, Loading("shear", "5e6 1/s", 1.2, every=0.05), forces=[sand.Contact(damping="critical")], seed=1)
+    rows, ledger = found.table, found.simulation.ledger.rows
+    volume = float(np.prod(found.plan.sides))
+    done = sum(b["stress"] * volume * (b["strain"] - a["strain"]) for a, b in itertools.pairwise(rows))
+    gained = [row["total"] - row["lost_box"] for row in (ledger[0], ledger[-1])]
+    assert done == pytest.approx(gained[1] - gained[0], rel=1e-2, abs=0.0) and done > 0.0
+    assert rows[-1]["strain"] == pytest.approx(1.2, rel=1e-6, abs=0.0) and len(rows) > 20
+    assert rows[-1]["filling"] == rows[0]["filling"] and {"tilt", "lost_rolling"} <= rows[-1].keys()
 
 
 def test_scales_are_those_of_the_contacts():
@@ -322,7 +487,7 @@ def outcome(seed, kind="compress", noise=0.0):
         "share_twisting": 0 * phi,
         "rate_ratio": 0.1 / phi,
     }
-    scales = {"kind": kind, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
+    scales = {"kind": kind, "largest_load": 0.0, "grains": 512, "roll_energy": 4.74e-16, "pressure_scale": 4.74e5}
     scales |= {"filling_at_start": 0.1, "surface_energy": 0.1, "radius": 1e-7, "largest_at_end": kind == "stretch"}
     return {"seed": seed, "table": {name: column.tolist() for name, column in table.items()}} | scales
 
@@ -381,6 +546,24 @@ def test_a_tension_that_still_rises(kind, end, text):
     assert content["largest_stress"] == max(4e3, 1e3 * end) and content["largest_at_end"] == (end == 5.0)
     ((_, said),) = run_rows([content | {"seed": 1}])
     assert text in said
+
+
+def test_figure_of_a_load():
+    """Under a load φ is also drawn over time; P(φ) of the rows in which φ is larger than in all before."""
+    run = outcome(1)
+    table = {name: np.array(column) for name, column in run["table"].items()}
+    phi, number = table["mean_filling"].copy(), np.arange(40.0)
+    order = np.concatenate([number, number[20:30]]).astype(int)  # expands again from row 40 on
+    table = {name: column[order] for name, column in table.items()} | {"time": np.arange(50.0), "filling": phi[order]}
+    run |= {"largest_load": 1e4, "table": {name: column.tolist() for name, column in table.items()}}
+    over_time, stress = laboratory_figure([run]).axes[:2]
+    assert over_time.get_lines()[0].get_ydata() == pytest.approx(phi[order][1:], rel=1e-12, abs=0.0)
+    x, y = stress.get_lines()[0].get_data()
+    slow = x > 0.1  # points of rows that are too fast are drawn apart
+    assert y[slow] == pytest.approx(5e5 * x[slow] ** 3, rel=2e-2, abs=0.0)
+    assert x[-1] == pytest.approx(phi[-1], rel=1e-9, abs=0.0)
+    x, y = laboratory_figure([run | {"kind": "shear"}]).axes[0].get_lines()[0].get_data()
+    assert x == pytest.approx(3 * y, rel=1e-12, abs=0.0)  # the strain of these rows is 3φ
 
 
 def test_rows_have_their_seed():

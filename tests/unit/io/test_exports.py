@@ -384,3 +384,40 @@ def test_the_time_of_a_dump(tmp_path, units, seconds):
     (tmp_path / "d").write_text(f"ITEM: UNITS\n{units}\n" + snapshot.format(0.25, 1) + snapshot.format(0.5, 2))
     times = [read_grains(tmp_path / "d", sand.SILICA, frame=k).time for k in (0, 1)]
     assert times == pytest.approx([0.25 * seconds, 0.5 * seconds], rel=1e-15, abs=0.0)
+
+
+def test_tilted_boxes_in_files(tmp_path):
+    """Frames with and without a tilt: the box of SAND is exact; GSD, XYZ and LAMMPS files have the same lattice.
+
+    a1 = (L_x, 0, 0), a2 = (0, L_y, 0), a3 = (T, 0, L_z), about the origin; GSD has T/L_z, LAMMPS the bounds of the
+    parallelepiped in a dump, and its sides in a data file.
+    """
+    grains = sand.Grains([[0, 0, 0], [1e-7, 0, 2e-7]], "20 nm", sand.ICE)
+    boxes = [Box.periodic(5e-7, 6e-7, 7e-7, tilt=tilt) for tilt in (0.0, 1.2e-7, -2e-7)]
+    path, writer = tmp_path / "a.gsd", TrajectoryWriter(tmp_path / "a.gsd")
+    for k, box in enumerate(boxes):
+        writer.write(10 * k, 1e-9 * k, grains, box, contacts_of(grains))
+    writer.close()
+    frames = list(Frames(path))
+    assert [frame.box for frame in frames] == boxes
+    with gsd.hoomd.open(path) as file:
+        for k, tilt in ((1, 1.2e-7), (2, -2e-7)):
+            sides = file[k].configuration.box[:3] * 20e-9
+            assert file[k].configuration.box[4] == pytest.approx(tilt / 7e-7, rel=1e-6, abs=0)
+            assert sides == pytest.approx([5e-7, 6e-7, 7e-7], rel=1e-6, abs=0)
+    texts = {}
+    for form in ("xyz", "lammps-dump", "lammps-data"):
+        made = export_frames(frames[1:2], tmp_path / form, form, lambda number, pair: np.arange(2))
+        texts[form] = made[0].read_text(encoding="utf-8")
+    lattice, origin = (
+        [float(v) for v in re.search(rf'{name}="([^"]*)"', texts["xyz"])[1].split()] for name in ("Lattice", "Origin")
+    )
+    assert lattice == pytest.approx([5000, 0, 0, 0, 6000, 0, 1200, 0, 7000], rel=1e-12, abs=0)
+    assert origin == pytest.approx([-3100, -3000, -3500], rel=1e-12, abs=0)
+    bounds = re.search(r"BOX BOUNDS xy xz yz pp pp pp\n(.*)\n(.*)\n(.*)\n", texts["lammps-dump"]).groups()
+    expected = [[-3.1e-7, 3.1e-7, 0], [-3e-7, 3e-7, 1.2e-7], [-3.5e-7, 3.5e-7, 0]]
+    for line, one in zip(bounds, expected, strict=True):
+        assert [float(v) for v in line.split()] == pytest.approx(one, rel=1e-12, abs=0)
+    assert re.search(r"^-3\.1\d*e-07 1\.89*\d*e-07 xlo xhi$", texts["lammps-data"], re.MULTILINE)
+    tilts = re.search(r"^0 (\S+) 0 xy xz yz$", texts["lammps-data"], re.MULTILINE)
+    assert float(tilts[1]) == pytest.approx(1.2e-7, rel=1e-12, abs=0)

@@ -87,6 +87,24 @@ def test_many_grains_in_thin_cells(lengths, reach):
 
 
 @pytest.mark.compiled("small")
+@pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (0.5, 0.5, 4.0), (4.0, 0.5, 0.5), (0.3, 1.0, 1.3)])
+@pytest.mark.parametrize("share", [0.5, -0.31, 0.04])
+def test_lists_in_tilted_boxes(lengths, share):
+    """All pairs by nearest images, also where one or two axes are a single cell; coordinates on faces, and clumps."""
+    rng = np.random.default_rng(7)
+    box, sides = Box(lengths, share * lengths[0]), np.array(lengths)
+    spread, clumps = (rng.random((400, 3)) - 0.5) * sides, (rng.random((10, 3)) - 0.5) * sides
+    edges = np.stack(np.meshgrid(*[[-0.5, 0.0, 0.5 - 1e-16]] * 3), -1).reshape(-1, 3) * sides * (1.0 - 1e-9)
+    position = np.concatenate([spread, clumps[rng.integers(10, size=400)] + rng.normal(0, 0.02, (400, 3)), edges])
+    position = box.wrap(position)
+    apart = box.nearest(position[:, None] - position[None])
+    for reach in (0.05, 0.14):
+        close = (apart**2).sum(axis=-1) < reach**2
+        np.fill_diagonal(close, False)
+        assert (rows(position, box, reach) == close).all() and close.any()
+
+
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.0), (0.7, 0.7, 0.7)])
 @pytest.mark.parametrize("cells_across", [3, 4, 11])
 def test_lists_are_symmetric(lengths, cells_across):

@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from sand.io.trajectory import Frames
+from sand.basics.box import Box
+from sand.io.trajectory import Frames, TrajectoryWriter
 from sand.viewer.packets import encode, frame_bytes, frame_packet, grains_packet
 
 from ..pages import decode
-from ..synthetic_trajectories import write_trajectory
+from ..synthetic_trajectories import contacts_of, grains_of, write_trajectory
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +71,13 @@ def test_headers_are_json():
     """A header never contains NaN, which is not JSON."""
     packet = encode({"time": np.nan}, {"a": np.arange(6.0)})
     assert json.loads(packet[12 : 12 + int.from_bytes(packet[8:12], "little")])["time"] is None
+
+
+def test_the_tilt_of_a_box(tmp_path):
+    """In units of lengths, of tilted boxes alone."""
+    grains, writer = grains_of(3), TrajectoryWriter(tmp_path / "a.gsd")
+    for k, tilt in enumerate((0.0, -2e-7)):
+        writer.write(k, 1e-9 * k, grains, Box.periodic("1 um", tilt=tilt), contacts_of([]))
+    writer.close()
+    heads = [decode(frame_packet(0, frame, np.zeros(3), 1e-8))[0] for frame in Frames(tmp_path / "a.gsd")]
+    assert "tilt" not in heads[0] and heads[1]["tilt"] == pytest.approx(-20.0, rel=1e-12, abs=0)

@@ -62,6 +62,7 @@ class FileBox(NamedTuple):
     low: np.ndarray  # (3,)
     high: np.ndarray  # (3,)
     periodic: tuple[bool, bool, bool]
+    tilt: float = 0.0  # displacement along x of the image one length beyond along z
 
 
 @dataclass
