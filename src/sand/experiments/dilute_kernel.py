@@ -64,5 +64,6 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
         if len(encounters) > 1:
             apart = (hits - value * weight).std(axis=0, ddof=1) * math.sqrt(len(encounters))
             error = np.maximum(apart / weight.sum(axis=0), error)
-    upper = [np.triu(each) + np.triu(each, 1).T for each in (value, error, hits.sum(axis=0), draws.sum(axis=0))]
-    return Kernel(bounds.astype(int), *upper, grains / np.maximum(bodies, 1.0))
+    total = value, error, hits.sum(axis=0), draws.sum(axis=0)
+    both = [np.triu(each) + np.triu(each, 1).T for each in total]
+    return Kernel(bounds.astype(int), both[0], both[1], both[2], both[3], grains / np.maximum(bodies, 1.0))
