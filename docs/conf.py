@@ -33,7 +33,7 @@ source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
 nitpicky = True
 # aliases of types of other packages, whose pages would be needed to link them
-nitpick_ignore_regex = [("py:class", r"(collections|numpy|typing)\..*")]
+nitpick_ignore_regex = [("py:class", r"(collections|numpy|pathlib|typing)\..*")]
 
 # Docstrings name types, shapes and units in words, so annotations stay out of the signatures.
 autodoc_typehints = "none"

@@ -19,6 +19,7 @@ import sand
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.experiments.collision_case import read_collision
+from sand.experiments.growth_case import read_growth
 from sand.experiments.laboratory_case import read_laboratory
 from sand.experiments.scattering import sampling
 from sand.experiments.scattering.scatter_case import read_scattering
@@ -31,7 +32,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda p: p.name)
 def test_case_files_are_valid(path):
     """Each is read by the command named in its first comment."""
-    reads = {"run": read_case, "grow": read_case, "collide": read_collision, "scatter": read_scattering}
+    reads = {"run": read_case, "grow": read_growth, "collide": read_collision, "scatter": read_scattering}
     reads |= {"sweep": SweepJob, "compress": partial(read_laboratory, command="compress")}
     reads |= {"elastic": partial(read_laboratory, command="elastic")}
     comment = path.read_text().split("[", 1)[0]

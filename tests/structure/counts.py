@@ -41,6 +41,8 @@ CAPABILITIES = {
     "cakes, that is ballistic deposits in a periodic column; a lid with a given load, forces on walls that are ramps; "
     "figure of a cake between walls": 268,
     "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 720,
+    "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
+    "filled again, populations as runs, charges, a field, kernel": 1933,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

@@ -70,10 +70,16 @@ def _collision_case(path: Path, start: tuple[str, str]) -> Description:
 
 def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     from ..config.case import check_case
+    from ..experiments.dilute_case import describe_population, is_dilute
     from ..experiments.growth_case import DEFAULT_SEEDS, read_growth
 
     content, given = read_growth(path)
     seeds = given or DEFAULT_SEEDS
+    if is_dilute(content):
+        with naming(path):
+            rows, numbers = describe_population(content, seeds[0])
+        of_all = ("populations", f"{len(seeds)} of {rows.pop(0)[1]}")
+        return "a valid case of growth in dilute dust", [of_all, *rows, start], {"kind": "growth case", **numbers}
     case = check_case(content, "")
     with naming(path):
         simulation = simulation_of(case, None)

@@ -58,6 +58,8 @@ def describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: re
             numbers = f"{found['done']} of {found['runs']} done, {found['failed']} failed"
             rows = [("state", f"finished: {numbers}"), *rows, ("draw with", f"sand plot {shlex.quote(str(path))}")]
             return name, rows, content | {"finished": True} | found
+    if job_command == "grow" and (path / files.ENCOUNTERS).exists():
+        return _describe_population(path, rows, content)
     if job_command == "grow":
         ends = [files.read_json(summary).get("outcome") for summary in path.glob(f"seed-*/{files.SUMMARY}")]
         rows.append(("boxes", f"{ends.count('finished')} finished"))
@@ -65,3 +67,14 @@ def describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: re
             rows = [("state", "finished"), *rows, ("measure with", f"sand analyse {shlex.quote(str(path))}")]
             return name, rows, content | {"finished": True} | files.read_json(path / files.GROWTH)
     return name, [("state", "running, or interrupted"), *rows, ("continue with", report.resume_line(path))], content
+
+
+def _describe_population(path: Path, rows: report.Rows, content: dict[str, Any]) -> Description:
+    """Describe one population of encounters."""
+    ended = (path / files.SUMMARY).exists()
+    found = files.read_json(path / files.SUMMARY) if ended else {}
+    names = {"mean_cluster_size": "S", "number_ratio": "n/n0", "hits": "hits", "flights": "flights", "time": "time [s]"}
+    state = str(found["outcome"]) if ended else "running, or interrupted"
+    own = [(name, f"{found[key]:.4g}") for key, name in names.items() if ended]
+    last = ("continue with", report.resume_line(path))
+    return "a population of encounters", [("state", state), *rows, *own, last], content | {"finished": ended} | found

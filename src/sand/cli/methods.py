@@ -160,9 +160,21 @@ def _radii(folder: Path) -> str:
 
 def _of_growth(folder: Path, path: Path) -> Sentences:
     from ..config.case import check_case
+    from ..experiments.dilute_case import check_dilute, is_dilute
     from ..experiments.growth_case import DEFAULT_SEEDS, read_growth
 
     content, seeds = read_growth(path)
+    if is_dilute(content):
+        checked = check_dilute(content, str(path))
+        yield (
+            "Growth was followed by a Monte Carlo of encounters of two bodies with thermal speeds, spins "
+            f"and orientations, at {checked.density:.3g} bodies per m³, in populations that differ by the seed "
+            f"alone: seeds {_seeds(seeds or DEFAULT_SEEDS)}. Each encounter was flown with all dipoles"
+            + (", and each contact computed grain by grain." if checked.method.hits == "resolve" else ".")
+        )
+        checked.case.grains.extent = None  # positions do not matter
+        yield from _of_case(checked.case, {})
+        return
     boxes = [files.read_json(one) for one in sorted(folder.glob(f"seed-*/{files.SUMMARY}"))]
     yield f"Growth was followed in boxes that differ by the seed alone: seeds {_seeds(seeds or DEFAULT_SEEDS)}."
     yield from _of_case(check_case(content, str(path)), {})

@@ -16,7 +16,8 @@ STILL = "still"
 GROWTH, OF_GROWTH = "growth", ("impact_parameter", "reach", "growth_efficiency", "kind", "seed")
 """The figure of the growth efficiency, and the columns that it needs."""
 FORMATS = ("png", "pdf", "svg")
-FOLDER, SWEEP_TABLE = "plots", "sweep.csv"  # as `PLOTS` and `SWEEP_CSV` of `io.run_folder`, whose import is slow
+FOLDER, SWEEP_TABLE, ENCOUNTERS = "plots", "sweep.csv", "encounters.csv"
+# as `PLOTS`, `SWEEP_CSV` and `ENCOUNTERS` of `io.run_folder`, whose import is slow
 LABORATORY = "laboratory"
 """The figure of packings that are loaded; also the name of the file with the results of such a job."""
 
@@ -235,7 +236,8 @@ def _place(
 
     problems: list[str] = []
     is_trajectory = source.is_file()
-    names = selection or list((STILL,) if is_trajectory else (*HISTORY, STILL))
+    shown = HISTORY[:1] if (source / ENCOUNTERS).exists() else HISTORY  # of encounters there are only sizes over time
+    names = selection or list((STILL,) if is_trajectory else (*shown, STILL))
     if is_trajectory:
         missing = [name for name in names if name in HISTORY]
         problems += [f"--what {name}: {source} has no ledger; give a run's folder" for name in missing]

@@ -14,7 +14,18 @@ from ..basics.errors import BadInput
 from ..basics.threads import set_threads
 from ..config.commands import LOADINGS
 from ..config.folders import content_of, job_in
-from ..io.run_folder import CASE, COLLISION, GROWTH, LABORATORY, SCATTERING, SUMMARY, SWEEP, SWEEP_CSV, read_json
+from ..io.run_folder import (
+    CASE,
+    COLLISION,
+    ENCOUNTERS,
+    GROWTH,
+    LABORATORY,
+    SCATTERING,
+    SUMMARY,
+    SWEEP,
+    SWEEP_CSV,
+    read_json,
+)
 from . import options, parsing, report
 from .collide import collide
 from .exits import PHYSICS
@@ -62,6 +73,8 @@ def command(
     set_threads(threads)
     place = Path(folder)
     kind, case = _kind(place)
+    if kind == "grow" and (place / ENCOUNTERS).exists():
+        return _population(place, case, wall_time, **output)
     if kind != "run":
         if until is not None:
             raise BadInput(f"--until applies to runs; {folder} holds {content_of(place)}")
@@ -72,6 +85,19 @@ def command(
     if workers > 1 or scheduler is not None:
         raise BadInput("--workers and --scheduler apply to jobs of many parts; for a run use --threads")
     return _run(place, until, wall_time, **output)
+
+
+def _population(place: Path, case: Path, wall_time: float | None, *, quiet: bool, as_json: bool) -> int | None:
+    """Continue one population of dilute dust; returns the exit code."""
+    from ..experiments.dilute_case import run_population
+    from ..io.run_folder import read_toml
+    from .job import running_job
+
+    content = read_toml(case)
+    with running_job(place, 1, wall_time=wall_time, quiet=quiet) as (_, interrupts):
+        outcome = run_population(content, content["run"]["seed"], place, [interrupts])
+    report.answer({"folder": str(place), "outcome": outcome}, f"{place}: {outcome}", [], as_json=as_json, quiet=quiet)
+    return None if outcome == "finished" else PHYSICS
 
 
 def _kind(folder: Path) -> tuple[str, Path]:

@@ -78,7 +78,7 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     for file in (case.grains.file, *(one.file for one in case.grains.classes)):
         if file is not None and out is not None:
             _refuse_own_source(Path(file), Path(out))
-    start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
+    start = start_of(case)
     if case.run.stop == GIVEN:
         raise BadInput(
             "run.stop = 'given': this condition is a function of a script; use sand.resume(DIR).run(until=function)"
@@ -87,6 +87,11 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     simulation = simulate(case, start.grains, start.box, **options)
     simulation.recipe, simulation.origin = case.grains.recipe(), start.note
     return simulation
+
+
+def start_of(case: Case) -> Start:
+    """Grains, contacts and box with which a case begins.  Raises BadInput."""
+    return _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
 
 
 def _refuse_own_source(source: Path, out: Path) -> None:

@@ -10,7 +10,7 @@ from ..basics.errors import BadInput
 OWN_TABLES = {
     "sweep": {"sweep"},
     "sequence": {"sequence"},  # of sequential collisions, which only a sweep reads
-    "grow": {"grow"},
+    "grow": {"grow", "method"},
     "scatter": {"flight", "measure"},
     "compress": {"compression"},
     "stretch": {"stretch"},

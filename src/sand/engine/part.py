@@ -14,7 +14,7 @@ import numpy as np
 
 from ..basics.array_groups import copy_group, resized
 from ..basics.arrays import SAVED_BODIES, ContactArrays, body_arrays, cluster_arrays
-from ..basics.grains import GrainArrays
+from ..basics.grains import GrainArrays, Grains
 from ..basics.state import BROKEN, CELL, CONTACT_STEPS, CONTACTS, GRAIN1, GRAIN2, MADE, SETTLED, State
 from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
@@ -155,23 +155,13 @@ class Part:
 
     def _new_engine(self, state: State, index: np.ndarray, contacts: int) -> Engine:
         """An engine for these grains, which is kept for others of the same number; there are at most `MOST_ENGINES`."""
-        given, count = self.prototype, len(index)
-        grains = subset(state.grains, index)
-        made = new_state(grains, state.box, given.parameters, given.content, contacts, over_all_pairs=True)
-        made.uniform_contacts = state.uniform_contacts
-        if self.has_bodies:
-            made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
-        else:
-            made.clusters = cluster_arrays(count)
-        for name in given.stored_state.of_components:
-            made.of_components[name] = resized(state.of_components[name], count)
-        # few grains, and bodies, share no work between threads
-        engine = given.for_state(made, with_threads=uses_task_queue(count) and not self.has_bodies)
-        engine.content = given.content.for_part(count)
+        engine = engine_of_part(
+            self.prototype, subset(state.grains, index), state, contacts, has_bodies=self.has_bodies
+        )
         if len(self._engines) == MOST_ENGINES:
             self._engines.clear()
             self._pairs.clear()
-        self._engines[count] = engine
+        self._engines[len(index)] = engine
         return engine
 
     def _give_component_arrays(
@@ -228,6 +218,23 @@ class Part:
         state.count[CONTACTS] = end
         state.pair_list.anchor[...] = math.inf  # the list of candidates says which pairs are in contact
         return np.arange(first, end)
+
+
+def engine_of_part(given: Engine, grains: Grains, state: State, contacts: int, *, has_bodies: bool = False) -> Engine:
+    """An engine with the settings of another one, for grains of its state, or like these, and so many contacts."""
+    count = len(grains)
+    made = new_state(grains, state.box, given.parameters, given.content, contacts, over_all_pairs=True)
+    made.uniform_contacts = state.uniform_contacts
+    if has_bodies:
+        made.bodies = body_arrays(count, in_gas=bool(state.bodies.decay.size))
+    else:
+        made.clusters = cluster_arrays(count)
+    for name in given.stored_state.of_components:
+        made.of_components[name] = resized(state.of_components[name], count)
+    # few grains, and bodies, share no work between threads
+    engine = given.for_state(made, with_threads=uses_task_queue(count) and not has_bodies)
+    engine.content = given.content.for_part(count)
+    return engine
 
 
 def references(arrays: Sequence[np.ndarray]) -> tuple[weakref.ref[np.ndarray], ...]:

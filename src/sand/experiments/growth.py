@@ -17,6 +17,7 @@ from ..basics.errors import BadInput, naming
 from ..basics.paths import user_path
 from ..io import run_folder as files
 from ..results import Run
+from .dilute_case import is_dilute
 from .growth_boxes import grow, run_box, shared_settings
 
 __all__ = [
@@ -89,7 +90,8 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         frame = frames[int(number)]
         rows = aggregate_statistics(frame, least)
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
-        bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
+        if not is_dilute(run.case):  # whose frames show bodies at rest
+            bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
     first = frames[0]
     frames.close()
     with naming(folder):

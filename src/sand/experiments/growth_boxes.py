@@ -17,6 +17,8 @@ from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..simulation.serialise import case_of, changed_tables
+from .dilute_case import check_dilute, is_dilute, run_population
+from .dilute_files import HitsSeen
 from .executors import results_of
 from .growth_case import DEFAULT_SEEDS, read_growth
 from .job import Job, Progress, ignored
@@ -53,16 +55,19 @@ class GrowthJob(Job):
     ) -> dict[str, Any]:
         """Run all boxes to their end, see `grow`; returns how they ended."""
         outcomes: dict[int, str] = {}
+        parts = "populations" if is_dilute(self.content) else self.PARTS
 
-        def show(line: str = "") -> None:
+        def show(line: str = "", state: str = "") -> None:
             done, total = len(outcomes), len(self.seeds)
-            progress(f"{done} of {total} {self.PARTS}", done / total, line and f"{line}  ({done} of {total})")
+            progress(f"{done} of {total} {parts}{state}", done / total, line and f"{line}  ({done} of {total})")
 
         def finished(seed: int, outcome: str) -> None:
             outcomes[seed] = outcome
             show(f"  seed {seed}: {outcome}")
 
         show()
+        if executor is None and is_dilute(self.content):
+            observers = [*observers, HitsSeen(lambda state: show("", state))]
         grow(self.content, self.seeds, self.folder, executor, finished, observers)
         return {"folder": str(self.folder), "seeds": self.seeds, "outcomes": outcomes}
 
@@ -108,7 +113,7 @@ def grow(
         By Ctrl-C; the same call resumes.
     """
     place = user_path(folder)
-    check_case(content, "case")
+    (check_dilute if is_dilute(content) else check_case)(content, "case")
     places = {seed: place / f"seed-{seed}" for seed in seeds}
     files.make_folder(place, shared=True)
     with writing(place, patience=PATIENCE):
@@ -136,7 +141,10 @@ def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, 
     boxes = [box for box in started if changed or box not in places]
     if not boxes:
         return
-    requested = shared_settings(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
+    if is_dilute(content):
+        requested = shared_settings(content)
+    else:
+        requested = shared_settings(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
     for box in boxes:
         known = shared_settings(files.read_toml(box / files.CASE))
         if others := [name for name in {**known, **requested} if known.get(name) != requested.get(name)]:
@@ -214,10 +222,13 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     BadInput
         If the folder contains a run of another case, or another process writes to it.
     """
-    place, case, own = user_path(folder), check_case(content, "case"), list(observers)
+    place, own = user_path(folder), list(observers)
     if place.is_dir():
         with writing(place, patience=PATIENCE):  # a worker whose parent was killed may be writing its checkpoint
             pass
+    if is_dilute(content):
+        return run_population(content, seed, place, own)
+    case = check_case(content, "case")
     case.run.seed = seed
     until = case.run.until
     if checkpoint_files(place):

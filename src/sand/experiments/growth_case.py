@@ -9,6 +9,7 @@ from ..basics.errors import BadInput, ErrorCollector
 from ..config.case import check_case, read_content
 from ..config.key_errors import validate
 from ..config.sections import Section, Seeds
+from .dilute_case import METHOD, MethodSection, check_dilute, is_dilute
 
 DEFAULT_SEEDS = list(range(1, 9))
 
@@ -39,6 +40,12 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     given, errors, section = content.pop("grow", None), ErrorCollector(), None
     if given is not None:
         section = errors.take(validate, GrowSection, given, str(path), table="grow")
+    if is_dilute(content):
+        errors.take(check_dilute, content, str(path))
+        errors.done()
+        return content, section and section.seeds
+    if (method := content.pop(METHOD, None)) is not None:
+        errors.take(validate, MethodSection, method, str(path), table=METHOD)
     case = errors.take(check_case, content, str(path))
     errors.done()
     if case.run.stop is not None:

@@ -32,7 +32,7 @@ import json
 import os
 import warnings
 import zipfile
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,10 @@ VERSION = 10
 """Version of the file format; other versions are refused. Versions before 9 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
+
+
+Reader = Callable[[Path], tuple[dict[str, np.ndarray], dict[str, Any]]]
+"""Reads a checkpoint: arrays and metadata."""
 
 
 def _checksum(arrays: dict[str, np.ndarray]) -> str:
@@ -117,6 +121,17 @@ def read_checkpoint(path: Path, components: Collection[Groups] = ()) -> tuple[di
     BadInput
         If it is not a checkpoint, is damaged, or has numbers that a state cannot have.
     """
+    arrays, meta = read_archive(path)
+    _name_own(arrays, meta)
+    try:
+        check_state(arrays, meta, components)
+    except BadInput as error:
+        raise BadInput(f"{path} cannot be resumed: {error}") from None
+    return arrays, meta
+
+
+def read_archive(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Arrays and metadata as `write_checkpoint` wrote them, of a state or of anything else; raises its errors."""
     refuse_devices(path)
     try:
         content = path.read_bytes()
@@ -146,11 +161,6 @@ def read_checkpoint(path: Path, components: Collection[Groups] = ()) -> tuple[di
         raise OtherFormat(f"{path} has format {meta['version']}, and this SAND reads format {VERSION}; {advice}")
     if _checksum(arrays) != meta.get("sha256"):
         raise BadInput(f"{path} is damaged: its checksum is wrong")
-    _name_own(arrays, meta)
-    try:
-        check_state(arrays, meta, components)
-    except BadInput as error:
-        raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
 
 
@@ -173,7 +183,7 @@ def _name_own(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
 
 
 def newest_checkpoint(
-    folder: Path, components: Collection[Groups] = ()
+    folder: Path, components: Collection[Groups] = (), read: Reader | None = None
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Read the newest intact checkpoint of a folder; damaged newer ones are renamed, with a warning.
 
@@ -181,6 +191,8 @@ def newest_checkpoint(
     ----------
     components : Collection[Mapping[str, type]], optional
         As of `read_checkpoint`.
+    read : callable or None, optional
+        What reads a file, such as `read_archive`; by default `read_checkpoint`.
 
     Returns
     -------
@@ -199,7 +211,7 @@ def newest_checkpoint(
     problems: list[tuple[Path, str]] = []
     for path in reversed(checkpoint_files(folder)):
         try:
-            arrays, meta = read_checkpoint(path, components)
+            arrays, meta = read_checkpoint(path, components) if read is None else read(path)
         except OtherFormat:
             raise
         except BadInput as error:

@@ -25,7 +25,7 @@ from .lock import LOCK, refuse_locked, writing
 
 OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS_CSV, FLIGHTS,
-    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON, LABORATORY, LOADED, ROWS_CSV,
+    GROWTH, VIEW, SWEEP, SWEEP_CSV, COMPARISON, LABORATORY, LOADED, ROWS_CSV, ENCOUNTERS, AGGREGATES,
 ) = (
     "case.toml",
     "trajectory.gsd",
@@ -46,6 +46,8 @@ OWN_FILES = (
     "laboratory.json",
     "loaded.jsonl",  # outcomes of the finished runs of sand compress, stretch or shear until all are
     "rows.csv",  # rows of the tables of all runs of a sweep
+    "encounters.csv",
+    "aggregates.csv",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
 CHECKPOINT = re.compile(r"checkpoint-(\d{15,})\.npz")

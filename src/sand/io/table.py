@@ -60,6 +60,8 @@ class GrowingTable:
         Names of the columns.
     resume : bool, optional
         Whether existing rows are kept.
+    most : int or None, optional
+        Number of rows that are kept at most.
 
     Raises
     ------
@@ -69,10 +71,11 @@ class GrowingTable:
         If it cannot be written.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], *, resume: bool = False):
+    def __init__(self, path: Path, columns: Sequence[str], *, resume: bool = False, most: int | None = None):
         self.path, self.columns = path, [*columns, CHECK]
         head = ",".join(self.columns)
         found = _lines(path, head, "does not have the columns of this job; give another folder") if resume else []
+        found = found[:most]
         lines = [line for line in found if line == _checked(line.rpartition(",")[0])]
         self.rows = [[float(part) for part in line.split(",")[:-1]] for line in lines]
         _report_bad_rows(path, len(found) - len(lines))

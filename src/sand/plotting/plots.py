@@ -41,6 +41,9 @@ _DRAW: dict[str, Callable[[Axes, Any, AxisUnit, AxisUnit], None]] = {
     "balance": draw_balance,
     "temperatures": lambda axes, ledger, time, _: draw_temperatures(axes, ledger, time),
 }
+OF_ENERGY = ("energies", "losses", "balance")
+"""Those of energies, in a unit that the ledger gives."""
+NO_UNIT = AxisUnit(1.0, "", "")
 HISTORY = tuple(_DRAW)
 """Names of the figures over time."""
 
@@ -73,10 +76,10 @@ def history_figure(ledger: LedgerColumns, name: str, grains: int, temperature: f
         with plot_style():
             figure, axes = _figure()
             time = time_unit(ledger)
-            unit = energy_unit(ledger, temperature, grains)
+            unit = energy_unit(ledger, temperature, grains) if name in OF_ENERGY else NO_UNIT
             _DRAW[name](axes, ledger, time, unit)
             draw_time([axes], time, ledger)
-            if unit.name in axes.get_ylabel() and unit.value:
+            if unit.value and unit.name in axes.get_ylabel():
                 axes.set_xlabel(f"{axes.get_xlabel()}\n{unit.value}")
             _apply_dark(figure, dark)
     except KeyError as error:

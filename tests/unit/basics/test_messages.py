@@ -102,6 +102,19 @@ start = "4 b_max"
 relative_error = 0.05
 seed = 3
 """
+ENCOUNTERS = """
+[method]
+kind = "encounters"
+[run]
+stop = "mean_cluster_size >= 4"
+[grains]
+number = 100
+number_density = "3e8 /m^3"
+radius = "10 nm"
+temperature = "100 K"
+[forces.contact]
+damping = "critical"
+"""
 KINDS = {"target": ("collide", COLLISION), "impact": ("collide", COLLISION), "projectile": ("collide", COLLISION)}
 KINDS["aggregate"] = ("compress", LOADING.replace("TABLE", "compression"))
 KINDS |= {
@@ -109,7 +122,7 @@ KINDS |= {
     for command, table in {"compress": "compression", "stretch": "stretch", "shear": "shear"}.items()
 }
 KINDS["elastic"] = ("elastic", ELASTIC)
-KINDS |= {"flight": ("scatter", SCATTERING), "measure": ("scatter", SCATTERING)}
+KINDS |= {"flight": ("scatter", SCATTERING), "measure": ("scatter", SCATTERING), "method": ("grow", ENCOUNTERS)}
 """Command and case of a use that begins with a change of this section; of other sections: `sand run` and CASE."""
 
 

@@ -11,13 +11,8 @@ from scipy.special import ellipj
 import sand
 from sand.basics.arrays import body_arrays
 from sand.basics.state import BODIES
-from sand.integrate.rigid.rigid_body import (
-    asymmetric_rotation,
-    contact_loads_bound,
-    free_sphere,
-    move_body,
-    sum_body_loads,
-)
+from sand.integrate.rigid.rigid_body import contact_loads_bound, move_body, sum_body_loads
+from sand.numerics.rotor import asymmetric_rotation, free_sphere
 
 INERTIA = (1.0, 2.0, 3.5)
 

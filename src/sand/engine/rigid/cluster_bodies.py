@@ -11,8 +11,8 @@ from ...basics.clusters import labels_of
 from ...basics.state import BODIES, CONTACTS, State
 from ...forces.gas_loops import GasParameters
 from ...integrate.rigid.body_friction import friction_modes
-from ...integrate.rigid.rigid_body import product
 from ...numerics.quaternion import matrix_of, quaternion_of
+from ...numerics.rotor import principal_frame, product
 
 OF_MEMBERS = ("offset", "rest_force", "rest_torque", "known_force", "known_torque", "inner_field")
 """Arrays of vectors of the grains of a body, in the body."""
@@ -94,10 +94,7 @@ def describe_body(state: State, index: np.ndarray, offset: np.ndarray) -> None:
     """
     bodies, first, grains = state.bodies, int(index[0]), state.grains.arrays
     m, inertia = grains.mass[index], grains.inertia[index]
-    tensor = ((m * offset**2).sum() + inertia.sum()) * np.eye(3) - (m * offset) @ offset.T
-    principal, axes = np.linalg.eigh(tensor)
-    if axes[:, 0] @ _cross(axes[:, 1:2], axes[:, 2:])[:, 0] < 0.0:
-        axes[:, 0] *= -1.0
+    principal, axes = principal_frame(m, inertia, offset)
     bodies.mass[first], bodies.inertia[:, first] = m.sum(), principal
     bodies.centre[:, first] = nearest_image(grains.position[:, first] - offset[:, 0], state.box.span)
     bodies.orientation[:, first] = quaternion_of(axes)

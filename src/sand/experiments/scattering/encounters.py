@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from ...basics.constants import MAGNETIC
 from ...basics.grains import Grains
 from ...forces.pair import dipole_formulas as dipole
+from ...numerics.rotor import principal_frame
 from .flight_driver import Limits
 from .initial_conditions import InitialConditions
 from .two_aggregates import TWO_AGGREGATES, Aggregates, Body
@@ -186,10 +187,7 @@ def body_of(grains: Grains) -> Body:
     """Rigid body of these grains, in its principal frame."""
     mass, count = grains.mass, len(grains)
     arm = grains.position - np.average(grains.position, axis=0, weights=mass)
-    isotropic = (mass * (arm**2).sum(axis=1) + grains.inertia).sum()
-    tensor = isotropic * np.eye(3) - np.einsum("i,ij,ik->jk", mass, arm, arm)
-    inertia, frame = np.linalg.eigh(tensor)
-    frame[:, 2] = np.cross(frame[:, 0], frame[:, 1])  # makes the frame right-handed
+    inertia, frame = principal_frame(mass, grains.inertia, arm.T)
     pose = Rotation.from_matrix(frame).as_quat()
     return Body(
         np.ascontiguousarray((arm @ frame).T),

@@ -35,6 +35,7 @@ from ...neighbours.skin import invalidate_skins, invalidate_speeds, list_is_stal
 from ...numerics.flow import extends_over_half, relative_velocity
 from ...numerics.kinds_of_box import unless_still
 from ...numerics.quaternion import turned
+from ...numerics.rotor import LARGEST_PIECE
 from ...numerics.vec import accrue, dot, load, load4, nearest_image, norm, put, sub
 from ..force_calls import add_external_loads, sum_external, sum_pair_forces
 from ..force_stages import ENERGY, WRAPPING
@@ -48,7 +49,6 @@ from ..task_queue import join_workers
 from .body_friction import drift_bodies_in_gas
 from .body_touches import CLEAR, LOADED, TOUCHING, find_near_bodies
 from .rigid_body import (
-    LARGEST_PIECE,
     contact_loads_bound,
     drift_bodies,
     kick_bodies,

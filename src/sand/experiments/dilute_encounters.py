@@ -1,0 +1,192 @@
+"""Encounters of dilute dust, one after the other: pairs by thinning of a bound, flights, and what becomes of hits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..basics.errors import BadInput
+from ..simulation.contact_phase import CHANGES
+from .dilute_body import Body, body_of
+from .dilute_flight import FlightResult, RigidFlights, kepler_start, start_distance
+from .dilute_hits import Hit, HitRule
+from .dilute_majorant import Approach
+from .dilute_population import Population, sizes_of
+from .scattering.event_draws import event_uniforms
+from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
+
+ENDS = {HIT: "hit", MISS: "miss", BOUND: "bound", FLIGHT_FAILED: "failed"}
+BEYOND = "beyond"
+"""End of an encounter with b above b̂, which needs no flight."""
+HIT_CHANGES = tuple(name for name in CHANGES if name not in ("lost_gas", "lost_outside", "lost_cutoff_changed"))
+"""Changes of energies [J] over a hit that can occur."""
+
+
+RECENT = 100
+"""Hits over which `Encounters.recent_others` is the mean."""
+
+
+class Encounter(NamedTuple):
+    """One draw; a row of encounters.csv."""
+
+    event: int
+    time: float  # [s]
+    end: str  # "beyond" b̂, without a flight; "miss", "hit"; "bound"
+    grains1: int
+    grains2: int
+    body1: int  # numbers of the bodies
+    body2: int
+    copy1: int  # 0, or the doubling in which the body was copied
+    copy2: int
+    moment1: float  # net moments [A m²]
+    moment2: float
+    speed: float  # relative speed at a large distance [m/s]
+    impact_parameter: float  # [m]
+    bound: float  # b̂ [m]
+    kernel: float  # K̂ of the pair [m³/s]
+    flight_time: float  # [s]
+    flight_steps: int
+    energy_start: float  # of relative motion, rotation and interaction at the start [J]
+    flight_error: float  # change of this energy in the flight [J]
+    touch_kinetic: float  # ½m̄u² at the touch [J]
+    touch_rotation: float  # [J]
+    touch_potential: float  # interaction of the two bodies at the touch [J]
+    made: int
+    slipped: int
+    broken: int
+    pieces: int
+    rest_time: float  # time of the contact phase [s]
+    contact_steps: int
+    others: float  # expected encounters of the two with others during the flight
+    energies: dict[str, float]  # of a hit, by channel [J]; empty if not computed
+
+    def row(self) -> dict[str, Any]:
+        """Columns of encounters.csv."""
+        return self._asdict() | {"energies": None} | {name: self.energies.get(name, 0.0) for name in HIT_CHANGES}
+
+
+WITHOUT_FLIGHT: dict[str, Any] = dict.fromkeys(
+    ("flight_time", "energy_start", "flight_error", "touch_kinetic", "touch_rotation", "touch_potential", "others"), 0.0
+) | {"flight_steps": 0}
+NO_HIT: dict[str, Any] = dict.fromkeys(("made", "slipped", "broken", "pieces", "contact_steps"), 0) | {
+    "rest_time": 0.0,
+    "energies": {},
+}
+
+
+class Encounters:
+    """Growth of a population whose gas thermalises all bodies between two encounters.
+
+    Parameters
+    ----------
+    population : Population
+        The bodies.
+    rigid_flights : RigidFlights
+        Computes flights.
+    hits : HitRule
+        What becomes of two bodies that touch.
+    seed : int
+        All random numbers are functions of it and the number of the event.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    event, flights, hits_seen : int
+        Draws, flights and hits so far.
+    others, recent_others : float
+        Sum of `Encounter.others` over hits, and its mean over the last hundred or so.
+    longest_flight : float
+        [s]
+    numbers : int
+        Number of the next body that forms.
+    """
+
+    def __init__(self, population: Population, rigid_flights: RigidFlights, hits: HitRule, seed: int):
+        self.population, self.rigid_flights, self.rule, self.seed = population, rigid_flights, hits, seed
+        self.time, self.event, self.flights, self.hits_seen, self.others = 0.0, 0, 0, 0, 0.0
+        self.longest_flight = self.recent_others = 0.0
+        self.numbers = 1 + max(body.number for body in population.bodies)
+
+    def step(self) -> Encounter:
+        """Draw one encounter, and compute it.
+
+        Raises
+        ------
+        BadInput
+            If a flight or a contact phase fails.
+        """
+        population, uniforms = self.population, event_uniforms(self.seed, self.event)
+        self.time -= math.log(uniforms[0]) / population.rate
+        i, j, kernel = population.draw(*uniforms[1:3])
+        a, b = population.bodies[i], population.bodies[j]
+        approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
+        drawn = _drawn(self.event, self.time, a, b) | approach._asdict() | {"kernel": kernel}
+        self.event += 1
+        if approach.impact_parameter > approach.bound:
+            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=BEYOND)
+        flight = self._fly(a, b, approach)
+        if flight is None:
+            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=ENDS[MISS])
+        met = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume * flight.time
+        own = _of_flight(flight) | {"others": met}
+        if flight.end == FLIGHT_FAILED:
+            raise BadInput(f"the flight of event {self.event - 1} failed: its state is not finite")
+        if flight.end != HIT:
+            return Encounter(**drawn, **own, **NO_HIT, end=ENDS[flight.end])
+        hit = self.rule(a, b, flight.state)
+        if hit.is_miss:
+            return Encounter(**drawn, **own, **NO_HIT, end=ENDS[MISS])
+        self._replace(i, j, hit)
+        self.hits_seen, self.others = self.hits_seen + 1, self.others + met
+        self.recent_others += (met - self.recent_others) / min(self.hits_seen, RECENT)
+        return Encounter(**drawn, **own, **_hit(hit), end=ENDS[HIT])
+
+    def _fly(self, a: Body, b: Body, approach: Approach) -> FlightResult | None:
+        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+        if start is None:
+            return None
+        flight = self.rigid_flights.thermal(a, b, *start, (self.seed, self.event - 1))
+        self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flight.time)
+        return flight
+
+    def _replace(self, i: int, j: int, hit: Hit) -> None:
+        """The bodies of a hit; all are copied when half of their number at the start is left."""
+        new = []
+        for grains, contacts in hit.pieces:
+            new.append(body_of(grains, contacts, self.numbers, self.event)[0])
+            self.numbers += 1
+        self.population.replace(i, j, new)
+        if 2 * len(self.population.bodies) <= self.population.start:
+            self.population.double()
+
+
+def net_moment(body: Body) -> float:
+    """|Σμ| [A m²]."""
+    return float(np.linalg.norm(body.grains.moment.sum(axis=1)))
+
+
+def _drawn(event: int, time: float, a: Body, b: Body) -> dict[str, Any]:
+    found: dict[str, Any] = {"event": event, "time": time}
+    for k, body in ((1, a), (2, b)):
+        found |= {f"grains{k}": len(body), f"body{k}": body.number, f"copy{k}": body.copy}
+        found |= {f"moment{k}": net_moment(body)}
+    return found
+
+
+def _of_flight(flight: FlightResult) -> dict[str, Any]:
+    rotation = flight.energy - flight.kinetic - flight.potential
+    return {
+        "flight_time": flight.time, "flight_steps": flight.steps, "energy_start": flight.energy_start,
+        "flight_error": flight.drift, "touch_kinetic": flight.kinetic, "touch_rotation": rotation,
+        "touch_potential": flight.potential,
+    }  # fmt: skip
+
+
+def _hit(hit: Hit) -> dict[str, Any]:
+    return {
+        "made": hit.made, "slipped": hit.slipped, "broken": hit.broken, "pieces": len(hit.pieces),
+        "rest_time": hit.time, "contact_steps": hit.steps, "energies": hit.energies,
+    }  # fmt: skip

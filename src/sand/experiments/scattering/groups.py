@@ -1,0 +1,56 @@
+"""Groups of neighbouring grains of a rigid aggregate, which act as one dipole at a distance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .rigid_flight import Groups
+
+GROUP = 4
+"""Members of a group of the next level."""
+
+
+def groups_of(x: np.ndarray, moment: np.ndarray) -> Groups:
+    """Grains at x (n, 3) [m] with moments (n, 3) [A m²] in the frame of a body, and all levels of groups of them.
+
+    A group of level l has up to 4ˡ neighbouring grains: the sum of their moments at the mean of their positions,
+    weighted by |μ|, about which the next term of equal dipoles vanishes.
+    """
+    strength = np.linalg.norm(moment, axis=1)
+    weight = np.maximum(strength, 1e-6 * strength.max()) if strength.any() else np.ones(len(x))
+    points, moments, strengths, first, reach = [x], [moment], [strength], [0, len(x)], [0.0]
+    order = _neighbours_together(x, np.arange(len(x)))
+    size = 1
+    while size < len(x):
+        size *= GROUP
+        begin = np.arange(0, len(x), size)
+        group = np.repeat(np.arange(len(begin)), np.diff([*begin, len(x)]))
+        total = np.add.reduceat(np.column_stack([weight, weight[:, None] * x, moment, strength])[order], begin)
+        centre = total[:, 1:4] / total[:, :1]
+        points.append(centre)
+        moments.append(total[:, 4:7])
+        strengths.append(total[:, 7])
+        first.append(first[-1] + len(begin))
+        reach.append(float(np.linalg.norm(x[order] - centre[group], axis=1).max()))
+    point = np.ascontiguousarray(np.concatenate(points).T)
+    return Groups(
+        point,
+        np.ascontiguousarray(np.concatenate(moments).T),
+        np.concatenate(strengths),
+        np.array(first),
+        np.array(reach),
+    )
+
+
+def _neighbours_together(x: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Order of grains `own` in which any 4ˡ at a multiple of 4ˡ are neighbours: bisection along the longest axis."""
+    if len(own) <= GROUP:
+        return own
+    apart = x[own] - x[own].mean(axis=0)
+    along = apart @ np.linalg.eigh(apart.T @ apart)[1][:, 2]
+    own = own[np.argsort(along, kind="stable")]
+    size = GROUP
+    while size * GROUP < len(own):
+        size *= GROUP
+    half = size * (-(-len(own) // size) // 2)
+    return np.concatenate([_neighbours_together(x, own[:half]), _neighbours_together(x, own[half:])])

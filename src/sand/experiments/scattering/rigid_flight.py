@@ -1,0 +1,337 @@
+"""Flights of two rigid aggregates until they are about to touch or part for good, in few steps.
+
+One step is kick, drift, kick of separation, relative velocity, orientations and angular momenta with the symplectic
+free rotor (`numerics.rotor`), so that spin costs no accuracy: bodies that turn a hundred times on their way need one
+sum over pairs of grains in about two radians.  At a distance a body is a few dipoles, sums of those of neighbouring
+grains.  Flights of `flight_driver`, of high order, are more accurate and ten times as expensive.
+
+With the smallest gap g of two grains, D = g + 2 r_min, e = max(|x| + r) of both bodies, ω̂ = √(2 E_rot/I_min) ≥ |ω|,
+and W = Σ 2k|μ||μ′|/d³ + Σ|μ| B, a step is
+
+    h = min(η/max(√(4F/m̄D), √(max(T, W)/I_min), √(max(T′, W)/I′_min), u/D),  2 rad/(|ω| + |ω′|),  g/2c)
+    c = u + ω̂ e + ω̂′ e′ + (F/m̄ + T e/I_min + T′ e′/I′_min) h
+
+No gap closes faster than c in a step: free rotation keeps E_rot, and the kick before it adds at most T h/2√(2 I_min) to
+its root.  So no step passes a touch.
+"""
+
+import functools
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiler.jit import formula, kernel, loop
+from ...forces.pair.dipole_formulas import contact_energy, pair_load
+from ...forces.pair.inverse_square import inverse_square
+from ...numerics.quaternion import turned, turned_back
+from ...numerics.rotor import LARGEST_PIECE, free_rotation, free_sphere
+from ...numerics.simd import float_bits, float_from_bits
+from ...numerics.vec import add, axpy, cross, dot, load, norm, put, sub
+from .flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
+from .initial_conditions import R, U, draw_path, set_vector, vector_at
+from .two_aggregates import (
+    ANGULAR1,
+    ANGULAR2,
+    TURN1,
+    TURN2,
+    draw_rigid_pose,
+    quaternion_at,
+    set_quaternion,
+)
+
+STEP_FRACTION = 0.1
+"""η, a step in units of the times in which forces, fields and velocities change."""
+LARGEST_TURN = 2.0
+"""Largest rotation of both bodies in a step [rad]."""
+TOUCH = 1e-3
+"""Gap of a hit, in units of the smallest radius."""
+GROUP_SIZE = 0.25
+"""Largest radius of a group, in units of the gap of the bounding spheres."""
+MOST_REVOLUTIONS = 100.0
+"""Revolutions of the line of centres after which a pair is bound."""
+RESULTS = (
+    *("end", "impact_parameter", "time", "steps", "gap", "kinetic", "potential", "energy"),
+    *("potential_start", "energy_start", "revolutions"),
+)
+"""Results of a flight: impact parameter and last gap [m], time [s]; energies [J] at the end: ½m̄u² of the relative
+motion, of all pairs and of the external field, and both of these with the rotation; the last two at the start, too;
+revolutions of the line of centres."""
+
+
+class Groups(NamedTuple):
+    """Grains of a body in its frame, then its groups, level by level."""
+
+    point: np.ndarray  # (3, m) centres [m]
+    moment: np.ndarray  # (3, m) [A m²]
+    strength: np.ndarray  # (m,) Σ|μ| [A m²]
+    first: np.ndarray  # (levels + 1,) level l has the columns first[l] … first[l + 1] − 1
+    reach: np.ndarray  # (levels,) largest distance of a grain from the centre of its group [m]
+
+
+class Now(NamedTuple):
+    """Work arrays of both bodies, (3, capacity): centres and moments of groups in the current orientations."""
+
+    position1: np.ndarray
+    moment1: np.ndarray
+    position2: np.ndarray
+    moment2: np.ndarray
+
+
+class FlyingBody(NamedTuple):
+    """One rigid aggregate."""
+
+    groups: Groups
+    radius: np.ndarray  # (n,) of the grains [m]
+    charge: np.ndarray  # (n,) of the grains [C]
+    inertia: tuple  # principal moments of inertia [kg m²], ascending
+    pose: tuple  # not used: orientations are random
+    extent: float  # outer radius about the centre of mass [m]
+
+
+class FlyingPair(NamedTuple):
+    """Parameters of a flight."""
+
+    first: FlyingBody
+    second: FlyingBody
+    k: float  # μ₀/4π [T m/A]
+    coulomb: float  # 1/4πε₀ [N m²/C²]
+    reduced: float  # m̄ [kg]
+    smallest: float  # smallest radius [m]
+    largest: float  # largest radius [m]
+    attraction: float  # 2k Σ|μ| Σ|μ′| [J m³]
+    attraction_of_charges: float  # Σ|q| Σ|q′|/4πε₀ [J m]
+    field: tuple  # external flux density [T]
+    # distance beyond which a receding body has escaped [m]; 0: that of the start, or less if it cannot return
+    escape: float
+    step_fraction: float  # η
+    group_size: float  # `GROUP_SIZE`; 0: all pairs of grains
+    most_steps: int
+
+
+class Loads(NamedTuple):
+    """Loads of two bodies on each other."""
+
+    force: tuple  # on the first [N]
+    torque1: tuple  # about the centres of mass [N m]
+    torque2: tuple
+    energy: float  # [J]
+    bound: float  # W, of torques by fields [J]
+    gap: float  # smallest of two grains [m]; of the bounding spheres where groups act
+
+
+@loop
+def place(q, groups, level, position, moment):
+    """Positions and moments of the groups of a level in the orientation q."""
+    for i in range(groups.first[level], groups.first[level + 1]):
+        put(position, i, turned(q, load(groups.point, i)))
+        put(moment, i, turned(q, load(groups.moment, i)))
+
+
+@formula
+def level_of(groups, clear, group_size):
+    """The coarsest level whose groups are small beside the gap of the bounding spheres."""
+    chosen = 0
+    for level in range(1, groups.reach.size):
+        if groups.reach[level] <= group_size * clear:
+            chosen = level
+    return chosen
+
+
+@functools.cache
+def loads_of(charged: bool) -> Callable:
+    """Compile the sum over pairs of groups, with charges or without."""
+
+    @loop
+    def sum_loads(r, pair, now, level1, level2):
+        one, two = pair.first.groups, pair.second.groups
+        pull = torque1 = torque2 = (0.0, 0.0, 0.0)
+        energy = bound = 0.0
+        gap = math.inf
+        for i in range(one.first[level1], one.first[level1 + 1]):
+            x1, moment1 = load(now.position1, i), load(now.moment1, i)
+            at = add(r, x1)
+            force_i = field_i = turning = (0.0, 0.0, 0.0)
+            energy_i = bound_i = 0.0
+            nearest = np.int64(0x7FE0000000000000)
+            for j in range(two.first[level2], two.first[level2 + 1]):
+                x2, moment2 = load(now.position2, j), load(now.moment2, j)
+                apart = sub(at, x2)
+                force, field1, field2, own = pair_load(apart, moment1, moment2, pair.k)
+                distance = norm(apart)
+                if charged:
+                    push, more = inverse_square(apart, pair.coulomb * pair.first.charge[i] * pair.second.charge[j])
+                    force, own = add(force, push), own + more
+                force_i, field_i = add(force_i, force), add(field_i, field1)
+                turning = add(turning, sub(cross(moment2, field2), cross(x2, force)))
+                energy_i += own
+                bound_i += contact_energy(1.0, two.strength[j], distance, pair.k)
+                if level1 + level2 == 0:
+                    nearest = min(nearest, float_bits(distance + (pair.largest - pair.second.radius[j])))
+            pull, torque2 = add(pull, force_i), add(torque2, turning)
+            torque1 = add(torque1, add(cross(x1, force_i), cross(moment1, field_i)))
+            energy += energy_i
+            bound += one.strength[i] * bound_i
+            if level1 + level2 == 0:
+                gap = min(gap, float_from_bits(nearest) - pair.largest - pair.first.radius[i])
+        if level1 + level2 > 0:
+            gap = norm(r) - pair.first.extent - pair.second.extent
+        return Loads(pull, torque1, torque2, energy, bound, gap)
+
+    return sum_loads
+
+
+@formula
+def net_moment(groups):
+    """Sum of all moments in the frame of the body: the last group [A m²]."""
+    return load(groups.moment, groups.point.shape[1] - 1)
+
+
+@formula
+def rotational(angular, inertia):
+    """Energy of rotation ½ Σ L_k²/I_k [J]."""
+    a, b, c = angular
+    return 0.5 * (a * a / inertia[0] + b * b / inertia[1] + c * c / inertia[2])
+
+
+@formula
+def spin_size(angular, inertia):
+    """|ω| [rad/s]."""
+    return norm((angular[0] / inertia[0], angular[1] / inertia[1], angular[2] / inertia[2]))
+
+
+@loop
+def rotate_freely(q, angular, body, h):
+    """Free rotation of a body by h [s]."""
+    if body.radius.size == 1:
+        return free_sphere(q, angular, body.inertia[0], h), angular
+    return free_rotation(q, angular, body.inertia, h, LARGEST_PIECE)
+
+
+@formula
+def longest_step(pair, loads, speed, angular1, angular2):
+    """Step h [s] of the module's formula."""
+    inertia1, inertia2, eta = pair.first.inertia, pair.second.inertia, pair.step_fraction
+    pull, turn1, turn2 = norm(loads.force), norm(loads.torque1), norm(loads.torque2)
+    width = loads.gap + 2.0 * pair.smallest
+    square = max(4.0 * pull / (pair.reduced * width), speed * speed / (width * width))
+    square = max(square, max(max(turn1, loads.bound) / inertia1[0], max(turn2, loads.bound) / inertia2[0]))
+    h = eta / math.sqrt(square)
+    spins = spin_size(angular1, inertia1) + spin_size(angular2, inertia2)
+    if spins > 0.0:
+        h = min(h, LARGEST_TURN / spins)
+    most1 = math.sqrt(2.0 * rotational(angular1, inertia1) / inertia1[0]) + turn1 / inertia1[0] * h
+    most2 = math.sqrt(2.0 * rotational(angular2, inertia2) / inertia2[0]) + turn2 / inertia2[0] * h
+    closing = speed + pull / pair.reduced * h + most1 * pair.first.extent + most2 * pair.second.extent
+    return min(h, 0.5 * loads.gap / closing)
+
+
+@functools.cache
+def flight_of(charged: bool = False) -> Callable:
+    """Compile one flight from the state y (20,) of `two_aggregates` to its end; returns `RESULTS` but the second."""
+    sum_loads = loads_of(charged)
+
+    @loop
+    def loads_at(r, q1, q2, pair, now):
+        """Loads in a configuration, those of the field included."""
+        one, two, clear = pair.first.groups, pair.second.groups, norm(r) - pair.first.extent - pair.second.extent
+        level1, level2 = level_of(one, clear, pair.group_size), level_of(two, clear, pair.group_size)
+        place(q1, one, level1, now.position1, now.moment1)
+        place(q2, two, level2, now.position2, now.moment2)
+        found = sum_loads(r, pair, now, level1, level2)
+        moment1, moment2 = turned(q1, net_moment(one)), turned(q2, net_moment(two))
+        return Loads(
+            found.force,
+            add(found.torque1, cross(moment1, pair.field)),
+            add(found.torque2, cross(moment2, pair.field)),
+            found.energy - dot(add(moment1, moment2), pair.field),
+            found.bound + max(norm(moment1), norm(moment2)) * norm(pair.field),
+            found.gap,
+        )
+
+    @formula
+    def escapes(radial, clear, pair):
+        """Whether no attraction at this distance can turn the relative motion around."""
+        if clear <= 0.0:
+            return False
+        most = pair.attraction / (clear * clear * clear) + pair.attraction_of_charges / clear
+        return 0.5 * pair.reduced * radial * radial > most
+
+    @loop
+    def fly(y, pair, now):
+        first, second = pair.first, pair.second
+        r, u, q1, q2 = vector_at(y, R), vector_at(y, U), quaternion_at(y, TURN1), quaternion_at(y, TURN2)
+        # angular momenta in the frames of the bodies
+        angular1, angular2 = turned_back(q1, vector_at(y, ANGULAR1)), turned_back(q2, vector_at(y, ANGULAR2))
+        escape = pair.escape if pair.escape > 0.0 else norm(r)
+        time, steps, end, swept, potential, start, kinetic, energy = 0.0, 0, BOUND, 0.0, 0.0, 0.0, 0.0, 0.0
+        loads = loads_at(r, q1, q2, pair, now)
+        while True:
+            kinetic = 0.5 * pair.reduced * dot(u, u)
+            energy = kinetic + rotational(angular1, first.inertia) + rotational(angular2, second.inertia)
+            energy += loads.energy
+            if steps == 0:
+                potential, start = loads.energy, energy
+            distance = norm(r)
+            radial = dot(r, u) / distance
+            if not abs(energy) < math.inf:
+                end = FLIGHT_FAILED
+                break
+            if loads.gap <= TOUCH * pair.smallest:
+                end = HIT
+                break
+            is_far = distance >= escape
+            if pair.escape == 0.0:  # what happens after an escape does not matter
+                is_far = is_far or escapes(radial, distance - first.extent - second.extent, pair)
+            if radial > 0.0 and is_far:
+                end = MISS
+                break
+            if steps >= pair.most_steps or swept >= 2.0 * math.pi * MOST_REVOLUTIONS:
+                break
+            h = longest_step(pair, loads, norm(u), angular1, angular2)
+            u = axpy(0.5 * h / pair.reduced, loads.force, u)
+            angular1 = axpy(0.5 * h, turned_back(q1, loads.torque1), angular1)
+            angular2 = axpy(0.5 * h, turned_back(q2, loads.torque2), angular2)
+            swept += h * norm(cross(r, u)) / (distance * distance)
+            r = axpy(h, u, r)
+            q1, angular1 = rotate_freely(q1, angular1, first, h)
+            q2, angular2 = rotate_freely(q2, angular2, second, h)
+            loads = loads_at(r, q1, q2, pair, now)
+            u = axpy(0.5 * h / pair.reduced, loads.force, u)
+            angular1 = axpy(0.5 * h, turned_back(q1, loads.torque1), angular1)
+            angular2 = axpy(0.5 * h, turned_back(q2, loads.torque2), angular2)
+            time, steps = time + h, steps + 1
+        set_vector(y, R, r)
+        set_vector(y, U, u)
+        set_quaternion(y, TURN1, q1)
+        set_quaternion(y, TURN2, q2)
+        set_vector(y, ANGULAR1, turned(q1, angular1))
+        set_vector(y, ANGULAR2, turned(q2, angular2))
+        return end, time, steps, loads.gap, kinetic, loads.energy, energy, potential, start, swept / (2.0 * math.pi)
+
+    return fly
+
+
+@functools.cache
+def flights_of(charged: bool = False) -> Callable:
+    """Compile flights, as `flight_driver.flights_of`: each is a function of (seed, stratum, number) alone.
+
+    Its arguments are the seed, the `flight_driver.Flights`, the `InitialConditions`, the `FlyingPair` and `Now`.
+    Without initial conditions of its own (`start.speed` = 0) a flight begins at the state in `Flights.ends`.
+    """
+    fly = flight_of(charged)
+
+    def fly_all(seed, flights, start, pair, now):
+        for flight in range(flights.numbers.size):
+            y, b = flights.ends[flight], 0.0
+            if start.speed > 0.0:
+                flight_id = (seed, flights.strata[flight], flights.numbers[flight])
+                b = draw_path(y, flight_id, flights.low[flight], flights.high[flight], start)
+                draw_rigid_pose(y, flight_id, start, pair)
+            end, time, steps, gap, kinetic, potential, energy, before, begun, swept = fly(y, pair, now)
+            values = (float(end), b, time, float(steps), gap, kinetic, potential, energy, before, begun, swept)
+            for column in range(len(values)):
+                flights.results[flight, column] = values[column]
+
+    return kernel(fly_all, purpose="flights of two rigid bodies")

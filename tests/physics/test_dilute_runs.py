@@ -1,0 +1,222 @@
+"""Populations of dilute dust as runs: files, interruption, results, and what is refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sand
+from sand.analysis.clusters import cluster_labels
+from sand.basics.errors import BadInput
+from sand.cli.main import main
+from sand.experiments import dilute_files, dilute_growth
+from sand.experiments.dilute_kernel import kernel_of
+from sand.experiments.growth import growth_of, read_box
+from sand.experiments.kernel_table import measured
+from sand.io.run_folder import read_json, read_toml, write_toml
+
+pytestmark = pytest.mark.compiled("scattering", "dipoles")
+EXAMPLE = Path(__file__).parents[2] / "examples" / "dilute-growth.toml"
+FORCES = [sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns"), sand.Dipoles()]
+NUMBERS = {"number_density": "3e8 /m^3", "temperature": "100 K"}
+STOP = "mean_cluster_size >= 3"
+
+
+def grains(number=100, **other):
+    """Magnetic iron grains, whose positions do not matter."""
+    return sand.Grains(np.zeros((number, 3)), "10 nm", "iron", **{"moment": "200 A m^2/kg", **other})
+
+
+def files_of(folder):
+    """Bytes of the files of a population, without those that hold times of the machine."""
+    return {name: (folder / name).read_bytes() for name in ("ledger.csv", "encounters.csv", "aggregates.csv")}
+
+
+class Stopped(Exception):
+    """Raised by `Stopper`."""
+
+
+class Stopper:
+    """An observer that interrupts after some hits."""
+
+    def __init__(self, hits):
+        self.left = hits
+
+    def see(self, simulation, row):
+        """Count down."""
+        self.left -= 1
+        if self.left == 0:
+            raise Stopped
+
+
+@pytest.fixture(scope="module")
+def population(tmp_path_factory):
+    """A finished population, resolved."""
+    return dilute_growth.grow(
+        grains(), FORCES, **NUMBERS, stop=STOP, seed=3, out=tmp_path_factory.mktemp("dilute") / "one"
+    )
+
+
+@pytest.mark.parametrize("checkpoint_every", [0.0, 1e9])
+@pytest.mark.parametrize("hits", [1, 23])
+def test_a_population_that_is_killed_ends_with_the_same_bits(population, tmp_path, monkeypatch, checkpoint_every, hits):
+    """Stopped after some hits, with a checkpoint after each or only at the start, it continues to equal files."""
+    monkeypatch.setattr(dilute_files, "CHECKPOINT_EVERY", checkpoint_every)
+    place = tmp_path / "killed"
+    with pytest.raises(Stopped):
+        dilute_growth.grow(grains(), FORCES, **NUMBERS, stop=STOP, seed=3, out=place, observers=[Stopper(hits)])
+    dilute_growth.grow(grains(), FORCES, **NUMBERS, stop=STOP, seed=3, out=place)
+    assert files_of(place) == files_of(population.folder)
+
+
+def test_the_ledger_and_the_table_of_encounters_agree(population):
+    """Hits, flights and draws of the ledger are those of encounters.csv; S grows by each hit; energies add up.
+
+    Over all hits: energy at the touch + kinetic + distant + contacts + losses = kinetic energy left to the gas +
+    potential + contacts … so that kinetic + contacts + distant + losses is 0 to 1e-3 of what contacts release.
+    """
+    ledger, found = population.ledger, population.encounters
+    assert ledger["step"][-1] == len(found["event"]) and ledger["hits"][-1] == (found["end"] == 0).sum()
+    assert ledger["flights"][-1] == (found["end"] != 3).sum()
+    assert (np.diff(ledger["mean_cluster_size"]) > 0.0).all() and ledger["mean_cluster_size"][-1] >= 3.0
+    assert found["event"].tolist() == list(range(len(found["event"])))
+    books = math.fsum(float(ledger[name][-1]) for name in dilute_files.HIT_CHANGES)
+    released = -float(ledger["contacts"][-1])
+    assert released > 0.0 and abs(books) < 1e-3 * released
+    kinetic = found["touch_kinetic"] + found["touch_rotation"] + found["kinetic"]
+    assert ledger["to_gas"][-1] == pytest.approx(kinetic[found["end"] == 0].sum(), rel=1e-9, abs=0.0)
+    ratio = found["impact_parameter"] / found["bound"]
+    assert ratio[found["end"] == 0].max() < 1.0 and ratio[found["end"] == 3].min() > 1.0
+
+
+def test_results_are_read_as_those_of_boxes(population):
+    """`sand.open`, frames with separate bodies, and the analysis of ensembles read a population.
+
+    S of the last frame's contacts is that of the ledger, and moments in aggregates.csv are those of its clusters.
+    """
+    run = sand.open(population.folder)
+    assert run.summary["outcome"] == "finished" and len(run.frames) >= 3
+    sizes = np.bincount(cluster_labels(len(run.frames[-1]), run.frames[-1].pair))
+    assert (sizes**2).sum() / sizes.sum() == pytest.approx(run.ledger["mean_cluster_size"][-1], rel=1e-12, abs=0.0)
+    assert sizes[sizes > 1].tolist() == population.aggregates["grains"].tolist()
+    found = growth_of([read_box(population.folder)], (1.5, 3.0))
+    assert found.temperatures == {} and found.moment is not None
+
+
+def test_the_kernel_follows_from_hits_and_bounds(population):
+    """K = Σ hits/Σ(1/K̂): of single grains with the seed's few hits within 4 standard errors of 3.03e-14 m³/s."""
+    kernel = population.kernel()
+    assert kernel.edges[0] == 1 and kernel.value[0, 1] == kernel.value[1, 0]
+    assert abs(kernel.value[0, 0] - 3.03e-14) < 4.0 * kernel.error[0, 0]
+    # the table of classes is a kernel of any two masses in its range, which the coagulation equation takes
+    mass = 3.298e-20
+    table = measured(kernel.rows(mass), extrapolate=True)
+    assert table(mass, mass) == pytest.approx(kernel.value[0, 0], rel=1e-6, abs=0.0)
+    assert table(2.0 * mass, mass) == pytest.approx(kernel.value[0, 1], rel=1e-6, abs=0.0)
+    both = kernel_of([population.encounters] * 2)
+    assert both.value[0, 0] == pytest.approx(kernel.value[0, 0], rel=1e-12, abs=0.0)
+
+
+def small_case(tmp_path, **changes):
+    """The example with a hundred grains to S = 2, joined at the touch, with other keys."""
+    content = read_toml(EXAMPLE)
+    content["grains"]["number"] = 100
+    content["run"]["stop"] = "mean_cluster_size >= 2"
+    content["grow"]["seeds"] = [1, 2]
+    content["method"]["hits"] = "stick"
+    for name, value in changes.items():
+        table, key = name.split("__")
+        content.setdefault(table, {})[key] = value
+    write_toml(tmp_path / "case.toml", content, "test")
+    return tmp_path / "case.toml"
+
+
+def test_the_command_grows_a_population_for_each_seed(tmp_path, capsys):
+    """`sand grow`: folders of seeds, the same bits as alone; with a later end it goes on, as from the start."""
+    case, place = small_case(tmp_path), tmp_path / "grown"
+    assert main(["grow", str(case), "--out", str(place), "--workers", "1", "--quiet"]) in (0, None)
+    assert read_json(place / "growth.json")["seeds"] == [1, 2]
+    later, other = small_case(tmp_path, run__stop="mean_cluster_size >= 2.5"), tmp_path / "other"
+    assert main(["grow", str(later), "--out", str(place), "--workers", "1", "--quiet"]) in (0, None)
+    assert main(["grow", str(later), "--out", str(other), "--seeds", "2", "--workers", "1", "--quiet"]) in (0, None)
+    assert files_of(place / "seed-2") == files_of(other / "seed-2")
+    assert main(["resume", str(place / "seed-1"), "--quiet"]) in (0, None)
+    assert main(["info", str(place / "seed-1")]) in (0, None) and "population" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"number_density": "1e19 /m^3"}, "others on average"),
+        ({"number_density": "-1 /m^3"}, "number_density"),
+        ({"temperature": 0.0}, "temperature"),
+        ({"hits": "bounce"}, "'resolve'"),
+        ({"stop": None}, "stop is missing"),
+        ({"stop": "kinetic_energy > 1 J"}, "kinetic_energy"),
+    ],
+)
+def test_wrong_arguments_are_refused(tmp_path, changes, words):
+    """One line says what is wrong; nothing is written."""
+    arguments = {**NUMBERS, "stop": STOP, "seed": 1, "out": tmp_path / "none", **changes}
+    with pytest.raises(BadInput, match=words):
+        dilute_growth.grow(grains(), FORCES, **arguments)
+    assert not (tmp_path / "none").exists()
+
+
+def test_few_grains_undamped_contacts_and_other_forces_are_refused(tmp_path):
+    """Fewer than 100 bodies; hits = 'resolve' without damping; gravity; a cut-off; no contact model; a dense gas."""
+    how = {**NUMBERS, "stop": STOP, "out": tmp_path / "none"}
+    gas = sand.Gas(temperature="100 K", density="1 kg/m^3", molecule_mass="2.3 u")
+    cases = [
+        (grains(50), FORCES, "too few"),
+        (grains(), [sand.Contact(), sand.Dipoles()], "undamped"),
+        (grains(), [*FORCES, sand.Gravity("1 m/s^2")], "gravity"),
+        (grains(), [FORCES[0], sand.Dipoles(cutoff="1 um")], "cut-off"),
+        (grains(), [sand.Dipoles()], "sand.Contact"),
+        (grains(), [*FORCES, gas], "stopping length"),
+    ]
+    for own, forces, words in cases:
+        with pytest.raises(BadInput, match=words):
+            dilute_growth.grow(own, forces, **how)
+
+
+def test_moments_that_flip_within_a_flight_are_refused(tmp_path):
+    """At 1000 K the moments of 10 nm iron flip within nanoseconds (K₁V/4): superparamagnetic."""
+    with pytest.raises(BadInput, match="superparamagnetic"):
+        dilute_growth.grow(
+            grains(), FORCES, number_density="1e8 /m^3", temperature="1000 K", stop=STOP, out=tmp_path / "x"
+        )
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"box__periodic": "1 um"}, "box"),
+        ({"run__frame_every": "1 us"}, "frame_every"),
+        ({"stepping__accuracy": 1e-6}, "stepping"),
+        ({"method__kind": "boxes"}, "hits"),
+        ({"method__between": "own"}, "between"),
+        ({"grains__spins": "none"}, "spins"),
+    ],
+)
+def test_keys_that_encounters_do_not_have_are_refused(tmp_path, capsys, changes, words):
+    """One line names the key."""
+    assert main(["grow", str(small_case(tmp_path, **changes)), "--out", str(tmp_path / "none")]) not in (0, None)
+    assert words in capsys.readouterr().err and not (tmp_path / "none").exists()
+
+
+def test_a_field_aligns_bodies_on_their_way(tmp_path):
+    """In 50 mT (μB = 240 k_BT) the energy at each start is −2μB of aligned moments to a few k_BT; flights keep it.
+
+    Energy errors of flights that hit are below 3 k_BT rms with the field, too; growth differs from that without.
+    """
+    forces = [sand.Contact(), sand.Dipoles(), sand.Field([0.0, 0.0, 0.05])]
+    how = {**NUMBERS, "stop": "mean_cluster_size >= 1.5", "seed": 2, "hits": "stick"}
+    found = dilute_growth.grow(grains(), forces, **how, out=tmp_path / "field").encounters
+    plain = dilute_growth.grow(grains(), forces[:2], **how, out=tmp_path / "plain").encounters
+    hits = found["end"] == 0
+    assert hits.sum() > 10 and found["time"][-1] != plain["time"][-1]
+    assert np.sqrt((found["flight_error"][hits] ** 2).mean()) < 3.0 * 1.380649e-21
+    single = hits & (found["grains1"] + found["grains2"] == 2)
+    assert (found["energy_start"][single] < -0.95 * 2.0 * 6.6e-18 * 0.05).all()

@@ -1,0 +1,312 @@
+"""Dilute dust: groups of grains, the bound of encounters, draws of pairs, and bodies that join; nothing is compiled."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import kstest
+
+import sand
+from sand.basics.constants import BOLTZMANN
+from sand.basics.initial_pairs import StrainedContacts
+from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
+from sand.experiments.dilute_hits import Stick, moving_pair
+from sand.experiments.dilute_majorant import Majorant, Sizes
+from sand.experiments.dilute_population import Population, sizes_of
+from sand.experiments.dilute_start import orientation_in_field, start_in_field
+from sand.experiments.scattering.event_draws import event_uniforms
+from sand.experiments.scattering.groups import GROUP
+
+RADIUS, MOMENT, T = 1e-8, 6.6e-18, 100.0
+
+
+def aggregate(places, directions, number=0):
+    """Iron grains on lattice places in units of their diameter, with moments in these directions, in contact."""
+    x = np.array(places, float) * 2.0 * RADIUS * (1.0 - 1e-4)
+    grains = sand.Grains(x, RADIUS, "iron", moment=MOMENT * np.array(directions, float))
+    pair = np.array([(i, j) for i in range(len(x)) for j in range(i) if np.linalg.norm(x[i] - x[j]) < 2.0 * RADIUS])
+    zeros = np.zeros((len(pair), 3))
+    contacts = StrainedContacts(pair.reshape(-1, 2)[:, ::-1], zeros, zeros, np.zeros(len(pair)))
+    return body_of(grains.arrays, contacts, number)[0]
+
+
+GRAIN = aggregate([[0, 0, 0]], [[0, 0, 1]])
+DIMER = aggregate([[0, 0, 0], [0, 0, 1]], [[0, 0, 1]] * 2)
+ANTIPARALLEL = aggregate([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0, -1]])
+
+
+def tree(count, seed=0):
+    """An aggregate of grains that stick to random ones of a lattice."""
+    rng, places = np.random.default_rng(seed), [(0, 0, 0)]
+    while len(places) < count:
+        step = np.zeros(3, int)
+        step[rng.integers(3)] = rng.choice((-1, 1))
+        place = tuple((np.array(places[rng.integers(len(places))]) + step).tolist())
+        if place not in places:
+            places.append(place)
+    axes = rng.normal(size=(count, 3))
+    return aggregate(places, axes / np.linalg.norm(axes, axis=1)[:, None])
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 5, 17, 70])
+def test_groups_of_each_level_share_the_grains_and_their_moments(count):
+    """Level l has ⌈n/4ˡ⌉ groups; Σμ and Σ|μ| are those of the body at each level, to rounding of n terms.
+
+    The last level is one group.  `reach` bounds the distance of each grain from the nearest centre of its level.
+    """
+    body = tree(count)
+    grains, groups = body.grains, body.flying.groups
+    levels = len(groups.reach)
+    assert [*np.diff(groups.first)] == [-(-count // GROUP**level) for level in range(levels)]
+    for level in range(levels):
+        part = slice(groups.first[level], groups.first[level + 1])
+        total = groups.moment[:, part].sum(axis=1)
+        assert total == pytest.approx(grains.moment.sum(axis=1), abs=1e-14 * body.strength)
+        assert groups.strength[part].sum() == pytest.approx(body.strength, rel=1e-13, abs=0.0)
+        apart = np.linalg.norm(grains.position[:, :, None] - groups.point[:, None, part], axis=0).min(axis=1)
+        assert apart.max() <= groups.reach[level] + 1e-12 * RADIUS
+    assert groups.first[-1] - groups.first[-2] == 1
+
+
+def test_neighbours_are_in_one_group():
+    """In a straight chain of 16 each group of 4 has neighbours: its reach is 3 radii, that of all 15."""
+    chain = aggregate([[k, 0, 0] for k in range(16)], [[1, 0, 0]] * 16)
+    assert chain.flying.groups.reach == pytest.approx([0.0, 3.0 * RADIUS, 15.0 * RADIUS], rel=1e-3, abs=1e-20)
+
+
+def maxwell(v, spread):
+    """Density of the speeds of Maxwell's distribution."""
+    return math.sqrt(2.0 / math.pi) * v * v / spread**3 * math.exp(-0.5 * (v / spread) ** 2)
+
+
+CHARGED = Sizes(3.3e-20, 0.0, 1e-8, 1.6e-19)
+
+
+@pytest.mark.parametrize("pair", [(GRAIN, GRAIN), (DIMER, tree(12)), (CHARGED, CHARGED)])
+def test_the_bound_of_the_rate_is_the_mean_of_its_cross_section(pair):
+    """K̂ = ∫ π (β² v^(−4/3) + e² + 2eQ/m̄v²) v f(v) dv by quadrature, to its accuracy of 1e-8."""
+    a, b = (each if isinstance(each, Sizes) else sizes_of(each) for each in pair)
+    majorant = Majorant(T)
+    reduced, far, near, focusing = majorant.squares(a, b)
+    spread = math.sqrt(BOLTZMANN * T / reduced)
+
+    def integrand(x):
+        v = x * spread
+        square = far * v ** (-4.0 / 3.0) + near + focusing / v**2
+        return math.pi * square * v * maxwell(v, spread) * spread
+
+    expected = quad(integrand, 0.0, 12.0, epsabs=0.0, epsrel=1e-10, limit=200)[0]
+    assert majorant.kernel(a, b) == pytest.approx(expected, rel=1e-7, abs=0.0)
+
+
+def test_the_bound_uses_all_moments_not_the_net_one():
+    """Of two antiparallel dimers the net moments are 0, but β is that of two dimers with parallel moments."""
+    majorant, (a, b) = Majorant(T), (sizes_of(ANTIPARALLEL), sizes_of(DIMER))
+    assert np.linalg.norm(ANTIPARALLEL.grains.moment.sum(axis=1)) < 1e-12 * MOMENT
+    assert majorant.squares(a, a)[1] == pytest.approx(majorant.squares(b, b)[1], rel=1e-12, abs=0.0)
+
+
+def test_speeds_and_impact_parameters_are_those_of_the_bound():
+    """b²/(β² v^(−4/3) + e²) is uniform, and speeds have the density (…) v f(v); Kolmogorov's test, p > 1e-3."""
+    majorant, size = Majorant(T), sizes_of(GRAIN)
+    reduced, far, near, _ = majorant.squares(size, size)
+    drawn = [majorant.draw(size, size, event_uniforms(3, k)[:3]) for k in range(2000)]
+    speed, b, bound = np.array(drawn).T
+    assert kstest(b**2 / (far * speed ** (-4.0 / 3.0) + near), "uniform").pvalue > 1e-3
+    spread, grid = math.sqrt(BOLTZMANN * T / reduced), np.linspace(1e-6, 12.0, 20_001)
+    parts = np.array([far * (grid * spread) ** (-1.0 / 3.0), near * grid * spread])
+    density = parts.sum(axis=0) * grid**2 * np.exp(-0.5 * grid**2)
+    total = np.cumsum(density)
+    assert kstest(np.interp(speed / spread, grid, total / total[-1]), "uniform").pvalue > 1e-3
+    assert bound == pytest.approx(np.maximum(np.sqrt(far) * speed ** (-2.0 / 3.0), math.sqrt(near)), rel=1e-12, abs=0.0)
+
+
+def test_random_numbers_are_functions_of_seed_and_event():
+    """Different events and seeds have different numbers, the same ones the same; 16,000 are uniform, p > 1e-3."""
+    assert event_uniforms(1, 5) == event_uniforms(1, 5) != event_uniforms(2, 5)
+    assert kstest(np.ravel([event_uniforms(1, k) for k in range(2000)]), "uniform").pvalue > 1e-3
+
+
+def test_sums_of_the_bound_follow_encounters():
+    """Sums that are changed in O(n) by joining, bouncing and doubling equal those of all pairs, to rounding."""
+    rng = np.random.default_rng(1)
+    bodies = [tree(count, k) for k, count in enumerate([1, 1, 1, 2, 3, 5, 8, 1, 1, 2])]
+    population = Population(bodies, 1.0, Majorant(T))
+    for k in range(6):
+        i, j = rng.choice(len(population.bodies), 2, replace=False)
+        population.replace(int(i), int(j), [tree(int(rng.integers(1, 9)), 20 + k)][: 2 - k % 2] * (1 + k // 5))
+        if k == 3:
+            rate = population.rate
+            population.double()
+            # rates per volume stay, but for the pairs of bodies with their copies
+            assert population.rate > 2.0 * rate
+    fresh = Population(population.bodies, population.volume, Majorant(T))
+    assert population.sums == pytest.approx(fresh.sums, rel=1e-12, abs=0.0)
+    assert population.rate == pytest.approx(fresh.rate, rel=1e-12, abs=0.0)
+    assert [*population.grains] == [len(body) for body in population.bodies]
+    sizes = population.grains
+    assert population.mean_size == pytest.approx((sizes**2).sum() / sizes.sum(), rel=1e-14, abs=0.0)
+
+
+def test_pairs_are_drawn_in_proportion_to_the_bound():
+    """Of 600 pairs of four bodies each of the six has its share within 4 standard deviations; none is a body itself."""
+    population = Population([tree(n, n) for n in (1, 2, 4, 9)], 1.0, Majorant(T))
+    count, number = np.zeros((4, 4)), 600
+    for event in range(number):
+        i, j, kernel = population.draw(*event_uniforms(5, event)[1:3])
+        count[min(i, j), max(i, j)] += 1
+        assert kernel == pytest.approx(float(population.row(i)[j]), rel=1e-13, abs=0.0)
+    rows = np.array([population.row(i) for i in range(4)])
+    share = 2.0 * np.triu(rows) / rows.sum()
+    off = np.abs(count - number * share) / np.sqrt(number * share * (1.0 - share) + 1e-9)
+    assert off.max() < 4.0 and not count.diagonal().any()
+
+
+class ConstantBound:
+    """A bound 1.5 K with K = 1 m³/s, whatever the sizes."""
+
+    def kernel(self, a, b):
+        """1.5 of each pair."""
+        return 1.5 + 0.0 * (a.mass + b.mass)
+
+
+def constant_growth(bodies, times, seed):
+    """S at given times of a population of equal bodies with the kernel 1 m³/s, by thinning of the bound."""
+    count = len(bodies)
+    population, time, sizes, found, event = (
+        Population(bodies, float(count), ConstantBound()),
+        0.0,
+        np.ones(count),
+        [],
+        0,
+    )
+    while len(found) < len(times):
+        uniforms = event_uniforms(seed, event)
+        event += 1
+        later = time - math.log(uniforms[0]) / population.rate if len(population.bodies) > 1 else math.inf
+        while len(found) < len(times) and times[len(found)] < later:
+            found.append(float((sizes**2).sum() / count))
+        time = later
+        if len(found) < len(times) and uniforms[3] < 1.0 / 1.5:
+            i, j, _ = population.draw(*uniforms[1:3])
+            joined = sizes[i] + sizes[j]
+            for k in sorted((i, j), reverse=True):  # as `Population.replace` moves them
+                sizes[k] = sizes[-1]
+                sizes = sizes[:-1]
+            sizes = np.append(sizes, joined)
+            population.replace(i, j, [bodies[0]])
+    return found
+
+
+def exact_constant_size(count, times):
+    """⟨S⟩ = n − (n − 1) e^(−K n₀ t/n) of n bodies with a constant kernel (Marcus 1968), with K n₀ = 1/s here."""
+    return count - (count - 1.0) * np.exp(-np.asarray(times) / count)
+
+
+def check_constant_kernel(count, runs, limit):
+    """The mean of S over runs lies within `limit` standard errors of the exact one at each of 5 times."""
+    times = np.geomspace(0.3, 20.0, 5)
+    found = np.array([constant_growth([GRAIN] * count, times, seed) for seed in range(runs)])
+    off = (found.mean(axis=0) - exact_constant_size(count, times)) / (found.std(axis=0, ddof=1) / math.sqrt(runs))
+    assert np.abs(off).max() < limit
+    return off
+
+
+def test_a_constant_kernel_gives_the_exact_mean_size():
+    """Thinning, waiting times and pairs together: 20 populations of 40 bodies; 4 standard errors."""
+    check_constant_kernel(40, 20, 4.0)
+
+
+@pytest.mark.validate
+def test_a_constant_kernel_gives_the_exact_mean_size_of_many(record_bound):
+    """As above with 200 populations of 200 bodies; 3 standard errors at each time."""
+    record_bound(
+        "constant kernel: largest deviation of S [standard errors]",
+        np.abs(check_constant_kernel(200, 200, 4.0)).max(),
+        most=3.0,
+    )
+
+
+def state_of(distance, angle=0.3):
+    """A state of a pair: apart along x, the second body turned about y, both with spins."""
+    turn = [0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle)]
+    return np.array(
+        [distance, 1e-9, 0.0, -3.0, 0.5, 0.1, 0.0, 0.0, 0.0, 1.0, *turn, 1e-27, 2e-27, 0.0, 0.0, 1e-27, -2e-27]
+    )
+
+
+def test_grains_in_space_have_the_momenta_of_their_bodies():
+    """P = 0, L = r × m̄u + L₁ + L₂, and the pieces of `moving_pair` have the state again, to rounding.
+
+    Orientations may differ by the choice of principal axes: positions of the grains are compared.
+    """
+    a, b, y = tree(7, 1), tree(12, 2), state_of(3e-7)
+    grains, contacts = in_space(a, b, y)
+    mass, arm = grains.mass, grains.position
+    assert grains.velocity @ mass == pytest.approx(np.zeros(3), abs=1e-13 * 3.0 * mass.sum())
+    angular = (mass * np.cross(arm, grains.velocity, axis=0)).sum(axis=1) + grains.spin @ grains.inertia
+    reduced = a.mass * b.mass / (a.mass + b.mass)
+    expected = reduced * np.cross(y[0:3], y[3:6]) + y[14:17] + y[17:20]
+    assert angular == pytest.approx(expected, abs=1e-12 * np.linalg.norm(expected))
+    own = np.arange(19)
+    pieces = [(type(grains)(*(each[..., part] for each in grains)), NO_CONTACTS) for part in (own[:7], own[7:])]
+    again = in_space(*moving_pair(pieces))[0]
+    assert again.position == pytest.approx(grains.position, abs=1e-12 * 3e-7)
+    assert again.velocity == pytest.approx(grains.velocity, abs=1e-11 * 3.0)
+    assert len(contacts.pair) == len(a.contacts.pair) + len(b.contacts.pair)
+
+
+def test_bodies_that_stick_touch_as_at_rest():
+    """The joined body has one more contact, at the equilibrium overlap, and the mass of both exactly."""
+    contact = sand.Contact()
+    rule = Stick(contact, (sand.IRON,))
+    a, b = tree(5, 3), tree(9, 4)
+    hit = rule(a, b, state_of(a.extent + b.extent + 1e-9))
+    ((grains, contacts),) = hit.pieces
+    body, _ = body_of(grains, contacts)
+    assert body.mass == pytest.approx(a.mass + b.mass, rel=1e-15, abs=0.0)
+    i, j = contacts.pair[-1]
+    overlap = 2.0 * RADIUS - np.linalg.norm(grains.position[:, i] - grains.position[:, j])
+    rest = (
+        sand.Contact()
+        .contact_law.normal_mode(*sand.Contact().pairing(sand.IRON, sand.IRON)[:2], 0.5 * RADIUS)
+        .rest_overlap
+    )
+    assert overlap == pytest.approx(rest, rel=1e-6, abs=0.0)
+    assert len(contacts.pair) == len(a.contacts.pair) + len(b.contacts.pair) + 1
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 20.0])
+def test_moments_in_a_field_have_langevins_mean(ratio):
+    """⟨cos θ⟩ = coth x − 1/x of moments about the field, x = μB/k_BT, within 4 standard errors of 300 bodies.
+
+    Rotations are proper; about the moment the body is at a random angle, so that a direction across it averages to 0.
+    """
+    rng, heat, field = np.random.default_rng(1), BOLTZMANN * T, np.array([0.0, 3e-4, 4e-4])
+    moment = ratio * heat / 5e-4 * np.array([0.6, 0.0, 0.8])
+    turns = [orientation_in_field(moment, field, heat, tuple(rng.random(3))) for _ in range(300)]
+    assert all(abs(np.linalg.det(turn) - 1.0) < 1e-12 for turn in turns[:20])
+    cosine = np.array([turn @ [0.6, 0.0, 0.8] @ field for turn in turns]) / 5e-4
+    mean = 1.0 / math.tanh(ratio) - 1.0 / ratio if ratio else 0.0
+    if ratio:
+        assert abs(cosine.mean() - mean) < 4.0 * cosine.std() / math.sqrt(300)
+    across = np.array([turn @ [0.0, 1.0, 0.0] for turn in turns])
+    assert np.abs(across.mean(axis=0)).max() < 4.0 / math.sqrt(300)
+
+
+def test_flights_in_a_field_come_from_all_sides_with_thermal_spins():
+    """b and the distance are those given, directions of flight average to 0, and ½L²/I to ½ k_BT per axis; 4 σ."""
+    heat, states = BOLTZMANN * T, []
+    for event in range(100):
+        states.append(start_in_field((DIMER, GRAIN), (2.0, 3e-8, 4e-7), heat, 1.5 * heat, (0.0, 0.0, 5e-5), (1, event)))
+    y = np.array(states)
+    flight = y[:, 3:6] / 2.0
+    along = (y[:, :3] * flight).sum(axis=1)
+    assert along == pytest.approx(np.full(100, -4e-7), rel=1e-12, abs=0.0)
+    assert np.linalg.norm(y[:, :3] - along[:, None] * flight, axis=1) == pytest.approx(
+        np.full(100, 3e-8), rel=1e-9, abs=0.0
+    )
+    assert np.abs(flight.mean(axis=0)).max() < 4.0 / math.sqrt(3.0 * 100)
+    energy = (y[:, 17:20] ** 2).sum(axis=1) / (2.0 * GRAIN.flying.inertia[0]) / heat
+    assert abs(energy.mean() - 1.5) < 4.0 * math.sqrt(1.5 / 100)
