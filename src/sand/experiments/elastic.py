@@ -42,6 +42,8 @@ from .laboratory_box import in_box
 
 WAVE, STIFFENS = 0.005, 2.3
 """Speed of sound over √(E/ρ) of the solid at φ = 0.1, and its exponent of φ, by which the cost is estimated."""
+STRESS_FREE = 1e-6
+"""Strain of the relaxed packing whose stress counts as none, when a packing without residual stress comes to rest."""
 LINEAR = 0.05
 """Largest change of the bulk modulus from that of the smallest strain in the linear range."""
 
@@ -58,7 +60,8 @@ class Elastic(Settings):
         smallest one, and the others show how far it is linear.
     accuracy : float, optional
         The response to a strain counts as complete when it changes by less than this share while the time is doubled,
-        and the packing as at rest when its stress changes by less than a fifth of it: above 0, at most 0.5.
+        and the packing as at rest when its stress changes by less than a fifth of it: above 0, at most 0.5. A warning
+        says what is not complete after the longest time.
     sound : bool, optional
         Whether the speed of sound is measured.
     copies : int, optional
@@ -253,10 +256,10 @@ def measure(
     time = float(rest.box.lengths[0] or 0.0) / (2.0 * math.pi * slowed)
     with rest.change() as change:
         change.replace(drag(rest.grains, time))
-    least = min(how.strains) * density_of(rest) * stiffest**2
-    changed = come_to_rest(rest, time, 0.2 * how.accuracy, least)
+    least = min(*how.strains, STRESS_FREE) * density_of(rest) * slowed**2
+    found = come_to_rest(rest, time, 0.2 * how.accuracy, least)
     springs = contact_springs(rest, contact)
-    at_rest = state_at_rest(rest, changed)
+    at_rest = state_at_rest(rest, *found)
     strains = sorted(how.strains)
     columns: list[list[Column]] = []  # for each strain those of the axes
     for k, strain in enumerate(strains):
@@ -264,15 +267,16 @@ def measure(
         for axis, name in enumerate("xyz"):
             progress(f"strain {strain:g} along {name}", 0.1 + 0.2 * (3 * k + axis) / len(strains))
             columns[k].append(strain_both_ways(rest, axis, strain, time, how.accuracy))
-    knocks, standing = {}, {}
+    knocks, standing, moduli = {}, {}, mean_moduli(matrix_of(columns[0]))
     for axis, name in enumerate("xyz" if how.sound else ""):
         progress(f"waves along {name}", 0.7 + 0.1 * axis)
         many = repeated(start_of(rest), axis, how.copies)
         free = Simulation(
             many.grains, given, box=many.box, contacts=many.contacts, frame_every="1 s", stepping=stepping, seed=seed
         )
-        for wave in (Wave(axis, axis), Wave(axis, (axis + 1) % 3)):
-            standing[wave] = standing_wave(free, wave, strains[0], stiffest)
+        for wave, one in ((Wave(axis, axis), "longitudinal"), (Wave(axis, (axis + 1) % 3), "shear")):
+            static = math.sqrt(max(moduli[one], 0.0) / density_of(rest))
+            standing[wave] = standing_wave(free, wave, strains[0], stiffest, static)
             knocks[wave] = knock(free, wave, strains[0], standing[wave])
     affine, shear = affine_of(rest, springs), affine_shear_moduli(springs, rest.box.volume)
     return Moduli(rest, at_rest, strains, columns, affine, shear, knocks, standing)

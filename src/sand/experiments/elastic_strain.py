@@ -53,6 +53,11 @@ def strain_both_ways(rest: Simulation, axis: int, strain: float, time: float, ac
         if before is not None and (changed := _change(moduli, before)) < accuracy:
             break
         before, held = moduli, 2.0 * held
+    else:
+        warn(
+            f"the response to a strain of {strain:g} along {'xyz'[axis]} is not complete after {held / 2.0:.3g} s: in "
+            f"the second half of this time the moduli changed by {100.0 * changed:.2g} %"
+        )
     limits = max(_at_limit(each) for each in pair)
     made, broken = (
         max(each.ledger.rows[-1][name] - rest.ledger.rows[-1][name] for each in pair) for name in ("made", "broken")
@@ -65,21 +70,24 @@ def strain_both_ways(rest: Simulation, axis: int, strain: float, time: float, ac
     return Column(moduli, changed, float(left), limits, int(made), int(broken), drift)
 
 
-def come_to_rest(simulation: Simulation, time: float, accuracy: float, least: float) -> float:
-    """Run until the stress changes by less than `accuracy`, or `least` [Pa], while the time is doubled.
+def come_to_rest(simulation: Simulation, time: float, accuracy: float, least: float) -> tuple[bool, float]:
+    """Run until no element of P changes by more than `accuracy` of the largest, or `least` [Pa], as the time doubles.
 
-    Returns the last change [Pa]. Warns if it is still larger after DOUBLINGS.
+    Returns whether it is so, and the last change [Pa]. Warns if it is not so after DOUBLINGS.
     """
-    before, held, start = _pressure(simulation), 4.0 * time, simulation.time
+    before, held, start = simulation.stress().total, 4.0 * time, simulation.time
     for _ in range(DOUBLINGS):
         simulation.run(until=start + held)
-        now = _pressure(simulation)
-        changed = float(np.abs(now - before).max())
-        if changed < max(accuracy * np.abs(now).max(), least):
-            return changed
+        now = simulation.stress().total
+        changed, largest = float(np.abs(now - before).max()), float(np.abs(now).max())
+        if changed < max(accuracy * largest, least):
+            return True, changed
         before, held = now, 2.0 * held
-    warn(f"the packing is not at rest after {simulation.time:.3g} s: its stress still changes by {changed:.3g} Pa")
-    return changed
+    warn(
+        f"the packing is not at rest after {simulation.time - start:.3g} s: in the second half of this time its stress "
+        f"changed by {changed:.3g} Pa, of {largest:.3g} Pa"
+    )
+    return False, changed
 
 
 def contact_springs(simulation: Simulation, contact: Contact) -> ContactSprings:
@@ -158,7 +166,7 @@ def _at_limit(simulation: Simulation) -> int:
     return int((np.max(shares, axis=0) > AT_LIMIT).sum())
 
 
-def state_at_rest(simulation: Simulation, changed: float) -> dict[str, float]:
+def state_at_rest(simulation: Simulation, at_rest: bool, changed: float) -> dict[str, float]:
     """What describes the packing at rest."""
     stress, grains, contacts = simulation.stress(), simulation.grains, simulation.contacts
     kinetic = float(stress.parts["kinetic"].trace()) * stress.volume / 2.0
@@ -171,6 +179,7 @@ def state_at_rest(simulation: Simulation, changed: float) -> dict[str, float]:
         "at_limit": _at_limit(simulation),
         "residual": stress.pressure,
         **residual,
+        "at_rest": at_rest,
         "residual_change": changed,
         "kinetic": kinetic,
         "time": simulation.time,

@@ -98,7 +98,7 @@ class Motion:
         return max(abs(each.ledger.drift) for each in self.pair)
 
 
-def standing_wave(rest: Simulation, wave: Wave, strain: float, stiffest: float) -> float:
+def standing_wave(rest: Simulation, wave: Wave, strain: float, stiffest: float, expected: float = 0.0) -> float:
     """Phase speed ω/k [m/s] of the standing wave with k = 2π/L: velocities v cos kx, the mean of which turns at π/2ω.
 
     Parameters
@@ -109,12 +109,16 @@ def standing_wave(rest: Simulation, wave: Wave, strain: float, stiffest: float) 
         k v/ω, about.
     stiffest : float
         Speed of waves of affine motion [m/s], an upper bound.
+    expected : float, optional
+        v/`strain` [m/s]; by default the speed that a first wave finds, whose strain is at most `strain`.
     """
+    # no wave that turns in time is slower than stiffest/LATEST
+    expected = expected or standing_wave(rest, wave, strain, stiffest, stiffest / LATEST)
     length = _side(rest, wave)
     profile = np.cos(2.0 * math.pi * rest.grains.position[:, wave.along] / length)
     first = 0.25 * length / stiffest
     weights = profile * rest.grains.mass
-    motion, time = Motion(rest, wave, strain * stiffest, profile), 0.5 * first
+    motion, time = Motion(rest, wave, strain * expected, profile), 0.5 * first
     before = 0.0, float(weights @ motion.at(0.0))
     while time < LATEST * first:
         now = float(weights @ motion.at(time))
