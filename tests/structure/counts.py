@@ -37,7 +37,7 @@ CAPABILITIES = {
     "energy, folders of several runs named by view": 18,
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
     "plot of packings, stress in exports and in the figure of a run, tables described by info": 357,
-    "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 199,
+    "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 200,
     "cakes, that is ballistic deposits in a periodic column; a lid with a given load, forces on walls that are ramps; "
     "figure of a cake between walls": 268,
     "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 720,
