@@ -36,7 +36,7 @@ CAPABILITIES = {
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
     "energy, folders of several runs named by view": 18,
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
-    "plot of packings, stress in exports and in the figure of a run, tables described by info": 357,
+    "plot of packings, stress in exports and in the figure of a run, tables described by info": 358,
     "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 200,
     "cakes, that is ballistic deposits in a periodic column; a lid with a given load, forces on walls that are ramps; "
     "figure of a cake between walls": 268,
