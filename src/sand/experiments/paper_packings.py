@@ -101,7 +101,7 @@ def compare_pressures(rows: Sequence[Row]) -> list[Compared]:
     for name in CHANNELS:
         values = {f"{filling:g}": near(dense, itemgetter(f"share_{name}"), filling, NEAR_DENSE) for filling in DENSE}
         known = {filling: one.value for filling, one in values.items() if math.isfinite(one.value)}
-        text = ", ".join(f"{value:.2f}" for value in known.values())
+        text = ", ".join(f"{max(value, 0.0):.2f}" for value in known.values())  # rounding gives -1e-16
         compared.append(Compared(f"share of {name} in what is dissipated at φ = {', '.join(known)}", "", text, ""))
     return [one for one in compared if one.ours not in ("", OUTSIDE)]
 
