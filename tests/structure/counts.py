@@ -34,7 +34,7 @@ CAPABILITIES = {
     "Ewald sums of dipoles and charges, forces with cut-offs, and rigid clusters in a box that is deformed at any "
     "rates": 468,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
-    "energy, folders of several runs named by view": 18,
+    "energy, folders of several runs named by view": 21,
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
     "plot of packings, stress in exports and in the figure of a run, tables described by info": 358,
     "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 200,

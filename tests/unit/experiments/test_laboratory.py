@@ -392,11 +392,11 @@ def test_folders_without_a_frame(tmp_path, monkeypatch, capsys):
     assert f"there is no file {tmp_path / 'old'}" in capsys.readouterr().err
     (tmp_path / "old/seed-1").mkdir(parents=True)
     assert main(["stretch", "pull.toml"]) == 2
-    assert f"file, for seed 2: {tmp_path / 'old'} holds runs of several seeds" in capsys.readouterr().err
+    assert f"file, for seed 2: {tmp_path / 'old'} holds a run for each seed" in capsys.readouterr().err
     (tmp_path / "old/case.toml").write_text(COMPRESSION)
     monkeypatch.setattr("sand.cli.view.WAIT", 0.0)
     assert main(["view", "old", "--html", "page.html"]) == 2
-    assert "old holds runs of several seeds" in capsys.readouterr().err
+    assert "old holds a run for each seed" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("contacts")
