@@ -319,6 +319,22 @@ def test_changes_of_the_shear():
         change.deformation = sand.Deformation(shear="1e7 1/s")
 
 
+def test_images_keep_their_velocity_as_a_rate_changes():
+    """With law = "linear" dT/dt is constant, γ L_z at the start, while L_x shrinks; also where a ramp sets A anew.
+
+    The ramp changes the rate along y alone, twice; T = γ L_z t, to rounding in some 1000 steps.
+    """
+    pair = sand.Grains([[0, 0, 0], [1e-6, 0, 0]], RADIUS, ICE)
+    until, shear, side = 3e-7, 1e6, 4e-6
+    ramp = sand.Ramp([[-1e6, 0.0, 5e5], [-1e6, 1e5, 5e5]], [0, until], steps=3)
+    for rate in (ramp, [-1e6, 0.0, 5e5]):
+        law = sand.Deformation(rate, law="linear", shear=shear)
+        sim = sand.Simulation(pair, [DAMPED], box=Box.periodic(side), deformation=law)
+        sim.run(until=until)
+        assert sim.box.lengths[0] == pytest.approx(side * (1.0 - 0.3), rel=1e-9, abs=0.0)
+        assert sim.box.tilt == pytest.approx(shear * side * until, rel=1e-9, abs=0.0)
+
+
 def test_what_cannot_be_used_is_refused():
     """One line each: forces between distant grains, walls, open axes, rigid clusters; also in a tilted box at rest."""
     grains = sand.Grains([[0, 0, 0], [4e-7, 0, 0]], RADIUS, ICE, moment=[[1e-18, 0, 0]] * 2)

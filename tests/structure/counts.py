@@ -34,12 +34,12 @@ CAPABILITIES = {
     "Ewald sums of dipoles and charges, forces with cut-offs, and rigid clusters in a box that is deformed at any "
     "rates": 468,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
-    "energy, folders of several runs named by view": 18,
+    "energy, folders of several runs named by view": 21,
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
-    "plot of packings, stress in exports and in the figure of a run, tables described by info": 357,
-    "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 199,
+    "plot of packings, stress in exports and in the figure of a run, tables described by info": 358,
+    "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 200,
     "cakes, that is ballistic deposits in a periodic column; a lid with a given load, forces on walls that are ramps; "
-    "figure of a cake between walls": 292,
+    "figure of a cake between walls": 298,
     "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 720,
     "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
     "filled again, populations as runs, charges, a field, kernel": 1933,

@@ -234,12 +234,14 @@ class DeformedBox(Component):
         """Set rates and pressure of the present intervals of the ramps, and A where rates have changed."""
         cell, given = _cell_of(engine.stored_state), force_at(self.given, engine.stored_state.time)
         cell.goal[0] = given.pressure or 0.0
-        rates, linear = (*given.rate, given.shear or 0.0), given.law == LINEAR
+        rates = (*given.rate, given.shear or 0.0)
         if (cell.rate != rates).any():
             cell.rate[:], cell.lasts[0] = rates, min(cell.lasts[0], engine.stored_state.time)
+            longer = cell.start / cell.span[:3] if given.law == LINEAR else np.ones(3)
             if given.law != PRESSURE:
-                cell.span[RATE:TILT] = cell.rate[:3] * (cell.start / cell.span[:3] if linear else 1.0)
-            cell.span[SHEAR] = cell.rate[3] * (cell.start[2] / cell.span[2] if linear else 1.0)
+                cell.span[RATE:TILT] = cell.rate[:3] * longer
+            # A_xz L_x L_z is constant while dH/dt is, as A → A F⁻¹ leaves it
+            cell.span[SHEAR] = cell.rate[3] * longer[0] * longer[2]
         if cell.ewald.any() and (cell.chosen != self._lengths_of_sums).any():
             self._lengths_of_sums = cell.chosen.copy()
             use_choices(engine, cell, self._cutoff)

@@ -53,8 +53,11 @@ def without_run(folder: Path) -> str:
         )
     if any((folder / name).exists() for name in (files.SCATTERING, files.FLIGHTS)):
         return f"{folder} holds a job of sand scatter, which keeps no trajectories of grains"
-    if any(folder.glob("seed-*")):
-        return f"{folder} holds runs of several seeds; give the folder of one of them, such as seed-1"
+    if seeds := sorted(one.name for one in folder.glob("seed-*")):
+        table = f"; the table of all is {files.RESULTS_CSV}" * (folder / files.RESULTS_CSV).exists()
+        return f"{folder} holds a run for each seed; give the folder of one of them, such as {seeds[0]}{table}"
+    if (folder / files.LABORATORY).exists():
+        return f"{folder} holds a job of sand elastic, which keeps no trajectories; its table is {files.RESULTS_CSV}"
     if (folder / files.CASE).exists():
         if (content := content_of(folder)).endswith("not been run"):
             return f"{folder} holds {content}"

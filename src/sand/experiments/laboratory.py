@@ -343,8 +343,8 @@ def slow_from(planned: Plan) -> str:
     good = f"{planned.rate_text(planned.rate / first)}, at the start"
     if (times := min(first, last)) > 1.0:
         warn(
-            f"the rate, {planned.rate_text(planned.rate)}, is {times:.2g} times too fast for a static stress; the "
-            f"largest good rate is {good}"
+            f"the rate, {planned.rate_text(planned.rate)}, is too fast for a static stress, {times:.2g} times where "
+            f"the packing is densest; the largest good rate is {good}"
         )
     return good
 

@@ -23,6 +23,8 @@ POINTS = 60
 NOUNS = {"compress": "pressure", "stretch": "tension", "shear": "shear stress"}
 FILLING = r"filling factor $\phi$"
 TOO_FAST, RISING = "open: too fast for a static stress", "rises to the end: no strength"
+UNBALANCED = 0.2
+"""Difference of the mean pressures on floor and lid, in those of the larger one, above which a row is not static."""
 
 Columns = Mapping[str, np.ndarray]
 
@@ -30,7 +32,7 @@ Columns = Mapping[str, np.ndarray]
 def curve_of(tables: Sequence[Columns], x: str, y: str, label: str) -> Curve:
     """Mean and range of a column over the tables of several seeds, within the range of x that all of them have.
 
-    Points are `weak` where a packing was loaded too fast.
+    Points are `weak` where a packing was loaded too fast, or the pressures on floor and lid differ.
     """
     logarithmic = x == "mean_filling"
     if logarithmic:
@@ -41,8 +43,16 @@ def curve_of(tables: Sequence[Columns], x: str, y: str, label: str) -> Curve:
     values = np.array([np.interp(places, table[x], table[y]) for table in tables])
     if logarithmic and y == "stress":  # fast compressions begin with noise, which a logarithm cannot show
         values[values <= 0.0] = np.nan
-    fast = np.max([np.interp(places, table[x], table["rate_ratio"]) for table in tables], axis=0) > 1.0
+    fast = np.max([np.interp(places, table[x], _fast(table)) for table in tables], axis=0) > 1.0
     return Curve(label, places, values.mean(axis=0), values.min(axis=0), values.max(axis=0), np.asarray(fast))
+
+
+def _fast(table: Columns) -> np.ndarray:
+    """The rate over the largest that is slow enough; 2 where the inertia of packing and lid shows as a difference."""
+    if "mean_pressure_floor" not in table:
+        return table["rate_ratio"]
+    both = np.array([table["mean_pressure_floor"], table["mean_pressure_lid"]])
+    return np.where(np.abs(both[0] - both[1]) > UNBALANCED * np.abs(both).max(axis=0), 2.0, table["rate_ratio"])
 
 
 def shares_of(tables: Sequence[Columns], x: str) -> list[Curve]:

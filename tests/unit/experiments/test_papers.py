@@ -203,6 +203,8 @@ def test_pressures_are_compared():
     one_seed = [row | {"stress": 2.0 * 4.74e5 * row["mean_filling"] ** 3} for row in rows if row["seed"] == 1]
     verdict = compare_pressures(one_seed)[0].verdict
     assert verdict == "+1 (+100%): perhaps the rate: the box is 1.3 times too fast"
+    low = [row | {"stress": 0.25 * row["stress"]} for row in one_seed]  # a rate that is too fast does not explain it
+    assert compare_pressures(low)[0].verdict == "-0.5 (-50%): no reason is known"
     panels = compression_panels(rows)
     assert [one.label for one in panels[1].curves] == ["$C_v$ = 1e-05", "$C_v$ = 3e-06"]
     assert panels[1].curves[0].y == pytest.approx(np.full(60, 1.1), rel=1e-3, abs=0.0)
