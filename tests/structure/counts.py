@@ -39,7 +39,7 @@ CAPABILITIES = {
     "plot of packings, stress in exports and in the figure of a run, tables described by info": 358,
     "simple shear of a periodic box, and tilted boxes: images, lists, work, files, page, sand shear by the box": 200,
     "cakes, that is ballistic deposits in a periodic column; a lid with a given load, forces on walls that are ramps; "
-    "figure of a cake between walls": 274,
+    "figure of a cake between walls": 298,
     "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 732,
     "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
     "filled again, populations as runs, charges, a field, kernel": 1933,

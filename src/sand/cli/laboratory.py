@@ -73,7 +73,8 @@ def run_rows(runs: list[dict[str, Any]]) -> report.Rows:
         else:
             where = f", at strain {run['strain_of_largest']:.3g}"
         stress = f"stress {last} at the end, {most} at most{where}; {run['coordination']:.2f} contacts per grain"
-        return f"{ends}; {stress}; {run['step']} steps, drift {run['drift']:.1e}"
+        rest = "at rest; " if run.get("at_rest") else "not at rest; " if "at_rest" in run else ""
+        return f"{ends}; {stress}; {rest}{run['step']} steps, drift {run['drift']:.1e}"
 
     return report.first_of([(f"seed {run['seed']}", text(run)) for run in runs], SHOWN)
 

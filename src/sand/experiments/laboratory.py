@@ -40,7 +40,9 @@ OF_STATE = (
 
 
 REST = 1e-4
-"""Relative change of the filling factor below which a packing under a constant pressure is at rest."""
+"""Relative change of the filling factor below which a packing under a constant pressure may be at rest."""
+BALANCE = 0.05
+"""Share of a constant pressure by which the mean pressures on floor and lid differ from it at most, at rest."""
 
 
 class Rate(NamedTuple):
@@ -188,6 +190,11 @@ class Loading(Settings):
     def load_is_given(self) -> bool:
         """Whether the load is given, and the strain is measured."""
         return self.kind == "compress" and self.pressure is not None
+
+    @property
+    def load_is_constant(self) -> bool:
+        """Whether one load is given, under which the packing comes to rest."""
+        return self.load_is_given and len(self.pressure) == 1
 
     @property
     def axes_allowed(self) -> tuple[str, ...]:
@@ -370,6 +377,7 @@ class Loaded(NamedTuple):
             "largest_stress": most["stress"],
             "strain_of_largest": most["strain"],
             "largest_at_end": most is last,
+            **({"at_rest": at_rest(planned, self.simulation.ledger.rows)} if planned.loading.load_is_constant else {}),
             "drift": self.simulation.ledger.drift,
             "table": {name: [row[name] for row in self.table] for name in last},
         }
@@ -395,6 +403,8 @@ def simulation_of(planned: Plan, forces: Sequence[Force] | None = None, **option
 def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
     """Run the simulation of a plan, which may have been resumed, to its end.
 
+    Warns if a packing is not at rest then under a constant load.
+
     Raises
     ------
     BadInput
@@ -406,25 +416,56 @@ def run_to_end(planned: Plan, simulation: Simulation) -> Loaded:
     simulation.observers = [*simulation.observers, seen]
     if simulation.writer is not None:
         simulation.writer.draws = False  # the figure of the table is drawn by the job
-    steady = planned.loading.load_is_given and len(planned.loading.pressure) == 1
+    steady = planned.loading.load_is_constant
     stop = (lambda running: at_rest(planned, running.ledger.rows)) if steady else None
     if stop is None or simulation.steps % EVERY or not stop(simulation):  # else it had ended before it was resumed
         result = simulation.run(max(planned.until, simulation.time), stop=stop)
         if result.outcome.is_physics:
             raise BadInput(f"the {planned.loading.kind} test cannot be computed to its end: {result}")
     rows = simulation.ledger.rows
+    if steady and not at_rest(planned, rows):
+        warn(unrest(planned, rows))
     if simulation.writer is not None:
         seen.see_frames(simulation.writer.folder / TRAJECTORY, rows)
     return Loaded(planned, table_of(planned, rows, seen), simulation)
 
 
+def window(planned: Plan) -> float:
+    """Time for which a packing must be at rest [s]: a tenth of that of the plan, or a row if it is longer."""
+    return max(0.1 * planned.until, planned.row_every) + 0.5 * planned.row_every
+
+
+def recent(planned: Plan, rows: Sequence[dict[str, float]]) -> tuple[float, float, float]:
+    """Relative change of φ in the last `window`, and the mean pressures of the grains on lid and floor [Pa]."""
+    way, since = _way(planned.loading), rows[-1]["time"] - window(planned)
+    last = [row for k, row in enumerate(rows) if row["time"] >= since or k >= len(rows) - 2]
+    filling, means = [planned.filling(way.sides(planned, row)) for row in last], way.means(planned, last[0], last[-1])
+    return max(filling) / min(filling) - 1.0, means["mean_pressure_lid"], means["mean_pressure_floor"]
+
+
 def at_rest(planned: Plan, rows: Sequence[dict[str, float]]) -> bool:
-    """Whether the filling factor has changed by less than REST in the last tenth of the time of a plan."""
-    recent = [row for row in rows if row["time"] >= rows[-1]["time"] - 0.1 * planned.until - 0.5 * planned.row_every]
-    if len(recent) in (len(rows), 1):
-        return False
-    found = [planned.filling(_way(planned.loading).sides(planned, row)) for row in recent]
-    return max(found) < min(found) * (1.0 + REST)
+    """Whether a packing bears its constant load P, at the last row or at the one before.
+
+    In the last `window` φ changes by less than REST, and the pressures on lid and floor are P within BALANCE. A run
+    that stops at rest writes one more row.
+    """
+    load = planned.loading.pressure[0]
+    for some in (rows, rows[:-1]):
+        if len(some) > 1 and some[-1]["time"] - some[0]["time"] > window(planned):
+            change, *pressures = recent(planned, some)
+            if change < REST and max(abs(one - load) for one in pressures) <= BALANCE * load:
+                return True
+    return False
+
+
+def unrest(planned: Plan, rows: Sequence[dict[str, float]]) -> str:
+    """In what a packing is not at rest, and what to do."""
+    change, *pressures = recent(planned, rows)
+    lid, floor, load = (format_quantity(float(f"{one:.3g}"), "Pa") for one in (*pressures, planned.loading.pressure[0]))
+    return (
+        f"not at rest after {format_quantity(planned.until, 's')}: pressure on the lid {lid}, on the floor {floor}, "
+        f"for {load}, change of the filling factor {100 * change:.2g} %; give a longer until, or damping"
+    )
 
 
 @checked
