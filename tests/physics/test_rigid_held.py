@@ -117,7 +117,7 @@ def test_a_thousand_tumbling_clusters_touch_a_wall(seed):
     assert compare_first_touches(seed, 100) > 50
 
 
-@pytest.mark.filterwarnings(NO_SETTLING)
+@pytest.mark.filterwarnings(NO_SETTLING, "ignore:clusters were awake")  # of about 100,000 contact steps, the limit
 @pytest.mark.compiled("dipoles")
 def test_a_wall_holds_a_magnetic_chain_against_a_grain_that_pulls_it():
     """The force of the floor on a chain of two, as of a body at rest: that of the dipole above, Σ 6kμ²/r⁴.
