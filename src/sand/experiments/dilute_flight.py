@@ -157,11 +157,3 @@ def start_distance(a: Body, b: Body, bound: float) -> float:
     """Distance [m] of the plane on which a flight starts: 2 b̂, but at least that at which the bodies are clear."""
     widest = max(float(a.grains.radius.max()), float(b.grains.radius.max()))
     return max(START * bound, a.extent + b.extent + 4.0 * widest)
-
-
-def reversed_state(state: np.ndarray) -> np.ndarray:
-    """A state (20,) with all motion reversed."""
-    other = state.copy()
-    for part in (slice(3, 6), slice(14, 20)):
-        other[part] *= -1.0
-    return other

@@ -37,8 +37,9 @@ from .elastic_strain import (
 )
 from .elastic_waves import Knock, Wave, knock, repeated, standing_wave
 from .job import ignored
-from .laboratory import BOX, Loading, contact_of, filling_factor, plan, read_rate, run_to_end, simulation_of
+from .laboratory import contact_of, filling_factor, plan, run_to_end, simulation_of
 from .laboratory_box import in_box
+from .laboratory_loading import BOX, Loading, read_rate
 
 WAVE, STIFFENS = 0.005, 2.3
 """Speed of sound over √(E/ρ) of the solid at φ = 0.1, and its exponent of φ, by which the cost is estimated."""

@@ -24,16 +24,6 @@ class ElasticJob(JobOfSeeds):
     COMMAND, RESULTS, KEPT, PARTS = "elastic", LABORATORY, LOADED, "packings"
     case: ElasticCase
 
-    def __init__(
-        self,
-        path: str | Path,
-        folder: str | Path | None = None,
-        seeds: list[int] | None = None,
-        command: str | None = None,
-        **how: bool,
-    ):
-        super().__init__(path, folder, seeds, **how)
-
     def read(self, path: str | Path) -> tuple[ElasticCase, str]:
         """The case, and the name of its table with the seeds."""
         return read_laboratory(path, self.COMMAND), self.COMMAND

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 from ..basics.errors import BadInput
 from ..basics.version import __version__
 from ..config.case import with_absolute_files
+from ..config.commands import command_for
 from ..io.lock import writing
 from ..io.run_folder import CASE, make_folder, read_toml, write_json, write_toml
 from ..io.table import GrowingOutcomes
@@ -156,6 +157,8 @@ class JobOfSeeds(Job):
         Output folder; by default that of the case, or the name of the case file.
     seeds : list of int or None, optional
         Replaces the seeds of the case.
+    command : str or None, optional
+        Command of a job of several commands; by default that of the case.
     **how
         As for `Job`.
 
@@ -170,7 +173,15 @@ class JobOfSeeds(Job):
         The case, checked.
     """
 
-    def __init__(self, path: str | Path, folder: str | Path | None = None, seeds: list[int] | None = None, **how: bool):
+    def __init__(
+        self,
+        path: str | Path,
+        folder: str | Path | None = None,
+        seeds: list[int] | None = None,
+        command: str | None = None,
+        **how: bool,
+    ):
+        self.COMMAND = command or self.COMMAND or command_for(read_toml(path)) or ""  # type: ignore[misc]
         self.case, table = self.read(path)
         section = getattr(self.case, table)
         super().__init__(path, folder or section.out, **how)

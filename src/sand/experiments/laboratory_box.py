@@ -15,7 +15,8 @@ from ..contact.model import Contact
 from ..setup.from_frame import Start
 
 if TYPE_CHECKING:
-    from .laboratory import Loading, Plan
+    from .laboratory import Plan
+    from .laboratory_loading import Loading
 
 LOST = "lost_box"
 """Column of the ledger: energy [J] that the moving box took from grains and contacts."""

@@ -29,7 +29,8 @@ from ..setup.from_file import from_trajectory, is_own_trajectory
 from ..setup.from_frame import Start
 from .collision_case import BodySection
 from .elastic import Begun, Elastic, begin
-from .laboratory import Loading, Plan, filling_factor, plan
+from .laboratory import Plan, filling_factor, plan
+from .laboratory_loading import Loading
 
 
 class PackingSection(BodySection):

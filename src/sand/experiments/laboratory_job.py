@@ -13,9 +13,8 @@ from ..basics.errors import BadInput, naming
 from ..basics.units import format_quantity
 from ..compiler.progress import announce
 from ..config.build import resume
-from ..config.commands import command_for
 from ..io.checkpoint_files import checkpoint_files
-from ..io.run_folder import FIGURE, LABORATORY, LOADED, RESULTS_CSV, read_toml
+from ..io.run_folder import FIGURE, LABORATORY, LOADED, RESULTS_CSV
 from ..io.table import write_table
 from ..simulation.observers import Observer
 from ..simulation.serialise import changed_tables
@@ -27,27 +26,11 @@ from .laboratory_case import OF_COMMAND, LaboratoryCase, model_of, read_laborato
 class LaboratoryJob(JobOfSeeds):
     """Packings that are loaded, one for each seed, each in its own folder seed-N with all files of a run.
 
-    Parameters
-    ----------
-    command : str or None, optional
-        "compress", "stretch" or "shear"; by default that of the case.
-    path, folder, seeds, **how
-        As for `JobOfSeeds`.
+    Parameters are those of `JobOfSeeds`, with the command "compress", "stretch" or "shear".
     """
 
-    RESULTS, KEPT, PARTS = LABORATORY, LOADED, "runs"
+    COMMAND, RESULTS, KEPT, PARTS = "", LABORATORY, LOADED, "runs"
     case: LaboratoryCase
-
-    def __init__(
-        self,
-        path: str | Path,
-        folder: str | Path | None = None,
-        seeds: list[int] | None = None,
-        command: str | None = None,
-        **how: bool,
-    ):
-        self.COMMAND = command or command_for(read_toml(path)) or ""  # type: ignore[misc]
-        super().__init__(path, folder, seeds, **how)
 
     def read(self, path: str | Path) -> tuple[LaboratoryCase, str]:
         """The case, and the name of its table with the seeds."""

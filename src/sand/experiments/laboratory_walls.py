@@ -17,7 +17,8 @@ from ..setup.from_frame import Start
 from .laboratory_box import in_box
 
 if TYPE_CHECKING:
-    from .laboratory import Loading, Plan
+    from .laboratory import Plan
+    from .laboratory_loading import Loading
 
 FLOOR, LID = "floor", "lid"
 FACTOR = 1.05

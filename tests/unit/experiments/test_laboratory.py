@@ -16,6 +16,7 @@ from sand.experiments import laboratory
 from sand.experiments.laboratory import Loaded, Loading, load, plan
 from sand.experiments.laboratory_figure import laboratory_figure
 from sand.experiments.laboratory_job import rows_of
+from sand.experiments.laboratory_loading import read_rate
 from sand.experiments.laboratory_table import Percolation, percolating, shares, table_of
 from sand.theory.compression import packing_scales
 
@@ -48,7 +49,7 @@ def test_rates(given, value, unit):
     """A rate per time of a contact, per second, or a speed; what is read is written so that it is read again."""
     found = Loading("compress", given, 0.4, by="walls").rate
     assert found == (pytest.approx(value, rel=1e-12, abs=0.0), unit)
-    assert laboratory.read_rate(str(found), "rate") == found
+    assert read_rate(str(found), "rate") == found
 
 
 def test_walls_touch_the_outermost_grains():
