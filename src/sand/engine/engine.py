@@ -240,7 +240,7 @@ class Engine(CompiledState):
         self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
-        """Take steps until `until` [s], or `most_steps` steps and those that are left of the last r-RESPA cycle.
+        """Take steps until `until` [s], or `most_steps` steps; an r-RESPA cycle is taken to its end.
 
         Components are brought up to date (`update`) before the first step, after the last one, and after the first step
         or cycle that ends at or after their `next_time`.

@@ -129,9 +129,10 @@ def grow(
     """Grow a population of thermal bodies to its end; called again, it continues an interrupted one with equal bits.
 
     Bodies, the clusters of the grains, are in a volume at a number density; between two encounters speeds, spins and
-    orientations are those of thermal equilibrium.  Pairs are drawn in proportion to an upper bound of their rate, fly
-    from far away, and those that touch are computed grain by grain until they are at rest.  When half of the bodies are
-    left, all are copied, in twice the volume.
+    orientations are those of thermal equilibrium.  Pairs of bodies are drawn in
+    proportion to an upper bound of their collision rate, and fly from far away as rigid bodies; if they touch, their
+    collision is computed grain by grain until the grains are at rest.  When half of the bodies are left, all are
+    copied, and the volume is doubled.
 
     Parameters
     ----------

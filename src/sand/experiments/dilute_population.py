@@ -10,8 +10,8 @@ import numpy as np
 from .dilute_body import Body
 from .dilute_majorant import Majorant, Sizes
 
-ROOM = 64
-"""Bodies for which the arrays are enlarged at a time."""
+SPARE_COLUMNS = 64
+"""Columns by which the arrays are enlarged when all belong to bodies."""
 
 
 class Population:
@@ -102,8 +102,9 @@ class Population:
         for body in new:
             count = len(self.bodies)
             if count == self._sums.size:
-                self._table = np.pad(self._table, ((0, 0), (0, ROOM)))
-                self._grains, self._sums = np.pad(self._grains, (0, ROOM)), np.pad(self._sums, (0, ROOM))
+                more = (0, SPARE_COLUMNS)
+                self._table = np.pad(self._table, ((0, 0), more))
+                self._grains, self._sums = np.pad(self._grains, more), np.pad(self._sums, more)
             row = self.kernel_with(sizes_of(body))
             self._sums[:count] += row
             self._sums[count], self._table[:, count], self._grains[count] = row.sum(), sizes_of(body), len(body)
