@@ -94,7 +94,8 @@ def deposit(
     Grains fall along −z, one after another, and stick at the first touch of the floor or of another grain, periodic
     images included; all contacts are at the equilibrium distance. Equal grains have a filling factor of about 0.15.
     Grains that roll on after their first touch, `contacts` = 2 or 3, as in the aggregates BAM1 and BAM2 of Shen, Draine
-    & Johnson (2008), make denser deposits, whose filling factors fall with height from 0.26 to 0.22 and 0.36 to 0.29. The cake is one body by its floor alone.
+    & Johnson (2008), make denser deposits, whose filling factors fall with height from 0.26 to 0.22 and 0.36 to 0.29.
+    The cake is one body by its floor alone.
 
     Parameters
     ----------
