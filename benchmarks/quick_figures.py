@@ -1,9 +1,10 @@
 """`python -m benchmarks --quoted`: measure what README and docs quote and a few minutes can measure.
 
-It runs examples/iron-gas.toml by the command line, with an empty cache and with a full one, draws the picture of README
-from its last frame, runs the scripts of README and of the first page of the docs, and writes docs/measured.json and the
-copies in README and CONTRIBUTING. Times are CPU times of one thread, because machines are shared. Records that it does
-not measure stay as they are. `--tests` adds the wall time of the default tests on two cores.
+It runs examples/iron-gas.toml by the command line, with an empty cache and with a full one, draws the pictures of
+README and docs from its last frame (`pictures.py`, by a Chromium), runs the scripts of README and of the first page
+of the docs, and writes docs/measured.json and the copies in README, CONTRIBUTING and ARCHITECTURE. Times are CPU
+times of one thread, because machines are shared. Records that it does not measure stay as they are. `--tests` adds
+the wall time of the default tests on two cores.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import datetime
 import json
 import os
 import platform
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,16 +20,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-import sand
-from sand.analysis.clusters import cluster_labels, unwrapped
-from sand.analysis.shape import gyration_radius, gyration_tensor
-
-from . import page_code, quoted, start_up
+from . import page_code, pictures, quoted, start_up
 from .timing import ran
 
-PICTURE = quoted.TOP / "docs" / "_static" / "iron-gas.png"
 SAND = start_up.SAND
 FIRST_PAGE = quoted.TOP / "docs" / "start.md"
 RUN_CELLS = "from pathlib import Path; from benchmarks import page_code as p; p.run_cells(p.cells(Path({!r})))"
@@ -84,25 +77,9 @@ def main_job(top: Path) -> dict[str, Any]:
     }
 
 
-def broadside(frame: Any) -> tuple[int, np.ndarray]:
-    """Rank by size of the most extended cluster (1 is the largest), and the direction of its shortest axis."""
-    labels = cluster_labels(len(frame.position), frame.pair)
-    whole = unwrapped(frame.position, frame.pair, frame.box)
-    ranked = np.argsort(-np.bincount(labels), kind="stable")  # as `sand plot --cluster` counts
-    bodies = [whole[labels == k] for k in ranked if np.sum(labels == k) > 1]
-    widest = int(np.argmax([gyration_radius(body) for body in bodies]))
-    axis = np.linalg.eigh(gyration_tensor(bodies[widest]))[1][:, 0]
-    return widest + 1, axis if axis[2] > 0.0 else -axis
-
-
 def picture(top: Path) -> dict[str, Any]:
-    """Draw the most extended cluster of the main job; the commands that make it."""
-    rank, axis = broadside(sand.open(top / "again").frames[-1])
-    view = ",".join(f"{x:.1f}" for x in axis)
-    words = ["--what", "still", "--cluster", str(rank), f"--view={view}", "--perspective", "--size", "1200x520"]
-    ran([*SAND, "plot", str(top / "again"), *words, "--out", str(top / "plots")], env=environment(top / "cache"))
-    shutil.copyfile(top / "plots" / "still.png", PICTURE)
-    return {"commands": f"sand run examples/iron-gas.toml\nsand plot iron-gas {' '.join(words)}"}
+    """Draw the most extended cluster of the main job; how many grains it has."""
+    return {"grains": [pictures.draw(top / "again", top, environment(top / "cache")), ""]}
 
 
 def script(top: Path) -> dict[str, Any]:
@@ -140,7 +117,7 @@ def tests(top: Path) -> dict[str, Any]:
 
 
 def write(with_tests: bool) -> str:
-    """Measure, and write docs/measured.json, the picture and the copies; the values as text."""
+    """Measure, and write docs/measured.json, the pictures and the copies; the values as text."""
     measures = [main_job, picture, script, first_page, commands, *([tests] if with_tests else [])]
     records = quoted.read()
     about = {"commit": commit(), "date": str(datetime.date.today()), "machine": processor()}

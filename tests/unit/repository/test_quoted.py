@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 quoted = pytest.importorskip("benchmarks.quoted", reason="benchmarks are not beside the tests")
-from benchmarks import page_code, quick_figures  # noqa: E402
+from benchmarks import page_code, pictures, quick_figures  # noqa: E402
 
 TOP = Path(__file__).parents[3]
 DOCS = sorted(
@@ -26,12 +26,12 @@ COSTS = re.compile(
 grains are shorter, those below are not."""
 NO_COST = {
     "docs/batch.md": ("waits up to ten seconds for them",),  # a setting
-    "CONTRIBUTING.md": (
+    "docs/maintain.md": (
         "0.5 s each, half a minute in total",  # limits that tests keep, not measured
         "| 3 s each",
         "an hour in total on two cores",
-        "a step of 0 s",
     ),
+    "docs/extend.md": ("a step of 0 s",),
     "docs/howto.md": (
         "every 30 s of wall time",  # settings
         "at least once a minute",
@@ -48,6 +48,12 @@ NO_COST = {
     "docs/physics/rigid-clusters.md": ("until the mean cluster size is 20, after 1.2 ms",),
 }
 """Texts that are no costs."""
+
+
+def anchors(page: str) -> set[str]:
+    """The headings of a page as they stand in links."""
+    headings = re.findall(r"^#+ (.+)$", page, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def prose(path: Path) -> str:
@@ -115,10 +121,11 @@ def test_copies_are_those_of_the_file(path):
 
 @pytest.mark.parametrize("path", quoted.COPIES, ids=lambda path: path.name)
 def test_links_lead_to_files(path):
-    """Relative links and pictures of the pages at the top."""
-    links = re.findall(r"\]\((?!\w+:|#)([^)#\s]+)", path.read_text("utf-8"))
-    assert not [link for link in links if not (TOP / link).is_file()]
-    assert path.name != "README.md" or quick_figures.PICTURE.relative_to(TOP).as_posix() in links
+    """Relative links, headings in them, and pictures of the pages at the top."""
+    links = re.findall(r"\]\((?!\w+:|#)([^)#\s]+)(?:#([^)\s]+))?", path.read_text("utf-8"))
+    assert not [link for link, _ in links if not (TOP / link).is_file()]
+    assert not [(link, to) for link, to in links if to and to not in anchors((TOP / link).read_text("utf-8"))]
+    assert path.name != "README.md" or pictures.PAGE.relative_to(TOP).as_posix() in dict(links)
 
 
 def test_a_changed_figure_is_noticed():

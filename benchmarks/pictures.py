@@ -1,0 +1,95 @@
+"""Pictures of README and docs, of the last frame of examples/iron-gas.toml: a still, and the page of `sand view`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import sand
+from sand.analysis.clusters import cluster_labels, unwrapped
+from sand.analysis.shape import gyration_radius, gyration_tensor
+
+from . import quoted, start_up
+from .timing import ran
+
+STATIC = quoted.TOP / "docs" / "_static"
+STILL = STATIC / "iron-gas.png"
+PAGE = STATIC / "grainview.png"
+WINDOW = {"width": 1200, "height": 640}
+"""Of the browser, in pixels."""
+SURROUNDINGS = 1.15
+"""Height of the view over that at which the cluster fills it."""
+
+
+class Broadside(NamedTuple):
+    """The most extended cluster of a frame, and how to look at it.
+
+    Attributes:
+        rank: by size, as `sand plot --cluster` counts; 1 is the largest.
+        grain: one of its grains.
+        grains: their number.
+        shortest: direction of its shortest axis, towards the eye.
+        middle: direction of its middle axis, upwards.
+    """
+
+    rank: int
+    grain: int
+    grains: int
+    shortest: np.ndarray
+    middle: np.ndarray
+
+
+def broadside(frame: Any) -> Broadside:
+    """The most extended cluster of a frame, whose longest axis shall lie across the picture."""
+    labels = cluster_labels(len(frame.position), frame.pair)
+    whole = unwrapped(frame.position, frame.pair, frame.box)
+    ranked = np.argsort(-np.bincount(labels), kind="stable")
+    members = [np.flatnonzero(labels == k) for k in ranked if np.sum(labels == k) > 1]
+    widest = int(np.argmax([gyration_radius(whole[body]) for body in members]))
+    axes = np.linalg.eigh(gyration_tensor(whole[members[widest]]))[1]
+    shortest, middle = (axis if axis[2] > 0.0 else -axis for axis in axes.T[:2])
+    return Broadside(widest + 1, int(members[widest][0]), len(members[widest]), shortest, middle)
+
+
+def draw(folder: Path, top: Path, environment: Mapping[str, str]) -> int:
+    """Draw both pictures of a run; number of grains of the cluster in them.
+
+    Args:
+        folder: of the run.
+        top: a folder for files on the way.
+        environment: of the command that draws the still.
+    """
+    frames = sand.open(folder).frames
+    seen = broadside(frames[-1])
+    view = ",".join(f"{x:.1f}" for x in seen.shortest)
+    words = ["--what", "still", "--cluster", str(seen.rank), f"--view={view}", "--perspective", "--size", "1200x520"]
+    ran([*start_up.SAND, "plot", str(folder), *words, "--out", str(top / "plots")], env=dict(environment))
+    shutil.copyfile(top / "plots" / "still.png", STILL)
+    page(folder, len(frames) - 1, seen, PAGE)
+    return seen.grains
+
+
+def page(folder: Path, frame: int, seen: Broadside, target: Path) -> None:
+    """A picture of the page of `sand view` with a cluster broadside, without the settings; needs a Chromium."""
+    from playwright.sync_api import sync_playwright
+    from tests.browser.chromium import FLAGS, find
+    from tests.browser.driving import Driven, served
+
+    with sync_playwright() as playwright, served(folder, None) as server:
+        browser = playwright.chromium.launch(executable_path=find(), headless=True, args=list(FLAGS))
+        tab = Driven(
+            browser.new_page(viewport=WINDOW), f"{server.url}#frame={frame}&grain={seen.grain}&isolate=1", bare=True
+        )
+        tab.run("app.camera.lookAlong(told[0], told[1])", seen.shortest.tolist(), seen.middle.tolist())
+        tab.press("z")  # the cluster fills the window
+        eye = tab.look()
+        look = [*eye["target"], *eye["from"], *eye["up"], SURROUNDINGS * eye["height"]]
+        look = ",".join(f"{x:.5g}" for x in look)
+        tab.open(f"{server.url}#frame={frame}&theme=light&bonds=load&size=0.75&box=0&look={look}")
+        tab.press("`")  # closes the settings
+        tab.tab.screenshot(path=target)
+        browser.close()
