@@ -90,3 +90,37 @@ def size_distribution(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     sizes, numbers = np.unique(np.bincount(checked_labels(labels)), return_counts=True)
     return sizes, numbers
+
+
+def mass_spectrum(sizes: np.ndarray, per_decade: float = 5.0) -> tuple[np.ndarray, ...]:
+    r"""s² n_s over the size s, averaged over classes of sizes of equal logarithmic width, per grain.
+
+    n_s is the number of clusters of s grains over the number of all grains, so that the sum over s of s n_s is 1, and
+    s² n_s is the share of the grains in clusters of a range d ln s of sizes, over that range. The value of a class from
+    a up to, and without, b is the mean over all its whole numbers, those without a cluster included:
+
+    .. math:: \langle s^2 n_s \rangle = \frac{1}{b-a} \sum_{s=a}^{b-1} s^2 n_s
+
+    Parameters
+    ----------
+    sizes : ndarray
+        (K,) grains of each cluster, single grains included; those of several boxes together.
+    per_decade : float, optional
+        Number of classes per factor of 10 of s; small sizes have a class each.
+
+    Returns
+    -------
+    tuple of ndarray
+        Geometric mean of the ends a and b − 1 of each class with a cluster, the mean of s² n_s, and its relative
+        standard error 1/√clusters, as for independent clusters.
+    """
+    grains = np.asarray(sizes, np.int64)
+    steps = np.arange(int(per_decade * np.log10(max(int(grains.max(initial=1)), 1))) + 2) / per_decade
+    ends = np.unique(np.append(np.ceil(10.0**steps - 1e-9).astype(np.int64), grains.max(initial=1) + 1))
+    ends = ends[ends <= grains.max(initial=1) + 1]
+    number = np.searchsorted(ends, grains, "right") - 1
+    count = np.bincount(number, minlength=len(ends) - 1)
+    total = np.bincount(number, grains.astype(float) ** 2, len(ends) - 1) / max(int(grains.sum()), 1)
+    found = count > 0
+    low, high = ends[:-1][found], ends[1:][found]
+    return np.sqrt(low * (high - 1.0)), total[found] / (high - low), 1.0 / np.sqrt(count[found])

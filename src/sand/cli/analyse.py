@@ -34,6 +34,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @click.option("--guides", is_flag=True, help="Draw the power laws of the paper in growth.png, too.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
 @options.output
+@options.drawing
 def command(
     folders: tuple[str, ...],
     out: str | None,

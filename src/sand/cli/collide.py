@@ -20,6 +20,7 @@ SHOWN = 12
 @options.imports
 @options.threads
 @options.output
+@options.drawing
 def command(
     case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
 ) -> None:

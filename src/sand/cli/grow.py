@@ -20,6 +20,7 @@ from . import options, parsing, report
 )
 @options.execution
 @options.output
+@options.drawing
 def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 

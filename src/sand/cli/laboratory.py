@@ -28,6 +28,7 @@ def command_of(
     @options.job_of_seeds
     @options.execution
     @options.output
+    @options.drawing
     def command(
         case: str, out: str | None, seeds: list[int] | None, overwrite: bool, threads: int | None, **how: Any
     ) -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import warnings
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -98,13 +102,13 @@ def _software(results: dict[str, Any]) -> str:
     return f"The simulations were done with {name} {cite('SAND', 'DominikNuebold2002')}{with_others}."
 
 
-def _common(case: Any, names: Iterable[str], results: dict[str, Any], forces: Any) -> Sentences:
-    """Materials of these names, forces and integrator of a case."""
-    from ..basics.material import PRESETS
+def _common(case: Any, materials: Iterable[Any], results: dict[str, Any], forces: Any) -> Sentences:
+    """Materials, given or by name, forces and integrator of a case."""
     from .method_text import of_forces, of_materials, of_steps
 
-    library = {**PRESETS, **{name: table.build(name) for name, table in case.materials.items()}}
-    yield from of_materials(library[name] for name in dict.fromkeys(names))
+    library = _library(case)
+    used = [library[one] if isinstance(one, str) else one for one in materials]
+    yield from of_materials({one.name: one for one in used}.values())
     yield from of_forces(forces)
     yield of_steps(case.stepping, results)
 
@@ -112,6 +116,38 @@ def _common(case: Any, names: Iterable[str], results: dict[str, Any], forces: An
 def _names(given: Any) -> list[str]:
     """Names of materials: one, several, or fractions."""
     return [given] if isinstance(given, str) else list(given or [])
+
+
+def _library(case: Any) -> dict[str, Any]:
+    """Presets and the materials of a case, by name."""
+    from ..basics.material import PRESETS
+
+    return {**PRESETS, **{name: table.build(name) for name, table in case.materials.items()}}
+
+
+def _names_none(body: Any) -> bool:
+    """Whether the materials of a body are those of its file, because the case names none."""
+    return body.kind == "file" and "material" not in body.model_fields_set
+
+
+def _of_body(body: Any, make: Callable[[], Any]) -> list[Any]:
+    """Materials of a body, by name, or of what `make` reads from its file; none if that is gone."""
+    if not _names_none(body):
+        return [body.material]
+    with contextlib.suppress(BadInput), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of how the file is understood
+        made = make()
+        return list(getattr(made, "grains", made).materials)
+    return []
+
+
+def _section_of(body: Any) -> str:
+    """What a case says of a body; no material that is a default in place of that of its file."""
+    from .method_text import section
+
+    if not _names_none(body):
+        return section(body)
+    return f"{section(body, 'material')}, with the materials of that file"
 
 
 def _of_run(folder: Path, path: Path) -> Sentences:
@@ -133,12 +169,15 @@ def _of_case(case: Any, results: dict[str, Any], radii: str = "") -> Sentences:
     grains, number = case.grains, case.grains.number or results.get("grains")
     origin = {"gas": "a gas", "file": "of a file", "given": "placed by a script"}[grains.kind]
     count = f"{number} grains{radii}" if number else f"grains{radii}"
-    yield f"The initial state was {count}, {origin}: {section(grains, 'kind', 'number', 'classes')}."
+    unnamed = ("material",) if _names_none(grains) else ()
+    yield f"The initial state was {count}, {origin}: {section(grains, 'kind', 'number', 'classes', *unnamed)}."
     for one in grains.classes:
         yield f"A class of its members had: {settings(one)}."
     where = "open space" if case.box.space is None else f"a box, {case.box.space.describe().replace(' um', ' µm')}"
     yield f"They moved in {where}."
-    used = _names(grains.material) + [name for one in grains.classes for name in _names(one.material)]
+    used = _names(None if unnamed else grains.material) + [
+        name for one in grains.classes for name in _names(one.material)
+    ]
     yield from _common(case, [*used, *case.materials], results, case.forces.build())
     for name, components in case.components().items():
         for one in components if isinstance(components, list) else [components] * (components is not None):
@@ -209,11 +248,13 @@ def _collision(case: Any, summary: dict[str, Any]) -> Sentences:
 
     bodies = {name: body for name in ("target", "projectile") if (body := getattr(case, name)) is not None}
     for name, body in bodies.items():
-        yield f"The {name} was: {section(body)}."
+        yield f"The {name} was: {_section_of(body)}."
     if len(bodies) == 1:
         yield f"It collided with a copy of itself, and so did what grew from it: {section(case.sequence)}."
     yield f"They collided with {section(case.impact, 'seeds', 'out')}; b, c: sums of outer, characteristic radii."
-    used = [*(body.material for body in bodies.values()), *case.materials]
+    library, seed = _library(case), case.impact.seeds[0]
+    of_bodies = [_of_body(body, partial(body.build, library, seed)) for body in bodies.values()]
+    used = [*itertools.chain(*of_bodies), *case.materials]
     yield from _common(case, used, summary, case.physics()[0])
 
 
@@ -234,9 +275,11 @@ def _loading(case: Any) -> Sentences:
     """Sentences on a case of `sand compress`, `stretch`, `shear` or `elastic`."""
     from .method_text import section
 
-    yield f"The packing was: {section(case.aggregate)}."
+    body, library = case.aggregate, _library(case)
+    yield f"The packing was: {_section_of(body)}."
     yield f"What was done, {case.section.kind}: {section(case.section, 'seeds', 'out')}; t_c is the time of a contact."
-    yield from _common(case, [case.aggregate.material, *case.materials], {}, case.physics())
+    used = _of_body(body, partial(body.packing, library, case.section.seeds[0]))
+    yield from _common(case, [*used, *case.materials], {}, case.physics())
 
 
 def _of_scattering(folder: Path, path: Path) -> Sentences:

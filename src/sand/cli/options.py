@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -78,6 +79,54 @@ threads = click.option(
     metavar="N",
     help="Threads for a large simulation (default: one per core, or $SAND_THREADS); results do not depend on it.",
 )
+
+
+def _read_width(_context: click.Context, _option: click.Parameter, text: str | None) -> str | None:
+    """Check a width.  Raises BadInput."""
+    if text is not None:
+        from ..plotting.figure_format import width_in_inches
+
+        width_in_inches(text, "--width")
+    return text
+
+
+def _read_style(_context: click.Context, _option: click.Parameter, text: str | None) -> str | None:
+    """Check a style of matplotlib.  Raises BadInput."""
+    if text is not None:
+        from ..plotting.figure_format import style_settings
+
+        style_settings(text, "--style")
+    return text
+
+
+def drawing(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --width and --style of every command that draws figures, which hold while it runs."""
+
+    @functools.wraps(command)
+    def drawn(*given: Any, figure_width: str | None, figure_style: str | None, **named: Any) -> Any:
+        if figure_width is None and figure_style is None:
+            return command(*given, **named)
+        from ..plotting.figure_format import figure_format
+
+        with figure_format(figure_width, figure_style):
+            return command(*given, **named)
+
+    width = click.option(
+        "--width",
+        "figure_width",
+        metavar="WIDTH",
+        callback=_read_width,
+        help="Width of figures, such as 3.4in or 86mm.",
+    )
+    style = click.option(
+        "--style",
+        "figure_style",
+        metavar="FILE",
+        type=FILE,
+        callback=_read_style,
+        help="Style file of matplotlib (.mplstyle), or name of a style, for fonts and lines of figures.",
+    )
+    return width(style(drawn))
 
 
 READING = ("radius", "length", "material")

@@ -12,7 +12,8 @@ import click
 from ..basics.errors import BadInput, did_you_mean
 from . import options, parsing, report
 
-STILL = "still"
+STILL, SPECTRUM = "still", "mass_spectrum"
+"""Of a frame: the picture of its grains, and s² n_s of its clusters."""
 GROWTH, OF_GROWTH = "growth", ("impact_parameter", "reach", "growth_efficiency", "kind", "seed")
 """The figure of the growth efficiency, and the columns that it needs."""
 FORMATS = ("png", "pdf", "svg")
@@ -51,8 +52,10 @@ class Source(NamedTuple):
     run: Any  # None for a trajectory
 
 
-def _size(_context: click.Context, _option: click.Parameter, text: str) -> PrintSize:
+def _size(_context: click.Context, _option: click.Parameter, text: str | None) -> PrintSize | None:
     """Read '1600x1000' or '17x10.6 cm'.  Raises BadInput."""
+    if text is None:
+        return None
     numbers = text.lower().replace("×", "x").rstrip("cmin ")
     unit = text.lower().replace("×", "x")[len(numbers) :].strip()
     try:
@@ -71,8 +74,29 @@ def _what(_context: click.Context, _option: click.Parameter, text: str | None) -
     return None if text is None else list(dict.fromkeys(part.strip() for part in text.split(",")))
 
 
+def _labels(_context: click.Context, _option: click.Parameter, text: str | None) -> list[str] | None:
+    """Read labels of runs."""
+    return None if text is None else [part.strip() for part in text.split(",")]
+
+
+def _check_several(sources: list[str], values: Mapping[str, Any]) -> Iterator[str]:
+    """Errors of what is given for several runs."""
+    labels, names = values["labels"], values["what"] or []
+    if labels is not None and len(labels) != len(sources):
+        yield f"--labels names {len(labels)} of {len(sources)} runs; give one label for each, separated by commas"
+    elif labels is not None and len(set(labels)) < len(labels):
+        yield "--labels gives the same label twice; labels must differ"
+    if len(sources) < 2:
+        return
+    if STILL in names:
+        yield "--what still shows one run; give one, or leave still out"
+    yield from (f"{one} holds a sweep or a job of packings; draw it alone" for one in sources if _is_many(Path(one)))
+
+
 def _check(values: Mapping[str, Any]) -> Iterator[str]:
     """Errors of the values of options."""
+    sources = list(values["source"] or ())
+    yield from _check_several(sources, values)
     if all(values[name] is None for name in ("what", "colour", "bonds", "view", "size")):
         return
     from ..analysis.quantities import names_of
@@ -80,10 +104,10 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
     from ..plotting.render.still import check_picture_options
 
     given = {name: values[name] for name in options.READING}
-    if values["source"] is not None and _is_many(Path(values["source"])):
+    if any(_is_many(Path(one)) for one in sources):
         return
-    one = None if values["source"] is None else _first_frame(Path(values["source"]), given)
-    allowed, names = (*HISTORY, STILL, *names_of(one)), values["what"] or []
+    one = _first_frame(Path(sources[0]), given) if sources else None
+    allowed, names = (*HISTORY, STILL, SPECTRUM, *names_of(one)), values["what"] or []
     yield from (f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed)
     if values["cluster"] is not None and (others := [name for name in names if name != STILL]):
         yield f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
@@ -105,7 +129,8 @@ def _bonds(given: str | None) -> str | None:
 
 
 @parsing.command("plot", short_help="Draw figures of a run, and a still picture of a frame.", check=_check)
-@click.argument("source", metavar="DIR", type=options.RUN)
+@click.argument("source", metavar="DIR…", type=options.RUN, nargs=-1, required=True)
+@click.option("--labels", metavar="A,B,…", callback=_labels, help="Names of several runs in one figure (default: DIR).")
 @click.option(
     "--what", metavar="WHAT,…", callback=_what, help="What to draw (default: all figures over time, and still)."
 )
@@ -130,10 +155,8 @@ def _bonds(given: str | None) -> str | None:
 @click.option(
     "--size",
     metavar="WxH",
-    default="10x6.25in",
-    show_default=True,
     callback=_size,
-    help="Size of the still picture, in pixels (1600x1000) or printed (17x10.6cm, also mm, in).",
+    help="Size of the still picture, in pixels (1600x1000) or printed (17x10.6cm, also mm, in); default 10x6.25in.",
 )
 @click.option(
     "--dpi",
@@ -148,25 +171,27 @@ def _bonds(given: str | None) -> str | None:
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.reading
 @options.output
+@options.drawing
 def command(
-    source: str,
+    source: tuple[str, ...],
+    labels: list[str] | None,
     what: list[str] | None,
     out: str | None,
     form: str,
     frame: int,
     overwrite: bool,
-    as_json: bool,
-    quiet: bool,
     **how: Any,
 ) -> None:
-    """Draw the run in DIR: figures over time, a still picture of a frame, histograms over grains.
+    """Draw the run in DIR, or several: figures over time, a still picture of a frame, histograms over grains.
 
     DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD; or a sweep, of which
     WHAT are columns of results, such as largest_remnant or outcome, or growth: growth efficiency and kinds of outcomes
     over speed and impact parameter. Of packings that were loaded by `sand compress`, `stretch` or `shear`, in a job or
-    a sweep, their figure is drawn, `laboratory`, or columns of the table of a job.
+    a sweep, their figure is drawn, `laboratory`, or columns of the table of a job. Of several runs each figure shows all,
+    named by --labels, in the folder plots.
 
-    WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still; or a
+    WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still,
+    mass_spectrum (s² n_s over the number s of grains of clusters, n_s clusters per grain of a frame); or a
     QUANTITY of grains, of which a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy,
     pressure (by contacts, mean in the grain), alignment (of moments with the moment of their cluster), field_alignment,
     material, at_rest (with rigid clusters), or an own quantity of the run, such as temperature. As a colour of grains,
@@ -174,19 +199,41 @@ def command(
     """
     from ..io.run_folder import make_folder, replace_file
 
-    if _is_many(Path(source)):
-        what = _of_many(Path(source), what)
-    folder, names = _place(Path(source), what, out, form, overwrite)
-    how["size"], how["whole"], how["bonds"] = how["size"].pixels(how["dpi"]), not how.pop("cut"), _bonds(how["bonds"])
+    output = {name: how.pop(name) for name in ("as_json", "quiet")}
+    places = [Path(one) for one in source]
+    if _is_many(places[0]):
+        what = _of_many(places[0], what)
+    folder, names = _place(places, what, out, form, overwrite)
+    how["size"] = _pixels(how["size"], how["dpi"])
+    how["whole"], how["bonds"], how["vector"] = not how.pop("cut"), _bonds(how["bonds"]), form != "png"
     given = {name: how.pop(name) for name in options.READING}
-    pictures = _draw(_open_source(Path(source), given), names, frame, form, how)
+    opened = [_open_source(one, given) for one in places]
+    figures = (_draw if len(opened) == 1 else _draw_several)(opened, labels or _names_of(places), names, frame, how)
+    from ..plotting.run_figure import figure_bytes
+
+    pictures = [figure_bytes(one, form, how["transparent"], how["dpi"]) for one in figures]
     if not folder.exists():
         make_folder(folder)
     paths = [folder / f"{name}.{form}" for name in names]
     for path, content in zip(paths, pictures, strict=True):
         replace_file(path, content)
     rows = [("folder", str(folder)), ("files", ", ".join(path.name for path in paths))]
-    report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json, quiet=quiet)
+    report.answer({"files": [str(path) for path in paths]}, f"plot {' '.join(source)}", rows, **output)
+
+
+def _pixels(size: PrintSize | None, dpi: int) -> tuple[int, int] | None:
+    """Width and height of the still picture in pixels; None if those follow from the width of all figures."""
+    from ..plotting.figure_format import format_width
+
+    if size is None and format_width() is not None:
+        return None
+    return (size or DEFAULT_SIZE).pixels(dpi)
+
+
+def _names_of(places: list[Path]) -> list[str]:
+    """Names of runs: those of their folders, or their paths if these are the same."""
+    names = [place.absolute().name for place in places]
+    return names if len(set(names)) == len(names) else [str(place) for place in places]
 
 
 def _of_many(folder: Path, what: list[str] | None) -> list[str]:
@@ -229,20 +276,22 @@ def _loaded(folder: Path) -> list[dict[str, Any]]:
 
 
 def _place(
-    source: Path, selection: list[str] | None, out: str | None, form: str, overwrite: bool
+    sources: list[Path], selection: list[str] | None, out: str | None, form: str, overwrite: bool
 ) -> tuple[Path, list[str]]:
     """Folder to write to and names of what to draw.  Raises BadInput, all errors."""
     from ..plotting.plots import HISTORY
 
     problems: list[str] = []
-    is_trajectory = source.is_file()
+    source, several = sources[0], len(sources) > 1
+    without_ledger = [one for one in sources if one.is_file()]
     shown = HISTORY[:1] if (source / ENCOUNTERS).exists() else HISTORY  # of encounters there are only sizes over time
-    names = selection or list((STILL,) if is_trajectory else (*shown, STILL))
-    if is_trajectory:
+    of_frames = (SPECTRUM,) if several else (STILL,)
+    names = selection or list(of_frames if without_ledger else (*shown, *of_frames))
+    for one in without_ledger:
         missing = [name for name in names if name in HISTORY]
-        problems += [f"--what {name}: {source} has no ledger; give a run's folder" for name in missing]
-    beside = source.with_name(f"{source.stem}-{FOLDER}") if is_trajectory else source / FOLDER
-    folder = beside if out is None else Path(out)
+        problems += [f"--what {name}: {one} has no ledger; give a run's folder" for name in missing]
+    beside = source.with_name(f"{source.stem}-{FOLDER}") if source.is_file() else source / FOLDER
+    folder = (Path(FOLDER) if several else beside) if out is None else Path(out)
     if not folder.is_dir() and (folder.exists() or (out is not None and not folder.parent.is_dir())):
         problems.append(f"--out {folder} cannot be a folder; give another one")
     existing = [name for name in names if (folder / f"{name}.{form}").exists()]
@@ -278,17 +327,18 @@ def _first_frame(path: Path, given: Mapping[str, Any]) -> Any:
             return None
 
 
-def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
-    """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
+def _draw(sources: list[Source], labels: list[str], names: list[str], frame: int, how: dict[str, Any]) -> list[Any]:
+    """Figures of a run, all before the first is written.  Raises BadInput."""
+    (source,) = sources
     if source.frames is None:
-        return _draw_many(source, names, form, how)
+        return _draw_many(source, names)
     from ..analysis.ledger_columns import LedgerColumns
     from ..basics.temperature import kinetic_temperature
     from ..io.ledger_table import read_ledger
     from ..io.run_folder import LEDGER
+    from ..plotting.overlay import Overlaid, spectrum_figure
     from ..plotting.plots import HISTORY, grains_figure, history_figure
     from ..plotting.render.still import still_picture
-    from ..plotting.run_figure import figure_bytes
 
     if any(name in HISTORY for name in names):
         ledger, first = LedgerColumns.from_rows(read_ledger(source.path / LEDGER)), _frame(source, 0)
@@ -302,16 +352,44 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
             return history_figure(ledger, name, *start, dark=how["dark"])
         if name == STILL:
             return still_picture(one, field=field, **how)
+        if name == SPECTRUM:
+            return spectrum_figure([Overlaid(labels[0], frame=one)], how["dark"])
         return grains_figure(one, name, field, dark=how["dark"])
 
-    return [figure_bytes(draw(name), form, how["transparent"], how["dpi"]) for name in names]
+    return [draw(name) for name in names]
 
 
-def _draw_many(source: Source, names: list[str], form: str, how: dict[str, Any]) -> list[bytes]:
+def _draw_several(
+    sources: list[Source], labels: list[str], names: list[str], frame: int, how: dict[str, Any]
+) -> list[Any]:
+    """Figures of several runs.  Raises BadInput."""
+    from ..analysis.ledger_columns import LedgerColumns
+    from ..io.ledger_table import read_ledger
+    from ..io.run_folder import LEDGER
+    from ..plotting.overlay import Overlaid, overlaid_grains, overlaid_history, spectrum_figure
+    from ..plotting.plots import HISTORY
+
+    runs = [Overlaid(label) for label in labels]
+    if any(name in HISTORY for name in names):
+        read = [LedgerColumns.from_rows(read_ledger(source.path / LEDGER)) for source in sources]
+        runs = [run._replace(ledger=ledger) for run, ledger in zip(runs, read, strict=True)]
+    if any(name not in HISTORY for name in names):
+        frames = [_frame(source, frame) for source in sources]
+        fields = [s.run.flux_density(f.time) if s.run else None for s, f in zip(sources, frames, strict=True)]
+        runs = [run._replace(frame=f, field=b) for run, f, b in zip(runs, frames, fields, strict=True)]
+
+    def draw(name: str) -> Any:
+        if name in HISTORY:
+            return overlaid_history(runs, name, how["dark"])
+        return spectrum_figure(runs, how["dark"]) if name == SPECTRUM else overlaid_grains(runs, name, how["dark"])
+
+    return [draw(name) for name in names]
+
+
+def _draw_many(source: Source, names: list[str]) -> list[Any]:
     """Draw columns of a sweep, or packings."""
     from ..experiments.laboratory_figure import laboratory_figure
     from ..plotting.collisions import growth_figure
-    from ..plotting.run_figure import figure_bytes
     from ..plotting.sweeps import sweep_figure
 
     sweep = source.run
@@ -327,8 +405,7 @@ def _draw_many(source: Source, names: list[str], form: str, how: dict[str, Any])
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         return growth_figure(rows, f"{len(rows)} collisions")
 
-    figures = map(draw, names)
-    return [figure_bytes(figure, form, how["transparent"], how["dpi"]) for figure in figures]
+    return [draw(name) for name in names]
 
 
 def _frame(source: Source, number: int) -> Any:

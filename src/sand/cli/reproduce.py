@@ -22,6 +22,7 @@ from . import options, parsing, report
 @options.wall_time
 @options.threads
 @options.output
+@options.drawing
 def command(
     name: str | None, out: str | None, small: bool, known: bool, retry: bool, threads: int | None, **how: Any
 ) -> int | None:
@@ -65,12 +66,13 @@ def _listed(job: Any) -> tuple[str, dict[str, Any]]:
 
 def comparison_rows(content: dict[str, Any]) -> report.Rows:
     """Each result of the paper beside that of SAND, and where the files are."""
-    rows = [
-        (one["what"], ": ".join(text for text in (f"{one['ours']}; paper: {one['paper']}", one["verdict"]) if text))
-        if one["paper"] and "note" not in content
-        else (one["what"], one["ours"])
-        for one in content["comparison"]
-    ]
+    rows = [(one["what"], _compared(one, "note" in content)) for one in content["comparison"]]
     done = f"{content['rows']} of {content['design']}, {content['cpu_seconds'] / 3600.0:.2g} core-hours"
     noted = [("note", content["note"])] if "note" in content else []
     return [("rows", done), *rows, *noted, ("files", f"{content['folder']}/results/")]
+
+
+def _compared(one: dict[str, Any], small: bool) -> str:
+    """What SAND finds, what the paper gives, and the verdict; of a small version there is one for all, a note."""
+    paper = f"; paper: {one['paper']}" if one["paper"] else ""
+    return f"{one['ours']}{paper}" + (f": {one['verdict']}" if paper and one["verdict"] and not small else "")

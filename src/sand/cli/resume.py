@@ -54,6 +54,7 @@ JOBS = {
 @options.scheduler
 @options.threads
 @options.output
+@options.drawing
 def command(
     folder: str,
     until: float | None,

@@ -41,6 +41,7 @@ def _check(values: parsing.OptionValues) -> Iterator[str]:
 @options.imports
 @options.threads
 @options.output
+@options.drawing
 def command(
     case: str | None,
     *,

@@ -30,6 +30,7 @@ def _check(values: Mapping[str, Any]) -> Iterator[str]:
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
 @options.overwrite
 @options.output
+@options.drawing
 def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: Any) -> None:
     """Compute the encounters of two bodies that CASE.toml describes.
 

@@ -118,8 +118,19 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     for one in ensembles:
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
         rows = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
+        rows["sizes"] = last_sizes(one.boxes)
         drawn.append((one.name, one.growth, rows))
     save(growth_figure(drawn, guides), folder / NAMES[4])
+
+
+def last_sizes(boxes: Sequence[BoxResult]) -> np.ndarray:
+    """Grains of each cluster, single grains included, in the last frame of every box."""
+    found = []
+    for box in boxes:
+        time, grains = box.aggregates["time"], box.aggregates["grains"]
+        last = grains[time == box.bodies[-1][0]] if box.bodies else grains[time == time.max(initial=0.0)]
+        found += [last, np.ones(max(box.grains - int(last.sum()), 0))]
+    return np.concatenate(found)
 
 
 def temperatures_over_time(boxes: Sequence[BoxResult]) -> np.ndarray:

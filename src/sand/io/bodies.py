@@ -81,7 +81,7 @@ def read_grains(
     Raises
     ------
     BadInput
-        If the file is missing or in no such format, has lines that are not numbers (the first ten are named), grains
+        If the file is missing or in no such format, has lines that are not numbers (the first one is named), grains
         with impossible numbers, quantities without a unit, no radii or two, no such frame, or unknown materials.
     """
     file, choice = user_path(path), (material, materials, otherwise)

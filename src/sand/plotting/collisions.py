@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from ..analysis.collision_kinds import UNDECIDED
 from ..analysis.impact_average import impact_average
 from .panels import CHANNEL_LABELS, LOSS_CHANNELS
-from .run_figure import DPI, RunFigure
-from .style import MUTED, TEXT_COLOUR, legend_above, log_axis, looks_of, no_line, plot_style
+from .run_figure import figure_with_panels
+from .style import MUTED, TEXT_COLOUR, figure_title, legend_above, log_axis, looks_of, no_line, plot_style
 
 ASIDE, WIDEST = 0.045, 0.12
 """Shift of the marks of a seed from those of the seed before, and the largest shift, as fractions of the speed."""
@@ -32,8 +32,7 @@ def collision_figure(results: list[dict[str, Any]], title: str) -> Figure:
         Title, see `experiments.collision_outcome.collision_title`.
     """
     with plot_style():
-        figure = RunFigure(figsize=(9.0, 3.6), dpi=DPI, layout="constrained")
-        left, right = figure.subplots(1, 2)
+        figure, (left, right) = figure_with_panels(2, (4.5, 3.6))
         outcomes = np.array([r["outcome"] for r in results])
         masses = np.array([r["largest_remnant"] for r in results])
         order = np.argsort(-masses, kind="stable")
@@ -46,7 +45,7 @@ def collision_figure(results: list[dict[str, Any]], title: str) -> Figure:
         left.xaxis.set_major_locator(MaxNLocator(integer=True))
         legend_above(left)
         _draw_shares(right, results)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9.0, weight="bold")
+        figure_title(figure, title, 9.0, weight="bold")
     return figure
 
 
@@ -90,8 +89,7 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
     number = np.unique(seeds, return_inverse=True)[1]
     beside = speed * (1.0 + min(ASIDE, WIDEST / max(number.max(), 1)) * (number - 0.5 * number.max()))
     with plot_style():
-        figure = RunFigure(figsize=(9.0, 3.8), dpi=DPI, layout="constrained")
-        left, right = figure.subplots(1, 2)
+        figure, (left, right) = figure_with_panels(2, (4.5, 3.8))
         left.axhline(0.0, color=MUTED, linewidth=0.7)
         for name, (colour, marker) in looks_of(kinds).items():
             of = kinds == name
@@ -114,7 +112,7 @@ def growth_figure(collisions: list[dict[str, Any]], title: str) -> Figure:
         for axes in (left, right) if speed.max() > 3.0 * speed.min() else ():
             log_axis(axes, "x")
         legend_above(right)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9.0, weight="bold")
+        figure_title(figure, title, 9.0, weight="bold")
     return figure
 
 

@@ -11,7 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, legend_above, plot_style, si_prefix
+from .overlay import draw_spectrum
+from .run_figure import figure_with_panels
+from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, legend_above, plot_style, points, si_prefix
 
 COLOURS = (RED, BLUE, GREEN, PURPLE)
 PAPER_EXPONENTS = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
@@ -21,21 +23,20 @@ TEMPERATURE_STYLES = (("translation", "o-"), ("rotation, mean", "^--"), ("rotati
 
 
 def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: bool = False) -> Figure:
-    """Figure of S(t), λ(S), μ(N), N(r_g) and the temperatures of bodies of one or more ensembles.
+    """Figure of S(t), λ(S), temperatures of bodies, μ(N), N(r_g) and s² n_s of one or more ensembles.
 
     Parameters
     ----------
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
         For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
-        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain, and `temperatures` (K, 4), times
-        [s] and `BodyTemperatures` [K].
+        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain, `temperatures` (K, 4), times [s]
+        and `BodyTemperatures` [K], and `sizes`, grains of each cluster in the last frames of all boxes.
     guides : bool, optional
         Whether lines show the power laws of the paper.
     """
     with plot_style():
-        figure = Figure(figsize=(14.4, 6.2 + 0.6 * len(ensembles)), layout="constrained")
-        (left, degrees, last), (middle, right, unused) = figure.subplots(2, 3)
-        unused.set_axis_off()
+        figure, panels = figure_with_panels(6, (4.8, 3.1 + 0.3 * len(ensembles)), 3)
+        left, degrees, last, middle, right, spectrum = panels
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _draw_growth(left, name, growth, size, colour, guides)
@@ -43,7 +44,9 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
             _draw_moments(middle, growth, rows, colour, guides)
             _draw_dimension(right, growth, rows, colour)
             _draw_temperatures(last, name, rows["temperatures"], size, colour)
-        logarithmic = (left, middle, right, last)
+            if rows["sizes"].size:
+                draw_spectrum(spectrum, rows["sizes"], colour, label=f"{name}: last frames")
+        logarithmic = (left, middle, right, last, spectrum)
         for axes in logarithmic:
             axes.set(xscale="log", yscale="log")
         degrees.set_xscale("log")
@@ -57,7 +60,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
         last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
         texts = {degrees: "$S$ grows too little", last: "all bodies are at rest"}
-        for axes in (left, degrees, last, middle, right):
+        for axes in panels:
             text = texts.get(axes, "no aggregates")
             if axes.get_legend_handles_labels()[0]:
                 legend_above(axes)
@@ -86,7 +89,7 @@ def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str, g
         ends = centre * np.array([0.7, 1.4])
         height = float(growth.z.at(centre)) * (ends / centre) ** z
         axes.plot(ends / size, height, color=MUTED, lw=0.8)
-        axes.annotate(f"$t^{{{z:g}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=7)
+        axes.annotate(f"$t^{{{z:g}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=points(7.0))
 
 
 def _draw_degrees(axes: Axes, name: str, growth: Any, colour: str) -> None:

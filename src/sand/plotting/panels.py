@@ -28,6 +28,7 @@ from .style import (
     format_number,
     format_si,
     legend_above,
+    points,
     si_prefix,
 )
 
@@ -167,7 +168,7 @@ def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
         looks: dict[str, Any] = {"color": ORANGE, "alpha": 0.5, "linewidth": 0.0, "zorder": 0}
         areas = [axes.fill_between(t, low, np.maximum(awake, low), step="mid", label="awake", **looks)]
     axes.set_ylabel("grains" if areas else "size (grains)")
-    right.tick_params(axis="y", pad=1.0, labelcolor=MUTED, labelsize=7)
+    right.tick_params(axis="y", pad=1.0, labelcolor=MUTED, labelsize=points(7.0))
     legend_above(axes, [*axes.get_lines(), *right.get_lines(), *areas])
 
 
@@ -252,7 +253,16 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
     if notes:  # below all curves
         low, high = axes.get_ylim()
         axes.set_ylim(low * (low / high) ** NOTE_SHARE, high)
-        axes.text(0.995, 0.03, "; ".join(notes), transform=axes.transAxes, ha="right", va="bottom", size=7, color=MUTED)
+        axes.text(
+            0.995,
+            0.03,
+            "; ".join(notes),
+            transform=axes.transAxes,
+            ha="right",
+            va="bottom",
+            size=points(7.0),
+            color=MUTED,
+        )
     _log_ticks(axes)
     legend_above(axes)
 
@@ -282,7 +292,7 @@ def draw_balance(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> Non
     axes.yaxis.set_major_formatter(_tick_label)
     drift = f"{format_number(ledger.drift)} of the energy dissipated and kinetic"
     text = f"energy error: {drift if np.isfinite(ledger.drift) else 'not finite at the end'}"
-    axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
+    axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=points(7.5))
 
 
 def draw_time(panels: list[Axes], time: AxisUnit, ledger: Any) -> None:
@@ -302,7 +312,7 @@ def _markers(t: np.ndarray) -> dict[str, Any]:
 
 
 def _no_data(axes: Axes, text: str) -> None:
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=7, color=MUTED)
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=points(7.0), color=MUTED)
     axes.set_yticks([])
 
 

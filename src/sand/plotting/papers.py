@@ -10,8 +10,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .run_figure import DPI, RunFigure
-from .style import LARGEST_COLOURS, MARKERS, MUTED, legend_above, log_axis, panel_letter, plot_style
+from .figure_format import format_width
+from .run_figure import LETTERS, figure_with_panels
+from .style import (
+    LARGEST_COLOURS,
+    MARKERS,
+    MUTED,
+    figure_title,
+    legend_above,
+    log_axis,
+    panel_letter,
+    plot_style,
+)
 
 
 class Curve(NamedTuple):
@@ -48,11 +58,11 @@ class Panel(NamedTuple):
 def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
     """Figure of panels in a row, with a title."""
     with plot_style():
-        figure = RunFigure(figsize=(4.6 * len(panels) + 0.4, 3.9), dpi=DPI, layout="constrained")
-        for k, (axes, panel) in enumerate(zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True)):
+        figure, drawn = figure_with_panels(len(panels), (4.6, 3.9), more=(0.4 * (format_width() is None), 0.0))
+        for axes, panel, letter in zip(drawn, panels, LETTERS, strict=False):
             _draw(axes, panel)
-            panel_letter(axes, "abcd"[k], -0.14)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=8.0)
+            panel_letter(axes, letter, -0.14)
+        figure_title(figure, title)
     return figure
 
 

@@ -15,6 +15,7 @@ from ..analysis.frame_statistics import size_distribution
 from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import category_names, measured, quantity
 from ..basics.errors import BadInput
+from .figure_format import figure_size
 from .panels import (
     AxisUnit,
     draw_balance,
@@ -29,7 +30,17 @@ from .panels import (
 )
 from .render.colouring import LOG_RANGE
 from .run_figure import DPI, RunFigure
-from .style import BLUE, DARK_BACKGROUND, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, format_si, plot_style, si_prefix
+from .style import (
+    BLUE,
+    DARK_BACKGROUND,
+    MUTED_ON_DARK,
+    TEXT_COLOUR,
+    TEXT_ON_DARK,
+    format_si,
+    plot_style,
+    points,
+    si_prefix,
+)
 
 SIZE = (5.6, 3.5)
 """Width and height [inches]: one and a half journal columns wide."""
@@ -74,14 +85,14 @@ def history_figure(ledger: LedgerColumns, name: str, grains: int, temperature: f
         raise BadInput("the ledger has no row yet, so there is nothing to plot over time")
     try:
         with plot_style():
-            figure, axes = _figure()
+            figure, axes = one_panel()
             time = time_unit(ledger)
             unit = energy_unit(ledger, temperature, grains) if name in OF_ENERGY else NO_UNIT
             _DRAW[name](axes, ledger, time, unit)
             draw_time([axes], time, ledger)
             if unit.value and unit.name in axes.get_ylabel():
                 axes.set_xlabel(f"{axes.get_xlabel()}\n{unit.value}")
-            _apply_dark(figure, dark)
+            dark_figure(figure, dark)
     except KeyError as error:
         raise BadInput(f"the ledger was written by another version of SAND: {error.args[0]}") from None
     return figure
@@ -111,7 +122,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     if not np.isfinite(values).any():
         raise BadInput(f"{name}: no grain has a finite value")
     with plot_style():
-        figure, axes = _figure()
+        figure, axes = one_panel()
         if name == "cluster":
             sizes, numbers = size_distribution(cluster_labels(len(values), frame.pair))
             _bars(axes, sizes, numbers)
@@ -124,8 +135,8 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
             _histogram(axes, values[np.isfinite(values)], what.meaning, what.unit)
         axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
         note = f"{len(values)} grains, t = {format_si(frame.time, 's')}"
-        axes.text(1.0, 1.02, note, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
-        _apply_dark(figure, dark)
+        axes.text(1.0, 1.02, note, transform=axes.transAxes, ha="right", va="bottom", size=points(7.5))
+        dark_figure(figure, dark)
     return figure
 
 
@@ -133,21 +144,33 @@ def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
     size, prefixed = (1.0, "") if unit == "1" else si_prefix(float(np.abs(values).max(initial=0.0)), unit)
     shown = values / size
     axes.set(xlabel=f"{meaning} ({prefixed})" if prefixed else meaning, ylabel="number of grains")
-    levels = np.unique(shown)
-    if unit == "1" and len(levels) <= 40 and np.all(levels == np.round(levels)):
+    if unit == "1" and _is_few_whole(shown):
         _bars(axes, *np.unique(shown, return_counts=True))
         return
-    low, high = float(shown.min()), float(shown.max())
+    edges, is_log = bin_edges(shown, unit)
+    if is_log:
+        axes.set_xscale("log")
+    axes.hist(shown, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
+
+
+def _is_few_whole(values: np.ndarray) -> bool:
+    """Whether values are whole numbers, at most 40 different ones."""
+    levels = np.unique(values)
+    return len(levels) <= 40 and bool(np.all(levels == np.round(levels)))
+
+
+def bin_edges(values: np.ndarray, unit: str) -> tuple[np.ndarray, bool]:
+    """Edges of the bins of a histogram, and whether its axis is logarithmic; few whole numbers have a bin each."""
+    low, high = float(values.min()), float(values.max())
+    if unit == "1" and _is_few_whole(values) and high - low < 200.0:
+        return np.arange(low - 0.5, high + 1.0), False
     if high - low <= 1e-6 * abs(high):  # also if all are 0
         half = 0.5 * abs(low) or 0.5
         low, high = low - half, high + half
-    bins = int(np.clip(np.sqrt(len(shown)) * 1.5, 5, 60))
+    bins = int(np.clip(np.sqrt(len(values)) * 1.5, 5, 60))
     if low > 0.0 and high > LOG_RANGE * low:
-        axes.set_xscale("log")
-        edges = np.geomspace(low, high, bins + 1)
-    else:
-        edges = np.linspace(low, high, bins + 1)
-    axes.hist(shown, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
+        return np.geomspace(low, high, bins + 1), True
+    return np.linspace(low, high, bins + 1), False
 
 
 def _bars(axes: Axes, x: np.ndarray, numbers: np.ndarray) -> None:
@@ -156,12 +179,13 @@ def _bars(axes: Axes, x: np.ndarray, numbers: np.ndarray) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(10, integer=True))
 
 
-def _figure() -> tuple[RunFigure, Axes]:
-    figure = RunFigure(figsize=SIZE, dpi=DPI, layout="constrained")
+def one_panel() -> tuple[RunFigure, Axes]:
+    """A figure of one panel in the width that is set."""
+    figure = RunFigure(figsize=figure_size(*SIZE), dpi=DPI, layout="constrained")
     return figure, figure.subplots()
 
 
-def _apply_dark(figure: Figure, dark: bool) -> None:
+def dark_figure(figure: Figure, dark: bool) -> None:
     """Set a dark background with light text and axes."""
     if not dark:
         return

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from ..analysis.quantities import material_names
 from ..basics.box import Box
 from ..io.run_folder import replace_file
+from .figure_format import panel_grid
 from .panels import (
     AxisUnit,
     draw_balance,
@@ -32,13 +33,12 @@ from .panels import (
     time_unit,
 )
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
-from .style import MUTED, RED, format_si, panel_letter, plot_style
+from .run_layout import DPI, Layout, layout_of
+from .style import MUTED, RED, TEXT_COLOUR, format_si, panel_letter, plot_style, points
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
-WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
-"""[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
 LETTERS = "abcdefgh"
 """Letters of the panels."""
 MIN_GRAIN_RADIUS = 11.0
@@ -50,14 +50,12 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 """Metadata of files by format, without time stamps."""
 
-# Positions of the panels in units of the figure size.
-_LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
-_TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
-_MARGIN = 0.012
+
 _HEIGHTS, _HEIGHTS_WITH_MORE, _HEIGHT = (1.0, 1.35, 1.1), (1.0, 1.25, 1.0), 0.8
 """Heights of the first panels over time, relative to each other, and of each of more between them and the balance."""
 _BALANCE = (0.5, 0.6)
 """Height of the balance without, and with more panels."""
+_MARGIN = 0.012
 
 
 class RunFigure(Figure):
@@ -68,6 +66,22 @@ class RunFigure(Figure):
 
     def _repr_png_(self) -> bytes:
         return figure_bytes(self)
+
+
+def figure_with_panels(
+    number: int,
+    panel: tuple[float, float],
+    columns: int = 4,
+    more: tuple[float, float] = (0.0, 0.0),
+    layout: Any = "constrained",
+) -> tuple[RunFigure, list[Axes]]:
+    """A figure of equal panels in the width that is set; parameters as for `panel_grid`."""
+    rows, columns, size = panel_grid(number, panel, columns, more)
+    figure = RunFigure(figsize=size, dpi=DPI, layout=layout)
+    panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    for unused in panels[number:]:
+        unused.set_axis_off()
+    return figure, panels[:number]
 
 
 def run_figure(simulation: Simulation) -> Figure:
@@ -83,21 +97,26 @@ def run_figure(simulation: Simulation) -> Figure:
     """
     scene = make_scene(simulation.grains, simulation.contacts["pair"], simulation.box)
     with plot_style():
-        figure = RunFigure(figsize=(WIDTH, HEIGHT), dpi=DPI)
-        _draw_header(figure, simulation)
+        more = _more_panels(simulation.ledger)
+        heights = (*(_HEIGHTS_WITH_MORE if more else _HEIGHTS), *[_HEIGHT] * len(more), _BALANCE[bool(more)])
+        layout, lines = layout_of(heights, _header(simulation))
+        figure = RunFigure(figsize=layout.size, dpi=DPI)
+        for (text, size), height in zip(lines, layout.lines, strict=True):
+            colour = {10.5: TEXT_COLOUR, 8.5: MUTED}.get(size, RED)
+            weight = "bold" if colour == TEXT_COLOUR else "normal"
+            figure.text(_MARGIN, height, text, size=points(size), color=colour, weight=weight, va="center")
         if simulation.ledger.rows:
-            _draw_history(figure, simulation)
+            _draw_history(figure, simulation, layout, heights)
         if scene.label.size:
-            letters = LETTERS[4 + len(_more_panels(simulation.ledger)) :]
-            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size, letters)
+            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size, layout, LETTERS[len(heights) :])
     return figure
 
 
-def _draw_header(figure: Figure, simulation: Simulation) -> None:
+def _header(simulation: Simulation) -> list[tuple[str, float]]:
+    """Lines of the header with their font sizes: title, facts, notes."""
     title = headline(simulation.grains, simulation.box, simulation.time, simulation.title)
-    figure.text(_MARGIN, 0.968, title, size=10.5, weight="bold", va="center")
     if not simulation.ledger.rows:
-        return
+        return [(title, 10.5)]
     last = simulation.ledger.rows[-1]
     count, mean = int(last["clusters"]), last["mean_cluster_size"]
     unit = energy_unit(simulation.ledger, simulation.temperature, len(simulation.grains))
@@ -112,10 +131,8 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
         ]
     facts.append(f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)")
     facts += [unit.value.replace(", the kinetic temperature at the start", "")] if unit.value else []
-    figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
-    for k, note in enumerate(simulation.notes()):
-        brief = note.split(";")[0]
-        figure.text(_MARGIN, 0.911 - 0.019 * k, f"Note: {brief}.", size=7.0, color=RED, va="center")
+    notes = [(f"Note: {note.split(';')[0]}.", 7.0) for note in simulation.notes()]
+    return [(title, 10.5), ("  ·  ".join(facts), 8.5), *notes]
 
 
 def headline(grains: Any, box: Box, time: float, title: str = "") -> str:
@@ -146,62 +163,69 @@ def _describe_box(box: Box) -> str:
     return "periodic " + " × ".join("open" if v is None else format_si(v, "m") for v in box.lengths)
 
 
-def _draw_history(figure: Figure, simulation: Simulation) -> None:
+def _draw_history(figure: Figure, simulation: Simulation, layout: Layout, heights: Sequence[float]) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    more = _more_panels(ledger)
-    first = _HEIGHTS_WITH_MORE if more else _HEIGHTS
-    heights = (*first, *[_HEIGHT] * len(more), _BALANCE[bool(more)])
-    panels = [figure.add_axes((_LEFT[0], 0.1 * k, _LEFT[1] - _LEFT[0], 0.1)) for k in range(len(heights))]
+    left, right = layout.history[:2]
+    panels = [figure.add_axes((left, 0.1 * k, right - left, 0.1)) for k in range(len(heights))]
     (draw_contacts if has_few_bodies(ledger) else draw_clusters)(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
-    for axes, draw in zip(panels[3:], more, strict=False):
+    for axes, draw in zip(panels[3:], _more_panels(ledger), strict=False):
         draw(axes, ledger, time)
     draw_balance(panels[-1], ledger, time, unit)
     draw_time(panels, time, ledger)
     for name, axes in zip(LETTERS, panels, strict=False):
-        axes.yaxis.set_label_coords(-0.155, 0.5)
-        panel_letter(axes, name, -0.185)
-    _place_panels(figure, panels, heights)
+        axes.yaxis.set_label_coords(layout.label, 0.5)
+        panel_letter(axes, name, layout.letter)
+    _place_panels(figure, panels, heights, layout)
 
 
 def _more_panels(ledger: Any) -> list[Callable[[Axes, Any, AxisUnit], None]]:
     """Functions that draw the panels which only some runs have."""
+    if not ledger.rows:
+        return []
     return [draw_temperatures] * has_temperatures(ledger) + [draw_pressure] * ("pressure" in ledger.columns)
 
 
-def _place_panels(figure: Figure, panels: list[Axes], heights: Sequence[float]) -> None:
+def _place_panels(figure: Figure, panels: list[Axes], heights: Sequence[float], layout: Layout) -> None:
     """Place the panels one below the other, with space for the rows of their legends."""
+    left, right, bottom, top = layout.history
     legends = [axes.get_legend() for axes in panels]
     rows = [0.0 if one is None else one.get_window_extent().height / figure.bbox.height for one in legends]
-    gaps = [max(_GAP, row + 0.4 * _GAP) for row in rows]
-    height = (_TOP + _GAP - _BOTTOM - sum(gaps)) / sum(heights)
-    top = _TOP + _GAP
+    gaps = [max(layout.gap, row + 0.4 * layout.gap) for row in rows]
+    top += layout.gap
+    height = (top - bottom - sum(gaps)) / sum(heights)
     for axes, share, gap in zip(panels, heights, gaps, strict=True):
         top -= gap + share * height
         for one in axes.get_shared_x_axes().get_siblings(axes):  # with the axis on the right
-            one.set_position((_LEFT[0], top, _LEFT[1] - _LEFT[0], share * height))
+            one.set_position((left, top, right - left, share * height))
 
 
-def _draw_grains(figure: Figure, scene: Scene, lost: int, letters: str) -> None:
+def _draw_grains(figure: Figure, scene: Scene, lost: int, layout: Layout, letters: str) -> None:
     """All grains in the box, and below it the largest clusters if grains are small; `lost` grains are not drawn."""
-    full = (0.03, 0.85)
-    window = view_window(scene, _pixels(full[1])[0] / _pixels(full[1])[1])
-    grain_radius = float(np.median(scene.radius)) * _pixels(full[1])[0] / (window[1] - window[0])
+    left, right, bottom, height = layout.grains
+    pixels = layout.pixels(height)
+    window = view_window(scene, pixels[0] / pixels[1])
+    grain_radius = float(np.median(scene.radius)) * pixels[0] / (window[1] - window[0])
     enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(largest_clusters(scene.label))
-    strip = 0.235
-    bottom, height = (full[0] + strip + 0.02, full[1] - strip - 0.02) if enlarge else full
-    axes = _panel(figure, _RIGHT, bottom, height)
-    draw_scene(axes, scene, _pixels(height))
+    strip = 0.276 * height if enlarge else 0.0
+    above = strip + 0.02 * enlarge
+    axes = figure.add_axes((left, bottom + above, right - left, height - above))
+    draw_scene(axes, scene, layout.pixels(height - above))
     panel_letter(axes, letters[0], 0.0)
-    axes.text(
-        0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=7.5, color=MUTED, va="bottom", ha="left"
-    )
+    caption: dict[str, Any] = {
+        "transform": axes.transAxes,
+        "size": points(7.5),
+        "color": MUTED,
+        "va": "bottom",
+        "ha": "left",
+    }
+    axes.text(0.04, 1.004, _caption(scene, lost), **caption)
     if enlarge:
-        axes = _panel(figure, _RIGHT, full[0], strip)
-        draw_largest(axes, scene, _pixels(strip))
+        axes = figure.add_axes((left, bottom, right - left, strip))
+        draw_largest(axes, scene, layout.pixels(strip))
         panel_letter(axes, letters[1], 0.0)
 
 
@@ -214,15 +238,6 @@ def _caption(scene: Scene, lost: int) -> str:
     if lost:
         parts.append(f"left out: {lost} without a finite position")
     return "; ".join(parts)
-
-
-def _panel(figure: Figure, columns: tuple[float, float], bottom: float, height: float) -> Axes:
-    return figure.add_axes((columns[0], bottom, columns[1] - columns[0], height))
-
-
-def _pixels(height: float) -> tuple[int, int]:
-    """Width and height in pixels of a panel on the right with this height relative to the figure."""
-    return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
 
 
 def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False, dpi: float = 0.0) -> bytes:

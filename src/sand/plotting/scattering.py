@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle, Wedge
 
-from .run_figure import DPI, RunFigure
+from .figure_format import format_width, panel_grid
+from .run_figure import DPI, RunFigure, figure_with_panels
 from .style import (
     BLUE,
     LARGEST_COLOURS,
@@ -20,10 +21,12 @@ from .style import (
     ORANGE,
     RED,
     TEXT_COLOUR,
+    figure_title,
     format_si,
     legend_above,
     panel_letter,
     plot_style,
+    points,
     si_prefix,
 )
 
@@ -58,8 +61,9 @@ def trajectories_figure(groups: Sequence[Sequence[Any]], names: Sequence[str], s
     unit = scales.capture or scales.touch
     unit_name = "b_\\mathrm{max}" if scales.capture else "(r_1+r_2)"
     with plot_style():
-        figure = RunFigure(figsize=(4.6 * len(groups) + 0.4, 4.9), dpi=DPI, layout=LAYOUT)
-        for k, axes in enumerate(np.atleast_1d(figure.subplots(1, len(groups)))):
+        more = 0.4 * (format_width() is None)
+        figure, panels = figure_with_panels(len(groups), (4.6, 4.9), more=(more, 0.0), layout=LAYOUT)
+        for k, axes in enumerate(panels):
             for one, colour in zip(groups[k], cycle(LARGEST_COLOURS), strict=False):
                 _draw_trajectory(axes, one, colour, unit)
             axes.set(xlim=(-WINDOW, WINDOW), ylim=(-WINDOW, WINDOW), aspect="equal")
@@ -67,7 +71,7 @@ def trajectories_figure(groups: Sequence[Sequence[Any]], names: Sequence[str], s
             legend_above(axes, title=f"spin: {names[k]};  $b/{unit_name}$ and outcome:")
             panel_letter(axes, "abcdefgh"[k], -0.12)
         lines = "thick lines: projectile; thin lines: target; dots: equal time intervals"
-        figure.suptitle(f"{title}\n{lines}", x=0.01, ha="left", fontsize=8.0)
+        figure_title(figure, f"{title}\n{lines}")
     return figure
 
 
@@ -98,8 +102,10 @@ def map_figure(found: Any, title: str) -> Figure:
         Description of the two bodies.
     """
     with plot_style():
-        figure = RunFigure(figsize=(9.6, 4.4), dpi=DPI, layout=LAYOUT)
-        left, right = np.asarray(figure.subfigures(1, 2, width_ratios=(1.25, 1.0)))
+        rows, columns, size = panel_grid(2, (4.8, 4.4), 2)
+        figure = RunFigure(figsize=size, dpi=DPI, layout=LAYOUT)
+        ratios: dict[str, Any] = {"width_ratios": (1.25, 1.0)} if columns == 2 else {}
+        left, right = np.asarray(figure.subfigures(rows, columns, **ratios)).ravel()
         axes = left.subplots()
         mesh = _draw_map(axes, found)
         panel_letter(axes, "a", -0.12)
@@ -111,7 +117,7 @@ def map_figure(found: Any, title: str) -> Figure:
                 _draw_disc(disc, found, int(chosen[k]), mesh)
         panel_letter(discs[0], "b", 0.0)
         right.colorbar(mesh, ax=list(discs), label="collision probability", shrink=0.8)
-        figure.suptitle(f"{title}; dashed: $b_\\mathrm{{max}}$ (Eq. 14)", x=0.01, ha="left", fontsize=9.0)
+        figure_title(figure, f"{title}; dashed: $b_\\mathrm{{max}}$ (Eq. 14)", 9.0)
     return figure
 
 
@@ -145,7 +151,7 @@ def _draw_disc(axes: Axes, found: Any, k: int, mesh: Any) -> None:
         axes.add_patch(ring)
     axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linestyle="--", color=RED, linewidth=1.4))
     axes.set(xlim=(-edges[-1], edges[-1]), ylim=(-edges[-1], edges[-1]), aspect="equal")
-    axes.set_title(format_si(float(found.speeds[k]), "m/s"), fontsize=8.0)
+    axes.set_title(format_si(float(found.speeds[k]), "m/s"), fontsize=points(8.0))
 
 
 def sigma_figure(found: Sequence[Any], title: str) -> Figure:
@@ -161,8 +167,7 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
         Description of the two bodies.
     """
     with plot_style():
-        figure = RunFigure(figsize=(9.0, 3.9), dpi=DPI, layout=LAYOUT)
-        left, right = figure.subplots(1, 2)
+        figure, (left, right) = figure_with_panels(2, (4.5, 3.9), layout=LAYOUT)
         _draw_sigma(left, found)
         if len(found) > 1 and found[0].analytic > 0.0:
             speeds = [one.speed for one in found]
@@ -174,7 +179,7 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
             _draw_profile(right, found[0])
         panel_letter(left, "a", -0.14)
         panel_letter(right, "b", -0.14)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9.0)
+        figure_title(figure, title, 9.0)
     return figure
 
 

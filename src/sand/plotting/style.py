@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from itertools import cycle
@@ -13,7 +14,10 @@ import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter, StrMethodFormatter
+
+from .figure_format import FONT_SIZE, settings_of_style
 
 BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#0072B2",
@@ -67,9 +71,8 @@ ON_DARK = {
 
 _STYLE = {
     "font.family": "DejaVu Sans",
-    "font.size": 8.0,
+    "font.size": FONT_SIZE,
     "text.color": TEXT_COLOUR,
-    "axes.labelsize": 8.0,
     "axes.labelcolor": TEXT_COLOUR,
     "axes.edgecolor": TEXT_COLOUR,
     "axes.linewidth": 0.7,
@@ -79,8 +82,6 @@ _STYLE = {
     "savefig.facecolor": "white",
     "lines.linewidth": 1.3,
     "lines.solid_capstyle": "round",
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
     "xtick.color": TEXT_COLOUR,
     "ytick.color": TEXT_COLOUR,
     "xtick.major.width": 0.7,
@@ -88,8 +89,9 @@ _STYLE = {
     "xtick.minor.width": 0.5,
     "ytick.minor.width": 0.5,
     "legend.frameon": False,
-    "legend.fontsize": 7.5,
 }
+_SIZES = {"axes.labelsize": 8.0, "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "legend.fontsize": 7.5}
+"""Font sizes [points] at the font size `FONT_SIZE`."""
 
 _PREFIX = dict(
     zip(range(-24, 16, 3), ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"), strict=True)
@@ -100,10 +102,18 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plot_style() -> AbstractContextManager[None]:
-    """Context manager that sets the SAND style and restores the user's settings on exit."""
+    """Context manager that sets the SAND style, with that of `figure_format`, and restores the user's on exit."""
     # Without the backend: to set one would start it.
     defaults = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith(("backend", "interactive"))}
-    return matplotlib.rc_context({**defaults, **_STYLE})
+    chosen = settings_of_style()
+    scale = float(chosen.get("font.size", FONT_SIZE)) / FONT_SIZE
+    sizes = {name: scale * size for name, size in _SIZES.items()}
+    return matplotlib.rc_context({**defaults, **_STYLE, **sizes, **chosen})
+
+
+def points(size: float) -> float:
+    """Font size [points] that is `size` at the default `FONT_SIZE`, and follows `font.size` of a style."""
+    return size * float(matplotlib.rcParams["font.size"]) / FONT_SIZE
 
 
 def looks_of(words: Iterable[Any]) -> dict[str, tuple[str, str]]:
@@ -199,7 +209,7 @@ def legend_above(axes: Axes, lines: Sequence[Artist] = (), *, title: str = "") -
             handletextpad=0.5,
             columnspacing=1.1,
             title=title or None,
-            title_fontsize=7.5,
+            title_fontsize=points(7.5),
             alignment="left",
         )
         if legend.get_window_extent().width <= axes.get_window_extent().width:
@@ -213,9 +223,18 @@ def _look(handle: Any) -> tuple[str, str, object]:
     return handle.get_label(), str(handle.get_color()), f"{handle.get_marker()} {handle.get_linestyle()}"
 
 
+def figure_title(figure: Figure, text: str, size: float = 8.0, **look: Any) -> None:
+    """Draw a title at the left, in as many lines as the width of the figure needs; `size` in points as for `points`."""
+    letters = int(72.0 * figure.get_size_inches()[0] / (0.5 * points(size)))
+    kept = re.sub(r"\$[^$]*\$", lambda found: found[0].replace(" ", "\0"), text)  # formulas are not cut
+    lines = [row for line in kept.split("\n") for row in textwrap.wrap(line, letters, break_long_words=False)]
+    title = "\n".join(lines).replace("\0", " ")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=points(size), **look)
+
+
 def panel_letter(axes: Axes, text: str, x: float) -> None:
     """Draw the letter of a panel at its top; `x` in units of the panel width."""
-    axes.text(x, 1.0, text, transform=axes.transAxes, weight="bold", size=10.0, va="bottom", ha="left")
+    axes.text(x, 1.0, text, transform=axes.transAxes, weight="bold", size=points(10.0), va="bottom", ha="left")
 
 
 def round_length(at_most: float) -> float:

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
+from .figure_format import figure_size, panel_grid
 from .run_figure import DPI, RunFigure
-from .style import LARGEST_COLOURS, MARKERS, OTHER_COLOURS, TEXT_COLOUR, log_axis, looks_of, no_line, plot_style
+from .style import LARGEST_COLOURS, MARKERS, OTHER_COLOURS, TEXT_COLOUR, log_axis, looks_of, no_line, plot_style, points
 
 MOST_LINES, MOST_PANELS = 14, 9
 """Largest numbers of lines and panels: of more combinations of the other keys, the first ones are drawn."""
@@ -67,7 +68,7 @@ def _combinations(table: Table, keys: Sequence[str]) -> np.ndarray:
 
 def _lines(table: Table, key: str, groups: np.ndarray, what: str) -> Figure:
     """A line for each combination of the other keys."""
-    figure = RunFigure(figsize=(6.5, 4.0), dpi=DPI, layout="constrained")
+    figure = RunFigure(figsize=figure_size(6.5, 4.0), dpi=DPI, layout="constrained")
     axes, x = figure.subplots(), _Values(table, key)
     names = list(dict.fromkeys(groups.tolist()))
     for name, colour, marker in zip(
@@ -89,16 +90,16 @@ def _classes(table: Table, keys: Sequence[str], groups: np.ndarray, what: str) -
     looks = looks_of(table[what].tolist())
     names = list(dict.fromkeys(groups.tolist()))
     shown = names[:MOST_PANELS]
-    columns = 2 if len(shown) == 4 else min(len(shown), 3)
-    rows = math.ceil(len(shown) / columns)
-    size = (4.6, 3.6) if len(shown) == 1 else (3.1 * columns, 2.7 * rows)
-    figure = RunFigure(figsize=(size[0] + 1.5, size[1] + 0.2), dpi=DPI, layout="constrained")
+    rows, columns, size = panel_grid(
+        len(shown), (4.6, 3.6) if len(shown) == 1 else (3.1, 2.7), 2 if len(shown) == 4 else 3, (1.5, 0.2)
+    )
+    figure = RunFigure(figsize=size, dpi=DPI, layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     over = [_Values(table, key) for key in keys]
     for axes, name in zip(panels, shown, strict=False):
         draw = _draw_map if len(keys) > 1 else _draw_shares
         draw(axes, over, groups == name, table[what].astype(str), looks)
-        axes.set_title(name, fontsize=7.5, loc="left")
+        axes.set_title(name, fontsize=points(7.5), loc="left")
         if len(shown) == rows * columns:
             axes.label_outer()
     for axes in panels[len(shown) :]:
@@ -164,7 +165,7 @@ def _draw_shares(
 def _say_what_is_left(figure: Figure, number: int, drawn: int) -> None:
     """Say in the title how many combinations of keys are not drawn."""
     if number > drawn:
-        figure.suptitle(f"the first {drawn} of {number} combinations of the other keys", fontsize=7.5)
+        figure.suptitle(f"the first {drawn} of {number} combinations of the other keys", fontsize=points(7.5))
 
 
 def _means(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -27,7 +27,7 @@ def open_grains(path: str | Path) -> GrainFile:
     Raises
     ------
     BadInput
-        If the file is missing or in no such format; the first ten lines that are not numbers are named.
+        If the file is missing or in no such format; the first line that is not numbers is named.
     """
     file = Path(path)
     if is_gsd(file):

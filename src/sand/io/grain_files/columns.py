@@ -10,7 +10,7 @@ import numpy as np
 from ...basics.arguments import MOST_GRAINS
 from ...basics.errors import BadInput
 from ...basics.units import in_unit
-from .data import LENGTHS, NAMED, GrainData, GrainFile, data_of, known_as, numbers
+from .data import LENGTHS, GrainData, GrainFile, data_of, known_as, numbers, with_number
 
 COMMENTS = "#%!"
 """Characters that begin a comment."""
@@ -30,7 +30,7 @@ def read_columns(path: Any, lines: list[str]) -> GrainFile:
     Raises
     ------
     BadInput
-        If lines are not such rows; the first ten are named.
+        If lines are not such rows; the first one is named, with the number of such lines.
     """
     rows, header, first, texts = _rows(path, _sphere_block(lines))
     table = np.array(rows)
@@ -92,7 +92,7 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
     """
     rows: list[list[float]] = []
     texts: dict[str, list[str]] = {}
-    problems: list[str] = []
+    wrong: list[int] = []
     header: Header = ([], {})
     stated: tuple[int, int] | None = None  # number of grains that the file states, and its line
     first = 0
@@ -116,9 +116,9 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
             stated = (int(row[0]), number)
             continue
         if len(row) < 3 or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
-            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} {_wanted(rows, header, first)}")
-            if len(problems) == NAMED:
-                break
+            if not wrong:
+                problem = f"{path}, line {number}: {line.strip()[:40]!r} {_wanted(rows, header, first)}"
+            wrong.append(number)
             continue
         if not rows:
             first = number
@@ -127,15 +127,17 @@ def _rows(path: Any, lines: list[str]) -> tuple[list[list[float]], Header, int, 
         if len(rows) > MOST_GRAINS:
             break
     if len(rows) > MOST_GRAINS:
-        problems.append(f"{path} holds more than {MOST_GRAINS:.0e} grains")
+        raise BadInput(f"{path} holds more than {MOST_GRAINS:.0e} grains")
+    if wrong:
+        raise BadInput(with_number(problem, len(wrong)))
     if stated and not rows:
-        problems.append(f"{path}, line {stated[1]}: {lines[stated[1] - 1].strip()[:40]!r} is not x y z or x y z r")
-    elif stated and not problems and stated[0] != len(rows):
-        problems.append(
+        raise BadInput(f"{path}, line {stated[1]}: {lines[stated[1] - 1].strip()[:40]!r} is not x y z or x y z r")
+    if stated and stated[0] != len(rows):
+        raise BadInput(
             f"{path}, line {stated[1]}: '{stated[0]}' is not the number of grains; there are {len(rows)} lines"
         )
-    if problems or not rows:
-        raise BadInput(problems or f"{path} holds no grain")
+    if not rows:
+        raise BadInput(f"{path} holds no grain")
     if uneven := [name for name, words in texts.items() if len(words) != len(rows)]:
         raise BadInput(f"{path}: column {uneven[0]!r} has numbers in some lines and text in others")
     return rows, header, first, texts

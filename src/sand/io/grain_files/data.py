@@ -122,6 +122,11 @@ class GrainFile(NamedTuple):
     frame: Callable[[int], GrainData]
 
 
+def with_number(problem: str, number: int) -> str:
+    """The message about the first wrong line of a file, and the number of such lines if there are several."""
+    return problem if number == 1 else f"{problem} (the first of {number} such lines)"
+
+
 def known_as(name: str) -> tuple[str, int | None] | None:
     """Quantity of a column, and its component; None if the name is unknown."""
     low = name.lower()

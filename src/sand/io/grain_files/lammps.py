@@ -9,7 +9,7 @@ import numpy as np
 
 from ...basics.errors import BadInput
 from ..extended_xyz import unlisted
-from .data import NAMED, FileBox, GrainData, GrainFile, data_of, number
+from .data import FileBox, GrainData, GrainFile, data_of, number, with_number
 
 CENTIMETRE, ANGSTROM, BOHR, FEMTOSECOND = 1e-2, 1e-10, 5.29177210903e-11, 1e-15
 STYLES = {
@@ -69,7 +69,7 @@ def read_data(path: Any, lines: list[str]) -> GrainFile:
     Raises
     ------
     BadInput
-        If its style of atoms is not stated or has no spheres, or lines are not numbers (the first ten are named).
+        If its style of atoms is not stated or has no spheres, or lines are not numbers (the first one is named).
     """
     sections, head = _sections(lines)
     stated = next((int(m[1]) for line in head if (m := re.match(r"^\s*(\d+)\s+atoms\b", line))), 0)
@@ -164,7 +164,7 @@ def _numbers(path: Any, rows: list[tuple[int, list[str], str]], names: list[str]
         except ValueError:
             problems.append(f"{path}, line {line}: {' '.join(words)[:40]!r} is not {' '.join(names)}")
     if problems:
-        raise BadInput(problems[:NAMED])
+        raise BadInput(with_number(problems[0], len(problems)))
     return dict(zip(names, values.T, strict=True))
 
 
@@ -186,7 +186,7 @@ def read_dump(path: Any, lines: list[str]) -> GrainFile:
     Raises
     ------
     BadInput
-        If a snapshot is incomplete, or lines are not numbers (the first ten are named).
+        If a snapshot is incomplete, or lines are not numbers (the first one is named).
     """
     starts = [k for k, line in enumerate(lines) if line.strip() == "ITEM: TIMESTEP"]
     ends = [*starts[1:], len(lines)]
@@ -230,7 +230,8 @@ def _snapshot(path: Any, lines: list[str], first: int, end: int, units: str | No
     picked = [(line, [w for w, n in zip(words, names, strict=False) if n not in texts], "") for line, words, _ in rows]
     short = [line for line, words, _ in rows if len(words) != len(names)]
     if short:
-        raise BadInput(f"{path}, line {line}: not the {len(names)} columns {' '.join(names)}" for line in short[:NAMED])
+        problem = f"{path}, line {short[0]}: not the {len(names)} columns {' '.join(names)}"
+        raise BadInput(with_number(problem, len(short)))
     columns = _numbers(path, picked, kept)
     order = np.argsort(columns["id"], kind="stable") if "id" in columns else np.arange(count)
     columns = {name: values[order] for name, values in columns.items()}

@@ -10,7 +10,7 @@ import numpy as np
 from ...basics.errors import BadInput
 from ...basics.units import in_unit
 from ..extended_xyz import unlisted
-from .data import NAMED, FileBox, GrainData, GrainFile, data_of, known_as, numbers
+from .data import FileBox, GrainData, GrainFile, data_of, known_as, numbers, with_number
 
 PERIODIC = dict.fromkeys(("T", "TRUE", "1"), True) | dict.fromkeys(("F", "FALSE", "0"), False)
 """Values of pbc."""
@@ -45,7 +45,7 @@ def read_xyz(path: Any, lines: list[str]) -> GrainFile:
     Raises
     ------
     BadInput
-        If a frame is incomplete, has no positions, or has lines that are not numbers (the first ten are named).
+        If a frame is incomplete, has no positions, or has lines that are not numbers (the first one is named).
     """
     starts = _frames(path, lines)
 
@@ -83,7 +83,7 @@ def _read_frame(path: Any, lines: list[str], first: int, count: int) -> GrainDat
         if len(words) != width
     ]
     if problems:
-        raise BadInput(problems[:NAMED])
+        raise BadInput(with_number(problems[0], len(problems)))
     unit = in_unit(f"1 {head.get('length_unit', 'angstrom')}", "m")
     if unit is None:
         raise BadInput(f"{place}: length_unit={head['length_unit']!r} is not a unit of length")
@@ -137,9 +137,9 @@ def _columns(path: Any, rows: list[list[str]], layout: list[tuple[str, str, int]
                 values[k] = numbers(words)
             except ValueError:
                 problems.append(f"{path}, line {first + 3 + k}: {' '.join(rows[k])[:40]!r} has no numbers for {name}")
+        if problems:
+            raise BadInput(with_number(problems[0], len(problems)))
         columns[name] = values[:, 0] if width == 1 else values
-    if problems:
-        raise BadInput(problems[:NAMED])
     return columns
 
 

@@ -11,41 +11,53 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ..palettes import SEQUENTIAL
-from ..style import BLUE
+from ..style import BLUE, points
 from .colouring import ColourKey
 
-COLUMN = 0.865
-"""Left edge of the colour keys, relative to the width of the figure."""
+Share = tuple[float, float]
+COLUMN = 0.135
+"""Width of the colour keys, relative to that of the figure."""
 
 
-def draw_colour_keys(figure: Figure, keys: list[ColourKey], scale: float, colour: str) -> None:
-    """Draw colour keys below each other on the right, as colour bars or as swatches with labels."""
-    top = 0.87
+def draw_colour_keys(figure: Figure, keys: list[ColourKey], scale: float, colour: str, share: Share) -> None:
+    """Draw colour keys below each other on the right, as colour bars or as swatches with labels.
+
+    `share` is how much more of width and height of the picture they take than in proportion to it.
+    """
+    top, left = 1.0 - 0.13 * share[1], 1.0 - COLUMN * share[0]
     for key in keys:
         lines = textwrap.fill(key.title, 18, break_long_words=False, break_on_hyphens=False)
-        figure.text(COLUMN, top, lines, size=8.5 * scale, weight="bold", color=colour, va="top", linespacing=1.25)
-        top -= 0.034 * (lines.count("\n") + 1) + 0.012
+        figure.text(left, top, lines, size=points(8.5 * scale), weight="bold", color=colour, va="top", linespacing=1.25)
+        top -= share[1] * (0.034 * (lines.count("\n") + 1) + 0.012)
         if key.swatches:
-            top = _swatches(figure, key, top, scale, colour) - 0.045
+            top = _swatches(figure, key, (left, top), scale, colour, share[1]) - 0.045 * share[1]
         else:
-            top = _bar(figure, key, top, 0.30 if len(keys) == 1 else 0.21, scale, colour) - 0.045
+            top = _bar(figure, key, (left, top), 0.30 if len(keys) == 1 else 0.21, scale, colour) - 0.045 * share[1]
 
 
-def _swatches(figure: Figure, key: ColourKey, top: float, scale: float, colour: str) -> float:
+def _swatches(
+    figure: Figure, key: ColourKey, at: tuple[float, float], scale: float, colour: str, share: float
+) -> float:
+    left, top = at
     width, height = figure.get_size_inches()
     for k, (text, swatch) in enumerate(key.swatches):
-        y = top - 0.036 * k - 0.018
+        y = top - share * (0.036 * k + 0.018)
         if np.isfinite(swatch).all():
-            axes = figure.add_axes((COLUMN, y - 0.011, 0.022 * height / width, 0.022), label=f"swatch {text}")
+            axes = figure.add_axes(
+                (left, y - 0.011 * share, 0.022 * share * height / width, 0.022 * share), label=f"swatch {text}"
+            )
             axes.set(xlim=(-1.05, 1.05), ylim=(-1.05, 1.05))
             axes.set_axis_off()
             axes.fill(*(f(np.linspace(0.0, 2.0 * np.pi, 60)) for f in (np.cos, np.sin)), color=swatch, linewidth=0.0)
-        figure.text(COLUMN + 0.034 * height / width, y, text, size=8.0 * scale, color=colour, va="center_baseline")
-    return top - 0.036 * len(key.swatches)
+        figure.text(
+            left + 0.034 * share * height / width, y, text, size=points(8.0 * scale), color=colour, va="center_baseline"
+        )
+    return top - 0.036 * share * len(key.swatches)
 
 
-def _bar(figure: Figure, key: ColourKey, top: float, height: float, scale: float, colour: str) -> float:
-    axes = figure.add_axes((COLUMN, top - height, 0.013, height), label="bar")
+def _bar(figure: Figure, key: ColourKey, at: tuple[float, float], height: float, scale: float, colour: str) -> float:
+    left, top = at
+    axes = figure.add_axes((left, top - height, 0.013, height), label="bar")
     norm = (LogNorm if key.log else Normalize)(key.low, key.high)
     bar = figure.colorbar(ScalarMappable(norm, key.map or SEQUENTIAL), cax=axes)
     bar.outline.set_visible(False)
@@ -54,7 +66,12 @@ def _bar(figure: Figure, key: ColourKey, top: float, height: float, scale: float
     bar.update_ticks()
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.tick_params(
-        labelsize=8.0 * scale, colors=colour, width=0.7 * scale, length=3.0 * scale, pad=3.0 * scale, which="both"
+        labelsize=points(8.0 * scale),
+        colors=colour,
+        width=0.7 * scale,
+        length=3.0 * scale,
+        pad=3.0 * scale,
+        which="both",
     )
     return top - height
 
@@ -72,11 +89,11 @@ def draw_directions(
         if np.hypot(*step) > 0.05:
             axes.plot([0.0, step[0]], [0.0, step[1]], color=axes_colour, linewidth=1.1 * scale)
             end = step * (1.0 + 0.32 / np.hypot(*step))
-            axes.text(end[0], end[1], name, color=axes_colour, size=8.0 * scale, ha="center", va="center")
+            axes.text(end[0], end[1], name, color=axes_colour, size=points(8.0 * scale), ha="center", va="center")
     if field is not None and np.linalg.norm(field) > 0.0:
         flat = (rotation @ field)[:2] / np.linalg.norm(field)
         colour = "#7CC4F5" if dark else BLUE
         style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6 * scale, "mutation_scale": 9.0 * scale}
         axes.annotate("", tuple(1.15 * flat), (0.0, 0.0), arrowprops={**style, "shrinkA": 0.0, "shrinkB": 0.0})
         end = flat * (1.15 + 0.3 / max(float(np.hypot(*flat)), 0.3))
-        axes.text(end[0], end[1], "B", color=colour, size=8.5 * scale, ha="center", va="center", weight="bold")
+        axes.text(end[0], end[1], "B", color=colour, size=points(8.5 * scale), ha="center", va="center", weight="bold")

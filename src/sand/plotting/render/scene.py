@@ -11,7 +11,18 @@ from matplotlib.axes import Axes
 
 from ...analysis.clusters import cluster_labels, cluster_sizes, unwrapped
 from ...basics.box import Box
-from ..style import LARGEST_COLOURS, MUTED, OTHER_COLOURS, SINGLE_COLOUR, TEXT_COLOUR, format_si, rgb, round_length
+from ...basics.clusters import closes_through_boundary
+from ..style import (
+    LARGEST_COLOURS,
+    MUTED,
+    OTHER_COLOURS,
+    SINGLE_COLOUR,
+    TEXT_COLOUR,
+    format_si,
+    points,
+    rgb,
+    round_length,
+)
 from .spheres import Spheres, render_spheres
 
 AZIMUTH, ELEVATION = 32.0, 20.0
@@ -48,7 +59,7 @@ class Scene:
     Attributes
     ----------
     position : ndarray
-        (N, 3) positions [m]; clusters are unwrapped, with their centre in the box.
+        (N, 3) positions [m]; clusters are unwrapped, with their centre in the box, or all grains are in the box.
     radius : ndarray
         (N,) radii [m].
     label : ndarray
@@ -117,15 +128,19 @@ def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> 
     box : Box
         Periodic or open box.
     whole : bool, optional
-        Unwrap clusters across periodic boundaries; otherwise every grain is drawn inside the box.
+        Unwrap clusters across periodic boundaries, but for percolating ones, which touch their own periodic image and
+        have no extent; otherwise every grain is drawn inside the box.
     """
     label = cluster_labels(len(grains), pairs)
     position = box.wrap(np.where(np.isfinite(grains.position), grains.position, np.nan))
     if whole:
-        position = unwrapped(position, pairs, box)
+        inside, position = position, unwrapped(position, pairs, box)
         sizes = cluster_sizes(label)
         centre = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
         position = position + (box.wrap(centre) - centre)[label]
+        percolates = np.zeros(len(sizes), bool)
+        percolates[label[pairs[closes_through_boundary(position, pairs, box), 0]]] = True
+        position = np.where(percolates[label, None], inside, position)
     finite = np.isfinite(position).all(axis=1)
     numbered = np.unique(label[finite], return_inverse=True)[1]
     return Scene(
@@ -234,7 +249,7 @@ def _draw_directions(axes: Axes) -> None:
     x, y = left + 1.6 * size, bottom + 0.9 * size
     for name, step in zip("xyz", camera_rotation()[:2].T * size, strict=True):
         axes.plot([x, x + step[0]], [y, y + step[1]], color=MUTED, linewidth=0.9, zorder=4)
-        axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=MUTED, size=7, ha="center", va="center")
+        axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=MUTED, size=points(7.0), ha="center", va="center")
 
 
 def draw_scale_bar(
@@ -249,7 +264,13 @@ def draw_scale_bar(
     )
     centre, offset = (x - length / 2, y), (0, 3 * scale)
     axes.annotate(
-        format_si(length, "m"), centre, offset, textcoords="offset points", ha="center", color=colour, size=7.5 * scale
+        format_si(length, "m"),
+        centre,
+        offset,
+        textcoords="offset points",
+        ha="center",
+        color=colour,
+        size=points(7.5 * scale),
     )
 
 
@@ -296,5 +317,7 @@ def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     window = fit_window((left, right, bottom - 0.22 * (top - bottom), top), aspect, 0.02, min_height)
     _draw_image(axes, spheres, window, pixels)
     for edge, size in zip(lower_edges, sizes, strict=True):
-        axes.annotate(f"{size} grains", edge, (0, -3), textcoords="offset points", ha="center", va="top", size=7.5)
+        axes.annotate(
+            f"{size} grains", edge, (0, -3), textcoords="offset points", ha="center", va="top", size=points(7.5)
+        )
     draw_scale_bar(axes, 0.15)
