@@ -187,8 +187,8 @@ def command(
     DIR may also be a trajectory, or a file of grains: XYZ, columns, LAMMPS data and dump, GSD; or a sweep, of which
     WHAT are columns of results, such as largest_remnant or outcome, or growth: growth efficiency and kinds of outcomes
     over speed and impact parameter. Of packings that were loaded by `sand compress`, `stretch` or `shear`, in a job or
-    a sweep, their figure is drawn, `laboratory`, or columns of the table of a job. Of several runs each figure shows all,
-    named by --labels, in the folder plots.
+    a sweep, their figure is drawn, `laboratory`, or columns of the table of a job. Of several runs each figure shows
+    all, named by --labels, in the folder plots.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, temperatures (of bodies), still,
     mass_spectrum (s² n_s over the number s of grains of clusters, n_s clusters per grain of a frame); or a

@@ -20,6 +20,8 @@ from .laboratory_table import CHANNELS
 
 POINTS = 60
 """Largest number of points of a curve."""
+MOST_SHARES = 4
+"""Largest number of groups whose shares of what is dissipated are drawn."""
 NOUNS = {"compress": "pressure", "stretch": "tension", "shear": "shear stress"}
 FILLING = r"filling factor $\phi$"
 TOO_FAST, RISING = "open: too fast for a static stress", "rises to the end: no strength"
@@ -69,7 +71,7 @@ def laboratory_figure(runs: Sequence[dict[str, Any]], column: str | None = None)
     ----------
     runs : Sequence[dict]
         Outcomes, as `experiments.laboratory.Loaded.to_dict`; of a sweep also with "group", the values of its keys. Each
-        group has a curve; the shares of what is dissipated are those of the first one.
+        group has a curve, and a panel with the shares of what is dissipated; of many groups some, from first to last.
     column : str or None, optional
         A column of the table to draw alone.
     """
@@ -80,7 +82,7 @@ def laboratory_figure(runs: Sequence[dict[str, Any]], column: str | None = None)
     first = runs[0]
     compressed = first["kind"] == "compress"
     x, label = ("mean_filling", FILLING) if compressed else ("strain", "strain")
-    first_name, tables = next(iter(groups.items()))
+    tables = next(iter(groups.values()))
     seeds = f"{len(tables)} seed{'s' * (len(tables) > 1)}"
 
     def curves(name: str) -> list[Curve]:
@@ -96,12 +98,19 @@ def laboratory_figure(runs: Sequence[dict[str, Any]], column: str | None = None)
     notes += [RISING] if not compressed and any(run["largest_at_end"] for run in runs) else []
     panels = [
         Panel(label, f"{NOUNS[first['kind']]} [Pa]", stress, laws, "xy" * compressed, not compressed, "; ".join(notes)),
-        Panel(label, "share of what is dissipated", shares_of(tables, x), (), log, legend=first_name),
         Panel(label, "coordination number $Z$", number, numbers, log),
     ]
+    names = list(groups)
+    for k in np.unique(np.linspace(0, len(names) - 1, min(len(names), MOST_SHARES)).round().astype(int)):
+        shares = shares_of(groups[names[k]], x)
+        panels.append(Panel(label, "share of what is dissipated", shares, (), log, legend=names[k]))
     if first["largest_load"]:  # one pressure does not show how the packing yields
         over, unit = ("time", " [s]") if compressed else ("strain", "")
-        free = [Curve("each seed" * (k == 0), one[over], one["filling"]) for k, one in enumerate(tables)]
+        free = [
+            Curve((name or "each seed") * (k == 0), one[over], one["filling"], look=look)
+            for look, (name, some) in enumerate(groups.items())
+            for k, one in enumerate(some)
+        ]
         panels.insert(0, Panel(over + unit, FILLING, free, log=""))
     energy = rf"$E_\mathrm{{roll}}=12\pi^2\gamma R\xi_\mathrm{{c}}$ = {first['roll_energy']:.3g} J, $R=r/2$"
     return panels_figure(panels, f"{title}; {energy}")

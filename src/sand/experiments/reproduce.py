@@ -116,8 +116,9 @@ class Reproduction(SweepJob):
         super().__init__(path, folder, settings, content=content, retry=retry)
         self.names = [row.name for row in self.rows]
         self._offsets = len({row.values.get("impact.impact_parameter") for row in self.rows})
-        rows = self._cells(place / name) if known else []
-        self.known = [cells for cells in rows if cells["run"] in self.names]
+        rows = [] if small else [cells for cells in self._cells(place / name) if cells["run"] in self.names]
+        self._measured = {cells["run"]: float(cells["cpu_seconds"]) for cells in rows}
+        self.known = rows if known else []
         have = {cells["run"] for cells in self.known}
         # cheap runs first, and all of one seed before those of the next
         self.rows = sorted(
@@ -130,7 +131,17 @@ class Reproduction(SweepJob):
         return case if self.first is None else changed_content(case, {"aggregate.file": COMPRESSED})
 
     def expected(self, left: Sequence[Run]) -> Expected:
-        """As `SweepJob.expected`; before packings are compressed, their cost, and that of runs with a packing."""
+        """As `SweepJob.expected`, with the measured CPU times of runs that are in the table that comes with SAND.
+
+        Before packings are compressed, their cost, and that of runs with a packing.
+        """
+        found = self._estimated(left)
+        if not all(row.name in self._measured for row in left) or self.first is not None:
+            return found
+        return found._replace(seconds=math.fsum(self._measured[row.name] for row in left))
+
+    def _estimated(self, left: Sequence[Run]) -> Expected:
+        """Cost without measured times."""
         if self.first is None or not left or (self.folder / COMPRESSED / LABORATORY).exists():
             return super().expected(left)
         body, self._is_set_up = self.first["aggregate"], True

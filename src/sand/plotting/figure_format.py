@@ -18,7 +18,7 @@ INCHES = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 1.0 / 25.4, "pt": 1.0 / 72.27}
 """Units of widths; pt is the point of TeX, in which `\\the\\columnwidth` is printed."""
 LEAST_WIDTH, MOST_WIDTH = 2.0, 20.0
 """Allowed widths [inches]."""
-LEAST_PANEL = 2.3
+LEAST_PANEL = 2.9
 """Least width of a panel [inches] beside others; narrower figures have fewer panels in a row."""
 FONT_SIZE = 8.0
 """Font size of the figures [points], to which all others are relative."""
@@ -95,7 +95,7 @@ def figure_format(width: Any = None, style: Any = None) -> Iterator[None]:
     Parameters
     ----------
     width : str or None, optional
-        Width with its unit, such as "3.4in"; None: as before. Panels side by side that would be narrower than 2.3
+        Width with its unit, such as "3.4in"; None: as before. Panels side by side that would be narrower than 2.9
         inches are placed below each other, and the ratio of width to height of a panel is kept.
     style : str or Path or None, optional
         Style file of matplotlib (.mplstyle), or name of a style; None: as before. Colours that mean something, such as
@@ -169,6 +169,6 @@ def panel_grid(
     if wanted is not None:
         columns = min(columns, max(int((wanted - more[0]) / LEAST_PANEL), 1))
         each = (wanted - more[0]) / columns
-        panel = each, max(each * panel[1] / panel[0], 0.62 * min(each, LEAST_PANEL))
+        panel = each, each * panel[1] / panel[0]
     rows = math.ceil(number / columns)
     return rows, columns, (columns * panel[0] + more[0], rows * panel[1] + more[1])

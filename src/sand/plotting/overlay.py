@@ -18,7 +18,7 @@ from ..analysis.quantities import category_names, measured, quantity
 from ..basics.errors import BadInput
 from ..io.ledger_table import TEMPERATURES
 from ..simulation.ledger import KINETIC
-from .panels import ELASTIC, LOSS_CHANNELS, TEMPERATURE_LINES, column, peak
+from .panels import DECADES, ELASTIC, LOSS_CHANNELS, TEMPERATURE_LINES, column, log_ticks, peak, scale_values
 from .plots import bin_edges, dark_figure, one_panel
 from .style import BLUE, GREEN, LARGEST_COLOURS, MUTED, ORANGE, PURPLE, RED, legend_above, plot_style, si_prefix
 
@@ -134,7 +134,16 @@ def overlaid_history(runs: Sequence[Overlaid], name: str, dark: bool = False) ->
                 kept = np.where(one[label] > 0.0, one[label], np.nan) if lines.scale == "log" else one[label]
                 axes.plot(run.ledger["time"] / time, kept / size, style, color=colour)
         axes.set(xlabel=f"time ({second})", ylabel=f"{lines.label} ({prefixed})" if prefixed else lines.label)
-        axes.set_yscale(lines.scale)
+        if lines.scale == "log":
+            drawn_lines = [one[label] for one in values for label in shown]
+            top = max(map(peak, drawn_lines)) / size
+            lowest = min(float(np.min(line, where=line > 0.0, initial=top * size)) for line in drawn_lines) / size
+            axes.set(yscale="log", ylim=(max(lowest / 1.3, top * 10.0**-DECADES) or 0.5, 1.3 * top or 1.0))
+            log_ticks(axes, plain=True)
+        else:
+            scale_values(
+                axes, [one[label] / size for one in values for label in shown if peak(one[label])] or [np.ones(1)]
+            )
         _legend(axes, runs, shown)
         dark_figure(figure, dark)
     return figure

@@ -67,6 +67,8 @@ MIN_BALANCE_RANGE = 1e-3
 """Minimum half range of the balance axis, relative to all losses and the largest kinetic energy."""
 
 
+WIDE_ENOUGH = 3.3
+"""Width of a panel [inches] from which on the error of the energy is stated in full."""
 FEW = 2
 """Bodies at the start up to which their motion is a flight, not a thermal motion, and energies are in units of it."""
 
@@ -161,7 +163,7 @@ def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
     sizes = max([float(ledger[name].max()) for name in ("largest_cluster", "mean_cluster_size")] + [peak(awake)])
     for own, top in ((axes, sizes), (right, float(ledger["clusters"].max()))):
         own.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)))
-        _log_ticks(own, plain=True)
+        log_ticks(own, plain=True)
     areas = []
     if awake.size:
         low = np.full(len(t), axes.get_ylim()[0])
@@ -182,7 +184,7 @@ def draw_energies(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> No
     for name, (values, colour) in drawn.items():
         axes.plot(t, values, color=colour, label=labels.get(name, name), **_markers(t))
     if drawn:
-        _scale(axes, [values for values, _ in drawn.values()])
+        scale_values(axes, [values for values, _ in drawn.values()])
         legend_above(axes)
     else:
         _no_data(axes, "all energies are zero")
@@ -210,7 +212,7 @@ def draw_temperatures(axes: Axes, ledger: Any, time: AxisUnit) -> None:
         axes.plot(t, np.where(values > 0.0, values, np.nan), color=colour, label=label, **_markers(t))
     lowest = min(float(np.min(values, where=values > 0.0, initial=top)) for values in drawn)
     axes.set(yscale="log", ylim=(max(lowest / 1.3, top * 10.0**-DECADES), 1.3 * top))
-    _log_ticks(axes, plain=True)
+    log_ticks(axes, plain=True)
     legend_above(axes)
 
 
@@ -224,7 +226,7 @@ def draw_pressure(axes: Axes, ledger: Any, time: AxisUnit) -> None:
         label, colour = PRESSURES[name]
         axes.plot(t, values, color=colour, label=label, **_markers(t))
     if any(map(peak, drawn)):
-        _scale(axes, [values for values in drawn if peak(values)])
+        scale_values(axes, [values for values in drawn if peak(values)])
     axes.set_ylabel(f"$P$ ({unit.name})")
     legend_above(axes)
 
@@ -263,7 +265,7 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
             size=points(7.0),
             color=MUTED,
         )
-    _log_ticks(axes)
+    log_ticks(axes)
     legend_above(axes)
 
 
@@ -290,7 +292,9 @@ def draw_balance(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> Non
     axes.set(ylim=(-half, half), ylabel=f"Δ ({unit.name})")
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
     axes.yaxis.set_major_formatter(_tick_label)
-    drift = f"{format_number(ledger.drift)} of the energy dissipated and kinetic"
+    of = " of the energy dissipated and kinetic"
+    full = axes.get_window_extent().width > WIDE_ENOUGH * axes.figure.dpi
+    drift = f"{format_number(ledger.drift)}{of if full else ''}"
     text = f"energy error: {drift if np.isfinite(ledger.drift) else 'not finite at the end'}"
     axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=points(7.5))
 
@@ -316,7 +320,7 @@ def _no_data(axes: Axes, text: str) -> None:
     axes.set_yticks([])
 
 
-def _scale(axes: Axes, curves: list[np.ndarray]) -> None:
+def scale_values(axes: Axes, curves: list[np.ndarray]) -> None:
     """Scale the axis linearly if the peaks of all curves are within a factor of 30, otherwise as symlog."""
     peaks = [peak(values) for values in curves]
     top = max(peaks)
@@ -337,7 +341,7 @@ def _scale(axes: Axes, curves: list[np.ndarray]) -> None:
     axes.yaxis.set_major_locator(locator)
 
 
-def _log_ticks(axes: Axes, plain: bool = False) -> None:
+def log_ticks(axes: Axes, plain: bool = False) -> None:
     """Ticks at powers of ten, also at 2 and 5 on short axes; `plain` writes 1000 instead of 10³."""
     low, high = axes.get_ylim()
     short = high < 250.0 * low

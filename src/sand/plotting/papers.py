@@ -33,6 +33,7 @@ class Curve(NamedTuple):
     low: np.ndarray | None = None
     high: np.ndarray | None = None
     weak: np.ndarray | None = None
+    look: int | None = None  # number of its colour and marker; by default its place among the curves
 
 
 class Guide(NamedTuple):
@@ -71,7 +72,9 @@ def _draw(axes: Axes, panel: Panel) -> None:
         log_axis(axes, axis)
     if panel.zero:
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    for curve, colour, marker in zip(panel.curves, cycle(LARGEST_COLOURS), cycle(MARKERS), strict=False):
+    for k, curve in enumerate(panel.curves):
+        number = k if curve.look is None else curve.look
+        colour, marker = LARGEST_COLOURS[number % len(LARGEST_COLOURS)], MARKERS[number % len(MARKERS)]
         weak = np.zeros(len(curve.x), bool) if curve.weak is None else curve.weak
         look: dict[str, Any] = {"marker": marker, "color": colour, "markersize": 4.0, "linewidth": 1.0}
         axes.plot(curve.x, np.where(weak, np.nan, curve.y), label=curve.label, **look)

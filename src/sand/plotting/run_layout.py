@@ -13,7 +13,7 @@ WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
 SIDE_BY_SIDE = 8.0
 """Width [inches] from which on the image of the grains is beside the panels over time, not below them."""
-PANEL_HEIGHT = 1.05
+PANEL_HEIGHT = 1.35
 """Height of a panel above the image of the grains, with its legend, over its relative height [inches]."""
 HEADER = (0.968, 0.931, 0.911, 0.019)
 """Heights of the lines of the header beside which there is space, and the distance of further ones, relative."""

@@ -139,7 +139,8 @@ def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> 
         centre = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
         position = position + (box.wrap(centre) - centre)[label]
         percolates = np.zeros(len(sizes), bool)
-        percolates[label[pairs[closes_through_boundary(position, pairs, box), 0]]] = True
+        ends = np.asarray(pairs, np.int64).reshape(-1, 2)  # without contacts of any type
+        percolates[label[ends[closes_through_boundary(position, ends, box), 0]]] = True
         position = np.where(percolates[label, None], inside, position)
     finite = np.isfinite(position).all(axis=1)
     numbered = np.unique(label[finite], return_inverse=True)[1]
