@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..basics.errors import BadInput, did_you_mean, shown
+from ..basics.errors import BadInput, shown
 
 WIDTH, STYLE = "SAND_FIGURE_WIDTH", "SAND_FIGURE_STYLE"
 """Environment variables with the width and the style of all figures, which worker processes inherit."""
@@ -59,8 +59,7 @@ def style_settings(style: Any, name: str = "style") -> dict[str, Any]:
     if text in styles.library:
         found: Mapping[str, Any] = styles.library[text]
     elif not Path(text).is_file():
-        known = did_you_mean(text, list(styles.available))
-        raise BadInput(f"{name} = {shown(text)}: there is no such style file, nor a style of matplotlib; {known}")
+        raise BadInput(f"{name} = {shown(text)}: there is no such style file, nor a style of this name in matplotlib")
     else:
         with _warnings_of("matplotlib") as problems:
             try:

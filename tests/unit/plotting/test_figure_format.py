@@ -40,14 +40,14 @@ def test_a_width_is_that_of_the_file():
         assert picture.width == round(100 * width_in_inches(width))
         assert len(left) == columns
         with plot_style():
-            title = figure.texts[0].get_window_extent() if figure.texts else figure._suptitle.get_window_extent()
+            title = figure.texts[0].get_window_extent()
         assert title.x1 <= figure.bbox.width
     assert format_width() is None and figure_size(5.0, 2.0) == (5.0, 2.0)
     assert panel_grid(3, (4.0, 2.0), 2) == (2, 2, (8.0, 4.0))
 
 
 def test_a_style_file(tmp_path):
-    """Settings of the file hold in the block; all font sizes are in proportion to font.size; figsize gives the width."""
+    """Settings of the file hold in the block; font sizes are in proportion to font.size; figsize gives the width."""
     path = tmp_path / "journal.mplstyle"
     path.write_text("font.size: 12\nfont.family: serif\nfigure.figsize: 3, 2\nbackend: agg\n")
     before = dict(matplotlib.rcParams)
@@ -69,7 +69,7 @@ def test_wrong_widths_and_styles(tmp_path):
         pass
     assert len(error.value.problems) == 2
     assert error.value.problems[0] == "width = '3.4' must be a width with its unit, such as 3.4in, 8.6cm or 246pt"
-    assert "there is no such style file, nor a style of matplotlib" in error.value.problems[1]
+    assert "there is no such style file, nor a style of this name in matplotlib" in error.value.problems[1]
     with pytest.raises(BadInput, match=r"font\.colour") as error, figure_format(style=path):
         pass
     assert len(error.value.problems) == 2
@@ -81,7 +81,7 @@ def test_wrong_widths_and_styles(tmp_path):
 @pytest.mark.draws
 @pytest.mark.compiled("dipoles")
 def test_the_figure_of_a_run_in_a_column(finished_run):
-    """In 3.4 inches all panels are within the figure and above the image of the grains, and no text is below 6 points."""
+    """In 3.4 inches all panels are within the figure, and no text is below 6 points."""
     simulation = sand.open(finished_run[0]).at(-1)
     wide = run_figure(simulation)
     with figure_format(width="3.4in"):

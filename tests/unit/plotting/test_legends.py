@@ -74,7 +74,7 @@ def ensembles_of_growth():
         boxes = [synthetic_box(z, 0.63, 1.4, seed) for seed in range(4)]
         units = {"unit_moment": boxes[0].moment, "unit_radius": boxes[0].radius}
         temperatures = np.column_stack([np.linspace(1e-6, 1e-5, 5), np.full((5, 3), 100.0)])
-        rows = all_aggregates(boxes) | units | {"temperatures": temperatures}
+        rows = all_aggregates(boxes) | units | {"temperatures": temperatures, "sizes": np.array([1, 1, 2, 5, 9])}
         ensembles.append((name, growth_of(boxes, (2.0, 100.0)), rows))
     return ensembles
 

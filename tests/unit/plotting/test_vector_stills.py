@@ -25,7 +25,7 @@ def test_the_order_of_spheres(eye):
     """
     random = np.random.default_rng(7)
     outlines, compared = Outlines(np.zeros(2), eye), 0
-    for _ in range(3000):
+    for _ in range(9000):
         centre, radius = random.uniform(-1.0, 1.0, (2, 3)), random.uniform(0.05, 0.9, 2)
         if np.linalg.norm(centre[0] - centre[1]) < radius.sum():
             continue
@@ -57,7 +57,7 @@ def test_outlines_fill_what_the_image_fills():
 
 
 def test_a_vector_file_has_no_image():
-    """PDF and SVG of outlines hold no pixels; each grain has its six discs in the SVG, and equal pictures equal bytes."""
+    """PDF and SVG of outlines hold no pixels; each grain has six discs in the SVG; equal pictures give equal bytes."""
     frame = frame_of([[0, 0, 0], [3e-8, 0, 0]])
     pictures = [still_picture(frame, vector=True, arrows=False, size=(300, 200)) for _ in range(2)]
     svg, again = (figure_bytes(one, "svg") for one in pictures)
