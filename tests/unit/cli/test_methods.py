@@ -15,6 +15,7 @@ from sand.cli.methods import KINDS
 from sand.cli.references import ARTICLES
 from sand.config.commands import OWN_TABLES
 from sand.forces.registry import FORCES
+from sand.io.bodies import write_body
 from sand.io.damage import sealed
 
 from .test_cite import entries
@@ -273,3 +274,19 @@ def test_a_finished_run(finished_run, capsys):
         "cutoff = 10 µm",
     ):
         assert part in text
+
+
+@pytest.mark.parametrize(("section", "body"), [("compression", "aggregate"), ("impact", "target")])
+def test_the_material_of_a_file(section, body, tmp_path, capsys):
+    """A body of a file that names its material is described with it, not with the default of the case."""
+    path = tmp_path / "body.xyz"
+    write_body(str(path), sand.setup.bpca(4, radius="0.1 um", material="iron", seed=1))
+    other = '[projectile]\nkind = "grain"\nradius = "0.1 um"\nmaterial = "iron"\n' if body == "target" else ""
+    how = 'rate = "1e-3 /t_c"\nto = 0.2' if section == "compression" else 'speed = "1 m/s"\nseeds = [1]'
+    case = f'[{body}]\nkind = "file"\nfile = "{path.as_posix()}"\n{other}[{section}]\n{how}\n{CONTACT}'
+    name = "laboratory.json" if section == "compression" else "collision.json"
+    results = {name: {"runs": [{}], "collisions": [{}], "sand": "0.0.7"}}
+    assert main(["methods", str(folder_of(tmp_path / "x", case, results))]) == 0
+    text = capsys.readouterr().out
+    assert "The material iron has" in text and "silica" not in text
+    assert f"file = {path.as_posix()}, with the materials of that file" in text

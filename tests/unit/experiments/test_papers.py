@@ -12,6 +12,7 @@ import sand
 from sand.analysis.fits import falls_below
 from sand.basics.material import material_named
 from sand.cli.main import main
+from sand.cli.reproduce import comparison_rows
 from sand.experiments import reproduce
 from sand.experiments.paper_chain import compare_chain
 from sand.experiments.paper_compression import compare_compression
@@ -26,6 +27,7 @@ from sand.experiments.paper_packings import compare_pressures, compare_strengths
 from sand.experiments.reproduce import FIGURES, Reproduction, papers_folder
 from sand.experiments.seed_table import Interval, mean_of, seed_table
 from sand.experiments.sequential import collide_in_sequence
+from sand.io.sweep_files import read_runs
 from sand.plotting.papers import panels_figure
 from sand.setup import bpca, grain
 from sand.theory import contact
@@ -386,3 +388,20 @@ def test_the_list(capsys):
     assert found["kataoka2013"]["also"] == ["tatsuuma2023", "arakawa2019"]
     assert main(["reproduce", "wada2013"]) == 2
     assert capsys.readouterr().err == "sand: there is no figure 'wada2013'; did you mean 'wada2013-ice'?\n"
+
+
+def test_the_expected_time_is_the_measured_one(tmp_path):
+    """Runs in the table that comes with SAND are expected to take the CPU time that they took there, on one core."""
+    job = Reproduction("kataoka2013", tmp_path / "there")
+    rows = read_runs(papers_folder() / "kataoka2013")
+    assert len(job.rows) == len(rows) == 8
+    measured = sum(float(one["cpu_seconds"]) for one in rows)
+    assert job.expected(job.rows).seconds == pytest.approx(measured, rel=1e-9, abs=0.0)
+
+
+def test_a_small_version_is_beside_the_paper():
+    """What the paper gives is printed also for a small version, and the verdict only once, as a note."""
+    one = {"what": "P", "paper": "1 (from memory)", "ours": "0.9", "verdict": "agrees"}
+    content = {"comparison": [one], "rows": 1, "design": 1, "cpu_seconds": 1.0, "folder": "there"}
+    assert dict(comparison_rows(content))["P"] == "0.9; paper: 1 (from memory): agrees"
+    assert dict(comparison_rows(content | {"note": "small"}))["P"] == "0.9; paper: 1 (from memory)"
