@@ -78,7 +78,7 @@ def test_the_ledger_and_the_table_of_encounters_agree(population):
     """
     ledger, found = population.ledger, population.encounters
     assert ledger["step"][-1] == len(found["event"]) and ledger["hits"][-1] == (found["end"] == 0).sum()
-    assert ledger["flights"][-1] == (found["end"] != 3).sum()
+    assert ledger["flights"][-1] == len(found["event"])
     assert (np.diff(ledger["mean_cluster_size"]) > 0.0).all() and ledger["mean_cluster_size"][-1] >= 3.0
     assert found["event"].tolist() == list(range(len(found["event"])))
     books = math.fsum(float(ledger[name][-1]) for name in dilute_files.HIT_CHANGES)
@@ -87,7 +87,7 @@ def test_the_ledger_and_the_table_of_encounters_agree(population):
     kinetic = found["touch_kinetic"] + found["touch_rotation"] + found["kinetic"]
     assert ledger["to_gas"][-1] == pytest.approx(kinetic[found["end"] == 0].sum(), rel=1e-9, abs=0.0)
     ratio = found["impact_parameter"] / found["bound"]
-    assert ratio[found["end"] == 0].max() < 1.0 and ratio[found["end"] == 3].min() > 1.0
+    assert ratio.max() < 1.0
 
 
 def test_results_are_read_as_those_of_boxes(population):

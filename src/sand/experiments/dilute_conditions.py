@@ -102,12 +102,11 @@ def others_meanwhile(population: Population, rigid_flights: RigidFlights, draws:
         i, j, kernel = population.draw(*uniforms[1:3])
         a, b = population.bodies[i], population.bodies[j]
         approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
-        if approach.impact_parameter <= approach.bound:
-            start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
-            flight = start and rigid_flights.thermal(a, b, *start, (PROBE_SEED, event))
-            if flight and flight.end == HIT:
-                sums = float(population.sums[i] + population.sums[j])
-                found.append((sums - 2.0 * kernel) / population.volume * flight.time)
+        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+        flight = start and rigid_flights.thermal(a, b, *start, (PROBE_SEED, event))
+        if flight and flight.end == HIT:
+            sums = float(population.sums[i] + population.sums[j])
+            found.append((sums - 2.0 * kernel) / population.volume * flight.time)
     return float(np.mean(found)) if found else 0.0
 
 

@@ -18,8 +18,6 @@ from .scattering.event_draws import event_uniforms
 from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
 
 ENDS = {HIT: "hit", MISS: "miss", BOUND: "bound", FLIGHT_FAILED: "failed"}
-BEYOND = "beyond"
-"""End of an encounter with b above b̂, which needs no flight."""
 HIT_CHANGES = tuple(name for name in CHANGES if name not in ("lost_gas", "lost_outside", "lost_cutoff_changed"))
 """Changes of energies [J] over a hit that can occur."""
 
@@ -33,7 +31,7 @@ class Encounter(NamedTuple):
 
     event: int
     time: float  # [s]
-    end: str  # "beyond" b̂, without a flight; "miss", "hit"; "bound"
+    end: str  # "hit", "miss", "bound"
     grains1: int
     grains2: int
     body1: int  # numbers of the bodies
@@ -125,8 +123,6 @@ class Encounters:
         approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
         drawn = _drawn(self.event, self.time, a, b) | approach._asdict() | {"kernel": kernel}
         self.event += 1
-        if approach.impact_parameter > approach.bound:
-            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=BEYOND)
         flight = self._fly(a, b, approach)
         if flight is None:
             return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=ENDS[MISS])

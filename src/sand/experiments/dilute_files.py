@@ -32,8 +32,8 @@ SHOWN_EVERY = 0.5
 """Wall time [s] between two lines of progress."""
 FRAMES_PER_DECADE = 10
 """Frames per decade of S."""
-END_CODES = {name: code for code, name in enumerate((*ENDS[:3], "beyond"))}
-"""Ends of encounters in encounters.csv: 0 hit, 1 miss, 2 bound, 3 beyond b̂."""
+END_CODES = {name: code for code, name in enumerate(ENDS[:3])}
+"""Ends of encounters in encounters.csv: 0 hit, 1 miss, 2 bound."""
 LEDGER_COLUMNS = (
     *("step", "time", "mean_cluster_size", "clusters", "largest_cluster", "grains", "volume", "number_ratio"),
     *("flights", "hits", "others", "to_gas", "flight_error", "touch_energy", *HIT_CHANGES),
