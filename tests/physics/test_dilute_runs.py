@@ -141,6 +141,8 @@ def test_the_command_grows_a_population_for_each_seed(tmp_path, capsys):
     assert main(["grow", str(later), "--out", str(place), "--workers", "1", "--quiet"]) in (0, None)
     assert main(["grow", str(later), "--out", str(other), "--seeds", "2", "--workers", "1", "--quiet"]) in (0, None)
     assert files_of(place / "seed-2") == files_of(other / "seed-2")
+    times = [[frame.time for frame in sand.open(each / "seed-2").frames] for each in (place, other)]
+    assert times[0] == times[1]
     assert main(["resume", str(place / "seed-1"), "--quiet"]) in (0, None)
     assert main(["info", str(place / "seed-1")]) in (0, None) and "population" in capsys.readouterr().out
 
@@ -175,6 +177,7 @@ def test_few_grains_undamped_contacts_and_other_forces_are_refused(tmp_path):
         (grains(), [FORCES[0], sand.Dipoles(cutoff="1 um")], "cut-off"),
         (grains(), [sand.Dipoles()], "sand.Contact"),
         (grains(), [*FORCES, gas], "stopping length"),
+        (grains(), [*FORCES, sand.Gas(temperature="90 K", density="1e-8 kg/m^3", molecule_mass="2.3 u")], "90 K"),
     ]
     for own, forces, words in cases:
         with pytest.raises(BadInput, match=words):
