@@ -91,17 +91,15 @@ def test_a_reversed_flight_returns_to_its_start():
     assert np.linalg.norm(moved) < 1e-2 * 5e-7 and np.linalg.norm(back[3:6] - y[3:6]) < 1e-2 * 2.5
 
 
-def flights_of_pair(a, b, number, seed=1, **options):
-    """Draws of the bound: b/b̂ and flight of each, None beyond b̂; and K̂."""
-    majorant, rigid_flights, found = Majorant(T), RigidFlights(HEAT, **options), []
+def flights_of_pair(a, b, number, seed=1, widening=1.0, **options):
+    """Draws with b̂ `widening` times as wide: b/b̂ and flight of each, None if charges repel the bodies; and K̂."""
+    majorant, rigid_flights, found = Majorant(T, widening), RigidFlights(HEAT, **options), []
     sizes = sizes_of(a), sizes_of(b)
     for event in range(number):
         approach = majorant.draw(*sizes, event_uniforms(seed, event)[3:6])
-        ratio, flight = approach.impact_parameter / approach.bound, None
-        if ratio <= 1.0:
-            distance = start_distance(a, b, approach.bound)
-            flight = rigid_flights.thermal(a, b, approach.speed, approach.impact_parameter, distance, (seed, event))
-        found.append((ratio, flight))
+        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+        flight = None if start is None else rigid_flights.thermal(a, b, *start, (seed, event))
+        found.append((approach.impact_parameter / approach.bound * widening, flight))
     return found, majorant.kernel(*sizes)
 
 
@@ -141,6 +139,18 @@ def test_groups_of_grains_act_as_the_grains_at_a_distance():
     changes = [flight.state[3:6] - y[3:6] for flight in found]
     first, second = (np.linalg.norm(each - changes[2]) / np.linalg.norm(changes[2]) for each in changes[:2])
     assert 0.0 < second < 0.5 * first < 0.025
+
+
+def test_charged_bodies_have_no_groups():
+    """Groups have no charge: where both bodies are charged, each grain counts, with equal bits for any group size."""
+    pair = []
+    for charges in ([1, 1], [-1, -1]):
+        charge = 1.602176634e-19 * np.array(charges, float)
+        grains = DIMER.grains._replace(charge=charge)
+        pair.append(body_of(grains, DIMER.contacts)[0])
+    y = start_state(*pair, 3.0, 2.2e-7, 5e-7)
+    one, other = (RigidFlights(HEAT, group_size=size).onward(*pair, y, 5e-7) for size in (0.25, 0.0))
+    assert one.state.tobytes() == other.state.tobytes() and pair[0].flying.groups.reach[1] < 0.25 * 4e-7
 
 
 def test_the_random_numbers_of_a_flight_are_those_of_its_event():
@@ -219,7 +229,7 @@ def test_a_population_repeats_its_bits_and_keeps_its_mass():
     assert density == pytest.approx(3e8, rel=1e-12, abs=0.0)
     mass = sum(body.mass for body in one.population.bodies)
     assert mass == pytest.approx(one.population.grains.sum() * GRAIN.mass, rel=1e-12, abs=0.0)
-    assert {row.end for row in rows} <= {"hit", "miss", "beyond"}
+    assert {row.end for row in rows} <= {"hit", "miss"}
 
 
 RING = aggregate(
@@ -229,27 +239,33 @@ HAIRPIN = aggregate(
     [[i, j, 0] for j in range(2) for i in range(8)], [[1 - 2 * j, 0, 0] for j in range(2) for i in range(8)]
 )
 AWKWARD = {
-    "grains": (GRAIN, GRAIN, 51.6, 0.6, 20_000),
-    "dimer": (GRAIN, DIMER, 83.9, 1.1, 12_000),
-    "antiparallel dimer": (GRAIN, ANTIPARALLEL, 11.8, 0.4, 16_000),
-    "two antiparallel dimers": (ANTIPARALLEL, ANTIPARALLEL, 15.6, 0.5, 16_000),
-    "ring of four": (GRAIN, RING, 14.4, 0.5, 16_000),
-    "hairpin of two chains": (GRAIN, HAIRPIN, 46.5, 2.3, 6_000),
+    "grains": (GRAIN, GRAIN, 51.73, 0.40, 20_000),
+    "dimer": (GRAIN, DIMER, 83.74, 0.79, 12_000),
+    "antiparallel dimer": (GRAIN, ANTIPARALLEL, 31.22, 0.29, 16_000),
+    "two antiparallel dimers": (ANTIPARALLEL, ANTIPARALLEL, 25.47, 0.34, 16_000),
+    "ring of four": (GRAIN, RING, 14.85, 0.47, 16_000),
+    "hairpin of two chains": (GRAIN, HAIRPIN, 80.95, 1.02, 6_000),
 }
-"""Pairs with ⟨σv⟩/π(2r)²⟨v⟩ and its standard error by an independent program, and numbers of draws."""
+"""Pairs with ⟨σv⟩/π(2r)²⟨v⟩ and its standard error, and numbers of draws.
+
+The values are those of another program, with loops, random numbers and steps of its own, in which all pairs of grains
+attract each other: seeds 101 and 102, and 30,000, 20,000, 74,000, 74,000, 24,000 and 66,000 flights.
+"""
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("name", AWKWARD)
 def test_rate_coefficients_of_awkward_pairs(name, record_bound):
-    """⟨σv⟩ of pairs, some with moments that cancel, within 3 standard errors of the difference; b̂ is never exceeded."""
+    """⟨σv⟩ of pairs, some with moments that cancel, by flights with groups of grains: as another program has it.
+
+    Within 3 standard errors of the difference; that program takes all pairs of grains.
+    """
     a, b, expected, error, number = AWKWARD[name]
-    rate, own, largest, errors = rate_coefficient(a, b, number)
+    rate, own, _, errors = rate_coefficient(a, b, number)
     reduced = a.mass * b.mass / (a.mass + b.mass)
     unit = math.pi * (2.0 * RADIUS) ** 2 * math.sqrt(8.0 * HEAT / (math.pi * reduced))
     off = (rate / unit - expected) / math.hypot(own / unit, error)
     record_bound(f"{name}: deviation of the rate coefficient [standard errors]", abs(off), most=3.0)
-    record_bound(f"{name}: largest impact parameter of a hit over its bound", largest, most=1.0)
     if name == "grains":
         record_bound("grains: energy error of flights [kT rms]", float(np.sqrt((errors**2).mean())), most=3.0)
         record_bound("grains: K(1,1) over 3.03e-14 m³/s", rate / 3.03e-14, least=0.97, most=1.03)
@@ -274,19 +290,39 @@ def test_the_cross_section_of_two_grains_at_thermal_speed(record_bound):
 @pytest.mark.validate
 def test_results_do_not_depend_on_bound_and_start(record_bound):
     """K(1,1) with b̂ 1.5 times as wide is the same, within 3 standard errors: thinning is exact."""
-    wide, rigid_flights, number, hits = Majorant(T, widening=1.5), RigidFlights(HEAT), 12_000, 0
-    size = sizes_of(GRAIN)
-    for k in range(number):
-        approach = wide.draw(size, size, event_uniforms(9, k)[3:6])
-        if approach.impact_parameter <= approach.bound:
-            far = start_distance(GRAIN, GRAIN, approach.bound)
-            hits += (
-                rigid_flights.thermal(GRAIN, GRAIN, approach.speed, approach.impact_parameter, far, (9, k)).end == HIT
-            )
-    share, bound = hits / number, wide.kernel(size, size)
+    wide, error_of_wide, _, _ = rate_coefficient(GRAIN, GRAIN, 12_000, seed=9, widening=1.5)
     other, error, _, _ = rate_coefficient(GRAIN, GRAIN, 12_000, seed=10)
-    off = (share * bound - other) / math.hypot(error, bound * math.sqrt(share * (1.0 - share) / number))
+    off = (wide - other) / math.hypot(error, error_of_wide)
     record_bound("K(1,1) with a wider bound: deviation [standard errors]", abs(off), most=3.0)
+
+
+def with_moment(number):
+    """A magnetic grain with so many elementary charges."""
+    return body_of(GRAIN.grains._replace(charge=np.array([number * 1.602176634e-19])), NO_CONTACTS)[0]
+
+
+WEAK = aggregate([[0, 0, 0]], [[0, 0, 0.05]])
+WIDE = {name: (*pair[:2], {}) for name, pair in AWKWARD.items()} | {
+    "weak grains": (WEAK, WEAK, {}),
+    "opposite charges": (with_moment(1), with_moment(-1), {}),
+    "equal charges": (with_moment(1), with_moment(1), {}),
+    "field": (DIMER, GRAIN, {"field": (0.0, 0.0, 2e-3)}),
+}
+"""Pairs, and options of their flights, with which b̂ is tried as a bound."""
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("name", WIDE)
+def test_no_path_beyond_the_bound_leads_to_a_hit(name, record_bound):
+    """Of 6,000 draws up to 1.5 b̂, of which more than half are beyond b̂, none of these hits.
+
+    The estimate of b̂ leaves out rotation and grains nearer than their centres: this is its test.
+    """
+    a, b, options = WIDE[name]
+    found, _ = flights_of_pair(a, b, 6_000, seed=21, widening=1.5, **options)
+    ratios = [ratio for ratio, flight in found if flight is not None and flight.end == HIT]
+    assert len(ratios) > 20 and sum(ratio > 1.0 for ratio, _ in found) > 3_000
+    record_bound(f"{name}: largest impact parameter of a hit over its bound", max(ratios), most=1.0)
 
 
 def merged(a, b, state):

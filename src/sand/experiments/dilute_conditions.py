@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.constants import BOLTZMANN
 from ..basics.errors import BadInput, warn
-from ..basics.grains import Grains
+from ..basics.grains import GrainArrays, Grains
 from ..basics.ramps import ramps_of
 from ..basics.units import format_quantity
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.gas import Gas
+from ..forces.gas_drag import rotation_friction, translation_friction
 from ..theory.magnetic_limits import magnetic_limits
-from .dilute_body import Body
-from .dilute_flight import RigidFlights, kepler_start, start_distance
-from .dilute_majorant import Majorant
+from .dilute_encounters import draw_flight
+from .dilute_flight import RigidFlights, start_distance
 from .dilute_population import Population, sizes_of
 from .scattering.event_draws import event_uniforms
 from .scattering.flight_driver import HIT
@@ -98,16 +99,9 @@ def others_meanwhile(population: Population, rigid_flights: RigidFlights, draws:
     """Mean expected number of encounters with others of two bodies during a flight that ends in a hit, at the start."""
     found = []
     for event in range(draws):
-        uniforms = event_uniforms(PROBE_SEED, event)
-        i, j, kernel = population.draw(*uniforms[1:3])
-        a, b = population.bodies[i], population.bodies[j]
-        approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
-        if approach.impact_parameter <= approach.bound:
-            start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
-            flight = start and rigid_flights.thermal(a, b, *start, (PROBE_SEED, event))
-            if flight and flight.end == HIT:
-                sums = float(population.sums[i] + population.sums[j])
-                found.append((sums - 2.0 * kernel) / population.volume * flight.time)
+        drawn = draw_flight(population, rigid_flights, (PROBE_SEED, event), event_uniforms(PROBE_SEED, event))
+        if drawn.flight is not None and drawn.flight.end == HIT:
+            found.append(drawn.others)
     return float(np.mean(found)) if found else 0.0
 
 
@@ -135,19 +129,28 @@ def check_population(population: Population, rigid_flights: RigidFlights, densit
 
 
 def check_gas(gas: Gas | None, grains: Grains, population: Population) -> None:
-    """Refuse a gas that acts within encounters, or does not thermalise bodies between them.
+    """Refuse a gas of another temperature, that acts within encounters, or does not thermalise bodies between them.
+
+    Stopping times are those of grains: of the body whose flights feel the gas most, and of the slowest grain.
 
     Raises BadInput.
     """
     if gas is None:
         return
-    time, majorant = gas.shortest_time(grains), population.majorant
-    slowest = population.bodies[int(np.argmax(population.sizes.mass))]
-    size = sizes_of(slowest)
-    speed = math.sqrt(3.0 * majorant.heat / slowest.mass)
-    reach, length = float(majorant.bound(size, size, speed)) + 2.0 * slowest.extent, speed * time
+    majorant, size, problems = population.majorant, population.sizes, []
+    temperature = majorant.heat / BOLTZMANN
+    if not math.isclose(gas.temperature, temperature, rel_tol=1e-9):
+        problems.append(
+            f"gas: its temperature is {gas.temperature:g} K, and that of the bodies {temperature:g} K; thermal bodies "
+            "have that of the gas: give one temperature"
+        )
+    speed = np.sqrt(3.0 * majorant.heat / size.mass)
+    lengths = speed * [float(_stopping_times(body.grains, gas).min()) for body in population.bodies]
+    reaches = majorant.bound(size, size, speed) + 2.0 * size.extent
+    worst = int(np.argmin(lengths / reaches))
+    length, reach = float(lengths[worst]), float(reaches[worst])
+    time = float(_stopping_times(grains.arrays, gas).max())
     between = len(population.bodies) / (2.0 * population.rate)
-    problems = []
     if length < BALLISTIC * reach:
         problems.append(
             f"gas: the stopping length of grains, {format_quantity(length, 'm')}, is less than {BALLISTIC:g} times "
@@ -164,6 +167,14 @@ def check_gas(gas: Gas | None, grains: Grains, population: Population) -> None:
         raise BadInput(problems)
 
 
+def _stopping_times(grains: GrainArrays, gas: Gas) -> np.ndarray:
+    """Stopping times [s] of velocity and spin of grains, (2, n); those of a rigid body of them lie in their range."""
+    law = gas.numbers()
+    numbers = law.density, law.mean_speed, law.accommodation
+    frictions = translation_friction(grains.radius, *numbers), rotation_friction(grains.radius, *numbers)
+    return np.stack([grains.mass / frictions[0], grains.inertia / frictions[1]])
+
+
 def check_moments(grains: Grains, temperature: float, population: Population) -> None:
     """Warn if thermal flips turn moments within grains before the first encounters.
 
@@ -177,7 +188,7 @@ def check_moments(grains: Grains, temperature: float, population: Population) ->
             continue
         radius = float(grains.radius[(grains.material == k) & (moments > 0.0)].min())
         time = magnetic_limits(material, radius, temperature).relaxation_time
-        flight = _flight_time(population.bodies[0], population.majorant)
+        flight = _flight_time(population)
         grain = f"{material.name} grains of {format_quantity(radius, 'm')}"
         flips = f"moments of {grain} flip after {format_quantity(time, 's')}"
         if time < flight:
@@ -193,7 +204,11 @@ def check_moments(grains: Grains, temperature: float, population: Population) ->
             )
 
 
-def _flight_time(body: Body, majorant: Majorant) -> float:
-    """Time [s] of a typical flight of two such bodies."""
-    size, speed = sizes_of(body), math.sqrt(2.0 * majorant.heat / body.mass)
-    return 2.0 * start_distance(body, body, float(majorant.bound(size, size, speed))) / speed
+def _flight_time(population: Population) -> float:
+    """Longest time [s] of typical flights of two equal magnetic bodies."""
+    found, majorant = [0.0], population.majorant
+    for body in population.bodies:
+        if body.strength > 0.0:
+            size, speed = sizes_of(body), math.sqrt(2.0 * majorant.heat / body.mass)
+            found.append(2.0 * start_distance(body, body, float(majorant.bound(size, size, speed))) / speed)
+    return max(found)

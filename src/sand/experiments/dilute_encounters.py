@@ -18,8 +18,8 @@ from .scattering.event_draws import event_uniforms
 from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
 
 ENDS = {HIT: "hit", MISS: "miss", BOUND: "bound", FLIGHT_FAILED: "failed"}
-BEYOND = "beyond"
-"""End of an encounter with b above b̂, which needs no flight."""
+REPELLED = "repelled"
+"""End of an encounter of charges that turn around before the start of a flight."""
 HIT_CHANGES = tuple(name for name in CHANGES if name not in ("lost_gas", "lost_outside", "lost_cutoff_changed"))
 """Changes of energies [J] over a hit that can occur."""
 
@@ -33,7 +33,7 @@ class Encounter(NamedTuple):
 
     event: int
     time: float  # [s]
-    end: str  # "beyond" b̂, without a flight; "miss", "hit"; "bound"
+    end: str  # "hit", "miss", "bound", "repelled"
     grains1: int
     grains2: int
     body1: int  # numbers of the bodies
@@ -76,6 +76,32 @@ NO_HIT: dict[str, Any] = dict.fromkeys(("made", "slipped", "broken", "pieces", "
 }
 
 
+class Drawn(NamedTuple):
+    """A pair, and its flight."""
+
+    i: int
+    j: int
+    kernel: float  # K̂ [m³/s]
+    approach: Approach
+    flight: FlightResult | None  # None: repelled before its start
+    others: float  # expected encounters of the two with others during the flight
+
+
+def draw_flight(
+    population: Population, rigid_flights: RigidFlights, event: tuple[int, int], uniforms: tuple[float, ...]
+) -> Drawn:
+    """Draw a pair and its approach, from five of the uniform deviates of an event (seed, number), and fly it."""
+    i, j, kernel = population.draw(*uniforms[1:3])
+    a, b = population.bodies[i], population.bodies[j]
+    approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
+    start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+    if start is None:
+        return Drawn(i, j, kernel, approach, None, 0.0)
+    flight = rigid_flights.thermal(a, b, *start, event)
+    rate = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume
+    return Drawn(i, j, kernel, approach, flight, rate * flight.time)
+
+
 class Encounters:
     """Growth of a population whose gas thermalises all bodies between two encounters.
 
@@ -94,8 +120,8 @@ class Encounters:
     ----------
     time : float
         [s]
-    event, flights, hits_seen : int
-        Draws, flights and hits so far.
+    event, flights, hits_seen, bound : int
+        Draws, flights, hits, and flights that ended without a hit or an escape so far.
     others, recent_others : float
         Sum of `Encounter.others` over hits, and its mean over the last hundred or so.
     longest_flight : float
@@ -107,7 +133,7 @@ class Encounters:
     def __init__(self, population: Population, rigid_flights: RigidFlights, hits: HitRule, seed: int):
         self.population, self.rigid_flights, self.rule, self.seed = population, rigid_flights, hits, seed
         self.time, self.event, self.flights, self.hits_seen, self.others = 0.0, 0, 0, 0, 0.0
-        self.longest_flight = self.recent_others = 0.0
+        self.longest_flight, self.recent_others, self.bound = 0.0, 0.0, 0
         self.numbers = 1 + max(body.number for body in population.bodies)
 
     def step(self) -> Encounter:
@@ -120,17 +146,16 @@ class Encounters:
         """
         population, uniforms = self.population, event_uniforms(self.seed, self.event)
         self.time -= math.log(uniforms[0]) / population.rate
-        i, j, kernel = population.draw(*uniforms[1:3])
+        i, j, kernel, approach, flight, met = draw_flight(
+            population, self.rigid_flights, (self.seed, self.event), uniforms
+        )
         a, b = population.bodies[i], population.bodies[j]
-        approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
         drawn = _drawn(self.event, self.time, a, b) | approach._asdict() | {"kernel": kernel}
         self.event += 1
-        if approach.impact_parameter > approach.bound:
-            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=BEYOND)
-        flight = self._fly(a, b, approach)
         if flight is None:
-            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=ENDS[MISS])
-        met = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume * flight.time
+            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=REPELLED)
+        self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flight.time)
+        self.bound += flight.end == BOUND
         own = _of_flight(flight) | {"others": met}
         if flight.end == FLIGHT_FAILED:
             raise BadInput(f"the flight of event {self.event - 1} failed: its state is not finite")
@@ -143,14 +168,6 @@ class Encounters:
         self.hits_seen, self.others = self.hits_seen + 1, self.others + met
         self.recent_others += (met - self.recent_others) / min(self.hits_seen, RECENT)
         return Encounter(**drawn, **own, **_hit(hit), end=ENDS[HIT])
-
-    def _fly(self, a: Body, b: Body, approach: Approach) -> FlightResult | None:
-        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
-        if start is None:
-            return None
-        flight = self.rigid_flights.thermal(a, b, *start, (self.seed, self.event - 1))
-        self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flight.time)
-        return flight
 
     def _replace(self, i: int, j: int, hit: Hit) -> None:
         """The bodies of a hit; all are copied when half of their number at the start is left."""

@@ -22,7 +22,7 @@ from ..io.damage import sealed
 from ..io.ledger_table import LedgerFile
 from ..io.table import GrowingTable, write_table
 from ..io.trajectory import Frames, TrajectoryWriter
-from .dilute_encounters import HIT_CHANGES, Encounter, Encounters
+from .dilute_encounters import HIT_CHANGES, REPELLED, Encounter, Encounters
 from .dilute_state import arrays_of, set_apart
 from .scattering.flights import ENDS
 
@@ -32,16 +32,16 @@ SHOWN_EVERY = 0.5
 """Wall time [s] between two lines of progress."""
 FRAMES_PER_DECADE = 10
 """Frames per decade of S."""
-END_CODES = {name: code for code, name in enumerate((*ENDS[:3], "beyond"))}
-"""Ends of encounters in encounters.csv: 0 hit, 1 miss, 2 bound, 3 beyond b̂."""
+END_CODES = {name: code for code, name in enumerate((*ENDS[:3], REPELLED))}
+"""Ends of encounters in encounters.csv: 0 hit, 1 miss, 2 bound, 3 repelled before a flight."""
 LEDGER_COLUMNS = (
     *("step", "time", "mean_cluster_size", "clusters", "largest_cluster", "grains", "volume", "number_ratio"),
-    *("flights", "hits", "others", "to_gas", "flight_error", "touch_energy", *HIT_CHANGES),
+    *("flights", "hits", "bound", "others", "to_gas", "flight_error", "touch_energy", *HIT_CHANGES),
 )
 """Columns of the ledger, a row after each hit: draws so far, time [s], S, bodies, grains of the largest and of all, V
-[m³], n/n₀, flights, hits, mean number of encounters with others during flights that hit; then sums over all hits [J]:
-kinetic energy that bodies leave to the gas, error of flights, energy at the touch, and changes in contact phases by
-channel."""
+[m³], n/n₀, flights, hits, flights without hit or escape, mean number of encounters with others during flights that
+hit; then sums over all hits [J]: kinetic energy that bodies leave to the gas, error of flights, energy at the touch,
+and changes in contact phases by channel."""
 
 
 def ledger_row(now: Encounters, start: float, before: dict[str, Any], hit: Encounter | None) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def ledger_row(now: Encounters, start: float, before: dict[str, Any], hit: Encou
         "clusters": len(population.bodies), "largest_cluster": int(population.grains.max()),
         "grains": int(population.grains.sum()), "volume": population.volume,
         "number_ratio": len(population.bodies) / population.volume / start, "flights": now.flights,
-        "hits": now.hits_seen, "others": now.others / max(now.hits_seen, 1),
+        "hits": now.hits_seen, "bound": now.bound, "others": now.others / max(now.hits_seen, 1),
     }  # fmt: skip
     sums = {name: before.get(name, 0.0) for name in LEDGER_COLUMNS if name not in row}
     if hit is not None:
@@ -157,9 +157,10 @@ class PopulationFiles:
         self.saved = monotonic()
 
     def finish(self, now: Encounters, outcome: str) -> dict[str, Any]:
-        """The last frame and checkpoint, the table of aggregates, and the summary."""
+        """The last checkpoint and frame, the table of aggregates, and the summary."""
+        self.save(now)  # without the frame of this end, which a run with a later end does not have
         self.frame(now)
-        self.save(now)
+        self.trajectory.close()
         self.ledger.close()
         write_table(self.folder / files.AGGREGATES, aggregate_rows(self.folder / files.TRAJECTORY, now))
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
@@ -189,7 +190,7 @@ class HitsSeen:
             self.last, self.hits = monotonic(), row["hits"]
 
 
-WHOLE = ("step", "clusters", "largest_cluster", "grains", "flights", "hits")
+WHOLE = ("step", "clusters", "largest_cluster", "grains", "flights", "hits", "bound")
 """Columns of whole numbers."""
 POPULATION = "dilute population"
 """What its checkpoints are, in their metadata."""

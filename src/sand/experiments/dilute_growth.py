@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import checked
-from ..basics.errors import BadInput, shown
+from ..basics.errors import BadInput, shown, warn
 from ..basics.grains import Grains
 from ..basics.initial_pairs import StrainedContacts
 from ..basics.units import si
@@ -39,7 +39,7 @@ from .dilute_conditions import (
     check_population,
     field_of,
 )
-from .dilute_encounters import Encounters
+from .dilute_encounters import RECENT, Encounters
 from .dilute_files import LEDGER_COLUMNS, PopulationFiles, kept_population
 from .dilute_flight import RigidFlights
 from .dilute_hits import HitRule, Resolve, Stick
@@ -184,6 +184,11 @@ def grow(
         record.begin(now, start)
         outcome = _advance(now, record, settings, start, observers)
         record.finish(now, outcome)
+        if now.bound:
+            warn(
+                f"{now.bound} of {now.flights} flights ended with the bodies still together, though not in contact; "
+                "they count as misses (end = 2 in encounters.csv)"
+            )
         found = Grown(folder, outcome)
         _draw(found, settings)
     return found
@@ -213,7 +218,7 @@ def _advance(
             return "finished"
         if now.time >= settings.until:
             return "finished"
-        if now.recent_others > MOST_OTHERS:
+        if now.hits_seen >= RECENT and now.recent_others > MOST_OTHERS:
             return NOT_BINARY
         encounter = now.step()
         record.add(now, encounter, start)

@@ -1,14 +1,25 @@
 """Upper bound of the rate of encounters of two bodies, from which hits are drawn by exact thinning.
 
-No impact parameter above b̂(v) = max(e, β v^(−2/3)) leads to a hit, with the sum e of the extents of both bodies and
+Encounters are drawn up to the impact parameter b̂(v),
 
-    β² = 3 (2k Σ|μ| Σ|μ′|/m̄)^(2/3),
+    b̂² = β² v^(−4/3) + e² + 2 (Q/m̄v²) (e + r_c),   β² = 3 (α/m̄)^(2/3),   r_c = (α/m̄v²)^(1/3),
+    α = 2k Σ|μ| Σ|μ′|,   Q = Σ|q| Σ|q′|/4πε₀,
 
-the largest b of capture (Eqs. 12, 13 of Dominik & Nübold 2002) for the sum of all |μ|: the net moment misses the hits
-of bodies whose moments cancel.  With charges b̂² is larger by 2Qe/m̄v², Q = Σ|q| Σ|q′|/4πε₀, the focusing of paths
-that touch.  Speeds have Maxwell's distribution with s² = k_BT/m̄, so that the rate of encounters in a volume V is K̂/V,
+with the sum e of the extents of both bodies.  All moments and charges at the centres, aligned, have the potential
+−Q/r − α/r³; sums of |μ| and |q|, as bodies whose net moments vanish attract each other, too.  A path that leads to a
+touch passes all r ≥ e, and its angular momentum m̄bv lets it pass r only if
 
-    K̂ = π ⟨b̂² v⟩ ≤ π [β² ⟨v^(−1/3)⟩ + e² ⟨v⟩ + 2eQ/m̄ ⟨v^(−1)⟩],  ⟨v^p⟩ = s^p 2^(p/2) Γ((3+p)/2)/Γ(3/2)
+    b² ≤ f(r) = r² + 2Qr/m̄v² + 2 r_c³/r.
+
+So each f(r) with r ≥ e bounds b².  Take the larger one of e and r_c: f(r_c) = 3 r_c² + 2Q r_c/m̄v² with 3 r_c² =
+β² v^(−4/3), the capture of Eqs. 12, 13 of Dominik & Nübold 2002; and f(e) = e² + 2Qe/m̄v² + 2 r_c³/e, of which the last
+term is below 2 r_c² if e > r_c.  Both are at most b̂².  Grains that are nearer than the centres of their bodies and
+energy of rotation that becomes one of motion are not in this estimate: flights with a wider bound show that b̂ holds.
+
+Speeds have Maxwell's distribution with s² = k_BT/m̄, so that the rate of encounters in a volume V is K̂/V,
+
+    K̂ = π ⟨b̂² v⟩ = π [β² ⟨v^(−1/3)⟩ + e² ⟨v⟩ + 2eQ/m̄ ⟨v^(−1)⟩ + 2 (Q/m̄) (α/m̄)^(1/3) ⟨v^(−5/3)⟩],
+    ⟨v^p⟩ = s^p 2^(p/2) Γ((3+p)/2)/Γ(3/2)
 """
 
 from __future__ import annotations
@@ -22,8 +33,10 @@ from scipy.special import gammaincinv
 from ..basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from .scattering.rigid_flight import contact_energy
 
-POWERS = (-1.0 / 3.0, 1.0, -1.0)
-"""p of the three parts of K̂."""
+POWERS = (-1.0 / 3.0, 1.0, -1.0, -5.0 / 3.0)
+"""p of the parts of K̂, ⟨v^p⟩; those of b̂² have v^(p − 1)."""
+MEANS = tuple(2.0 ** (0.5 * p) * math.gamma(0.5 * (3.0 + p)) / math.gamma(1.5) for p in POWERS)
+"""⟨v^p⟩/s^p of Maxwell's distribution."""
 
 
 class Sizes(NamedTuple):
@@ -40,7 +53,7 @@ class Approach(NamedTuple):
 
     speed: float  # v [m/s]
     impact_parameter: float  # b [m]
-    bound: float  # b̂(v) [m]; no hit if b is larger
+    bound: float  # b̂(v) [m]
 
 
 def mean_power(power: float, spread: Any) -> Any:
@@ -62,43 +75,41 @@ class Majorant:
     def __init__(self, temperature: float, widening: float = 1.0):
         self.heat, self.widening = BOLTZMANN * temperature, widening
 
-    def squares(self, a: Sizes, b: Sizes) -> tuple[Any, Any, Any, Any]:
-        """m̄ [kg], and the factors of v^(−4/3), 1 and v^(−2) in the bound of b̂²."""
+    def squares(self, a: Sizes, b: Sizes) -> tuple[Any, ...]:
+        """m̄ [kg], and the factors of v^(p − 1) in b̂² for the powers `POWERS`."""
         reduced, extent, wide = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent, self.widening**2
-        far = 3.0 * np.cbrt(contact_energy(a.strength, b.strength, 1.0, MAGNETIC) / reduced) ** 2
-        focusing = 2.0 * extent * COULOMB * a.charge * b.charge / reduced
-        return reduced, wide * far, wide * extent**2, wide * focusing
-
-    def parts(self, a: Sizes, b: Sizes) -> tuple[Any, Any, Any]:
-        """Parts of K̂ [m³/s] for the powers `POWERS` of the speed."""
-        reduced, *factors = self.squares(a, b)
-        spread = np.sqrt(self.heat / reduced)
-        first, second, third = (
-            math.pi * factor * mean_power(power, spread) for factor, power in zip(factors, POWERS, strict=True)
-        )
-        return first, second, third
+        root = np.cbrt(contact_energy(a.strength, b.strength, 1.0, MAGNETIC) / reduced)
+        focusing = 2.0 * wide * COULOMB * a.charge * b.charge / reduced
+        return reduced, 3.0 * wide * root**2, wide * extent**2, focusing * extent, focusing * root
 
     def kernel(self, a: Sizes, b: Sizes) -> Any:
         """K̂ [m³/s]."""
-        return sum(self.parts(a, b))
+        return sum(self._parts(*self.squares(a, b)))
 
     def bound(self, a: Sizes, b: Sizes, speed: Any) -> Any:
         """b̂ [m] at a speed [m/s]."""
-        _, far, near, focusing = self.squares(a, b)
-        captured, grazing = far * speed ** (-4.0 / 3.0), near + focusing / speed**2
-        # charges and moments together attract from farther than either
-        return np.sqrt(np.where(focusing > 0.0, captured + grazing, np.maximum(captured, grazing)))
+        return np.sqrt(_square(self.squares(a, b)[1:], speed))
 
     def draw(self, a: Sizes, b: Sizes, uniforms: tuple[float, ...]) -> Approach:
         """Speed and impact parameter of an encounter, from three uniform deviates.
 
         One part of K̂ is drawn by its share; its speeds have x = v²/2s² of the gamma distribution of shape (3 + p)/2;
-        b² is uniform up to the bound.
+        b² is uniform in (0, b̂²).
         """
-        parts = np.cumsum(self.parts(a, b))
+        reduced, *factors = self.squares(a, b)
+        parts = np.cumsum(self._parts(reduced, *factors))
         part = min(int(np.searchsorted(parts, uniforms[0] * parts[-1])), len(POWERS) - 1)
-        reduced, far, near, focusing = (float(each) for each in self.squares(a, b))
         x = float(gammaincinv(0.5 * (3.0 + POWERS[part]), uniforms[1]))
         speed = math.sqrt(2.0 * self.heat / reduced * x)
-        square = uniforms[2] * (far * speed ** (-4.0 / 3.0) + near + focusing / speed**2)
-        return Approach(speed, math.sqrt(square), float(self.bound(a, b, speed)))
+        square = float(_square(factors, speed))
+        return Approach(speed, math.sqrt(uniforms[2] * square), math.sqrt(square))
+
+    def _parts(self, reduced: Any, *factors: Any) -> list[Any]:
+        """Parts of K̂ [m³/s] for the powers `POWERS` of the speed."""
+        spread = np.sqrt(self.heat / reduced)
+        return [math.pi * f * mean * spread**p for p, mean, f in zip(POWERS, MEANS, factors, strict=True)]
+
+
+def _square(factors: Any, speed: Any) -> Any:
+    """b̂² [m²] at a speed [m/s]."""
+    return sum(factor * speed ** (power - 1.0) for power, factor in zip(POWERS, factors, strict=True))

@@ -18,7 +18,9 @@ STORED = ("radius", "mass", "inertia", "charge", "position", "moment", "own", "m
 """Quantities of grains that a body has; all others are those of a body at rest."""
 SPACING = 1.5
 """Distance of aggregates in a frame, in diameters of the largest one."""
-SINGLE_NUMBERS = ("time", "event", "flights", "hits_seen", "others", "recent_others", "longest_flight", "numbers")
+SINGLE_NUMBERS = (
+    *("time", "event", "flights", "hits_seen", "bound", "others", "recent_others", "longest_flight", "numbers"),
+)
 """What `Encounters` counts."""
 
 

@@ -60,6 +60,8 @@ CHANGES = ("kinetic", "contacts", "distant", *LOSSES)
 """Changes of energies [J] over a contact phase: of motion, as rigid bodies; stored in contacts; of forces at a
 distance; and losses by channel. `lost_quieting` is the vibration that is left, which rigid bodies do not have. The sum
 is 0 but for errors of the integration."""
+SLOWEST = 1e-6
+"""Longest period [s] of a contact of which `LONGEST` is a multiple; it holds where nothing touches."""
 
 
 class ContactPhase:
@@ -107,14 +109,14 @@ class ContactPhase:
             if now != counts or vibration > AT_REST * limit:
                 since = state.time
             quiet = quiet + 1 if now == counts and vibration + strain < AT_REST * limit else 0
-            counts, period = now, min(period, longest)
+            counts, period = now, min(period, longest or math.inf)  # 0: nothing is in contact now
             wait = longest * max(PERIODS, len(state.grains) ** 2 / 10.0)
             if label.any():
                 if _smallest_gap(state.grains, label) > APART * smallest:
                     break
             elif quiet == 2 or state.time - since > wait:
                 break
-            if state.time > LONGEST * min(period, 1e-6):
+            if state.time > LONGEST * min(period, SLOWEST):
                 raise BadInput(
                     f"an encounter has not come to rest after {state.time:.3g} s; give sand.Contact a damping"
                 )

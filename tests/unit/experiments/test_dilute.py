@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import kstest
 
 import sand
-from sand.basics.constants import BOLTZMANN
+from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.basics.initial_pairs import StrainedContacts
 from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
 from sand.experiments.dilute_hits import Stick, moving_pair
@@ -17,6 +17,7 @@ from sand.experiments.dilute_population import Population, sizes_of
 from sand.experiments.dilute_start import orientation_in_field, start_in_field
 from sand.experiments.scattering.event_draws import event_uniforms
 from sand.experiments.scattering.groups import GROUP
+from sand.experiments.scattering.rigid_flight import GROUP_SIZE
 
 RADIUS, MOMENT, T = 1e-8, 6.6e-18, 100.0
 
@@ -53,7 +54,8 @@ def tree(count, seed=0):
 def test_groups_of_each_level_share_the_grains_and_their_moments(count):
     """Level l has ⌈n/4ˡ⌉ groups; Σμ and Σ|μ| are those of the body at each level, to rounding of n terms.
 
-    The last level is one group.  `reach` bounds the distance of each grain from the nearest centre of its level.
+    The last level is one group.  `reach` bounds the distance of each grain from the nearest centre of its level, as
+    Σ|μ| ≥ |Σμ|.
     """
     body = tree(count)
     grains, groups = body.grains, body.flying.groups
@@ -75,29 +77,85 @@ def test_neighbours_are_in_one_group():
     assert chain.flying.groups.reach == pytest.approx([0.0, 3.0 * RADIUS, 15.0 * RADIUS], rel=1e-3, abs=1e-20)
 
 
+def flux_density(x, moment, at):
+    """Flux density over μ₀/4π of dipoles (3, n) at a place [A/m²]."""
+    apart = at[:, None] - x
+    d = np.linalg.norm(apart, axis=0)
+    return (3.0 * apart * (apart * moment).sum(axis=0) / d**5 - moment / d**3).sum(axis=1)
+
+
+BODIES = [ANTIPARALLEL, DIMER, *(tree(count, count) for count in (4, 7, 16, 17, 70))]
+
+
+@pytest.mark.parametrize("body", BODIES, ids=len)
+def test_groups_err_by_a_share_of_what_they_do(body):
+    """The error of a level's flux density is bounded by its own dipoles, whether or not moments cancel.
+
+    The derivative of a dipole's field along a unit vector is at most 6 k|μ|/d⁴, that on the axis.  Grains at a from the
+    centre of their group, where the gap to the place is D, so change it by at most 6k Σ|μ| a/D⁴ ≤ 6k |Σμ| reach/D⁴, at
+    a gap of reach/0.25 by 1.5 k|Σμ|/D³.  D is the distance from the sphere about the body, or from all grains.
+    """
+    groups, rng = body.flying.groups, np.random.default_rng(2)
+    used = [level for level in range(1, len(groups.reach)) if groups.reach[level] < 1e3 * body.extent]
+    assert bool(used) == (body is not ANTIPARALLEL)
+    for level in used:
+        part, gap = slice(groups.first[level], groups.first[level + 1]), groups.reach[level] / GROUP_SIZE
+        for axis in rng.normal(size=(20, 3)):
+            at = (body.extent + gap) * axis / np.linalg.norm(axis)
+            exact = flux_density(body.grains.position, body.grains.moment, at)
+            error = flux_density(groups.point[:, part], groups.moment[:, part], at) - exact
+            net = np.linalg.norm(groups.moment[:, part], axis=0).sum()
+            assert np.linalg.norm(error) <= 6.0 * GROUP_SIZE * net / gap**3
+
+
 def maxwell(v, spread):
     """Density of the speeds of Maxwell's distribution."""
     return math.sqrt(2.0 / math.pi) * v * v / spread**3 * math.exp(-0.5 * (v / spread) ** 2)
 
 
-CHARGED = Sizes(3.3e-20, 0.0, 1e-8, 1.6e-19)
+CHARGED, BOTH = Sizes(3.3e-20, 0.0, 1e-8, 1.6e-19), Sizes(3.3e-20, MOMENT, 1e-8, 1.6e-19)
 
 
-@pytest.mark.parametrize("pair", [(GRAIN, GRAIN), (DIMER, tree(12)), (CHARGED, CHARGED)])
+@pytest.mark.parametrize("pair", [(GRAIN, GRAIN), (DIMER, tree(12)), (CHARGED, CHARGED), (BOTH, BOTH)])
 def test_the_bound_of_the_rate_is_the_mean_of_its_cross_section(pair):
-    """K̂ = ∫ π (β² v^(−4/3) + e² + 2eQ/m̄v²) v f(v) dv by quadrature, to its accuracy of 1e-8."""
+    """K̂ = ∫ π b̂² v f(v) dv by quadrature, to its accuracy of 1e-8; b̂² is written out as in the module."""
     a, b = (each if isinstance(each, Sizes) else sizes_of(each) for each in pair)
     majorant = Majorant(T)
-    reduced, far, near, focusing = majorant.squares(a, b)
+    reduced, extent = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent
+    alpha, product = 2.0 * MAGNETIC * a.strength * b.strength, COULOMB * a.charge * b.charge
     spread = math.sqrt(BOLTZMANN * T / reduced)
 
-    def integrand(x):
-        v = x * spread
-        square = far * v ** (-4.0 / 3.0) + near + focusing / v**2
-        return math.pi * square * v * maxwell(v, spread) * spread
+    def square(v):
+        near = (alpha / (reduced * v * v)) ** (1.0 / 3.0)
+        return 3.0 * near**2 + extent**2 + 2.0 * product / (reduced * v * v) * (extent + near)
 
-    expected = quad(integrand, 0.0, 12.0, epsabs=0.0, epsrel=1e-10, limit=200)[0]
+    def integrand(y):  # v = s y³, as ⟨v^(−5/3)⟩ has a steep start
+        v = spread * y**3
+        return math.pi * square(v) * v * maxwell(v, spread) * 3.0 * spread * y**2
+
+    expected = quad(integrand, 0.0, 12.0 ** (1.0 / 3.0), epsabs=0.0, epsrel=1e-10, limit=200)[0]
     assert majorant.kernel(a, b) == pytest.approx(expected, rel=1e-7, abs=0.0)
+    for v in (0.1 * spread, spread, 5.0 * spread):
+        assert majorant.bound(a, b, v) == pytest.approx(math.sqrt(square(v)), rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("charges", [0.0, 0.1, 1.0, 10.0])
+@pytest.mark.parametrize("moments", [0.0, 0.1, 1.0])
+def test_the_bound_is_above_all_paths_that_touch(charges, moments):
+    """Spheres that attract each other by −Q/r − α/r³ touch at r = e if b² ≤ min over r ≥ e of r² (1 + (Q/r + α/r³)/E).
+
+    b̂² is not below this minimum, found on a grid, E = ½m̄v², at any speed.  It is the minimum with charges alone; with
+    moments alone it is at most 1.466 of it, the largest (1 + 3x²)/(1 + 2x³), where x = r_c/e < 1 solves x³ + x = 1.
+    """
+    size = Sizes(3.3e-20, moments * MOMENT, 1e-8, charges * 1.6e-19)
+    reduced, extent = 0.5 * size.mass, 2.0 * size.extent
+    alpha, product = 2.0 * MAGNETIC * size.strength**2, COULOMB * size.charge**2
+    r = extent * np.geomspace(1.0, 1e4, 20_000)
+    for v in np.geomspace(0.01, 100.0, 30):
+        exact = (r**2 * (1.0 + (product / r + alpha / r**3) / (0.5 * reduced * v * v))).min()
+        ratio = float(Majorant(T).bound(size, size, v)) ** 2 / exact
+        assert ratio >= 1.0 - 1e-12
+        assert charges * moments > 0.0 or ratio <= (1.466 if moments else 1.0 + 1e-12)
 
 
 def test_the_bound_uses_all_moments_not_the_net_one():
@@ -108,18 +166,19 @@ def test_the_bound_uses_all_moments_not_the_net_one():
 
 
 def test_speeds_and_impact_parameters_are_those_of_the_bound():
-    """b²/(β² v^(−4/3) + e²) is uniform, and speeds have the density (…) v f(v); Kolmogorov's test, p > 1e-3."""
-    majorant, size = Majorant(T), sizes_of(GRAIN)
-    reduced, far, near, _ = majorant.squares(size, size)
-    drawn = [majorant.draw(size, size, event_uniforms(3, k)[:3]) for k in range(2000)]
+    """b²/b̂² is uniform in (0, 1), and speeds have the density b̂² v f(v); Kolmogorov's test, p > 1e-3.
+
+    With charges and moments, so that all four parts of K̂ are drawn.
+    """
+    majorant = Majorant(T)
+    drawn = [majorant.draw(BOTH, BOTH, event_uniforms(3, k)[:3]) for k in range(2000)]
     speed, b, bound = np.array(drawn).T
-    assert kstest(b**2 / (far * speed ** (-4.0 / 3.0) + near), "uniform").pvalue > 1e-3
-    spread, grid = math.sqrt(BOLTZMANN * T / reduced), np.linspace(1e-6, 12.0, 20_001)
-    parts = np.array([far * (grid * spread) ** (-1.0 / 3.0), near * grid * spread])
-    density = parts.sum(axis=0) * grid**2 * np.exp(-0.5 * grid**2)
-    total = np.cumsum(density)
+    assert bound == pytest.approx(majorant.bound(BOTH, BOTH, speed), rel=1e-12, abs=0.0)
+    assert kstest((b / bound) ** 2, "uniform").pvalue > 1e-3
+    spread, grid = math.sqrt(BOLTZMANN * T / (0.5 * BOTH.mass)), np.geomspace(1e-9, 12.0, 20_001)
+    density = majorant.bound(BOTH, BOTH, grid * spread) ** 2 * grid**3 * np.exp(-0.5 * grid**2)
+    total = np.cumsum(density * np.gradient(grid))
     assert kstest(np.interp(speed / spread, grid, total / total[-1]), "uniform").pvalue > 1e-3
-    assert bound == pytest.approx(np.maximum(np.sqrt(far) * speed ** (-2.0 / 3.0), math.sqrt(near)), rel=1e-12, abs=0.0)
 
 
 def test_random_numbers_are_functions_of_seed_and_event():

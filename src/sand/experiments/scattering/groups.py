@@ -14,7 +14,9 @@ def groups_of(x: np.ndarray, moment: np.ndarray) -> Groups:
     """Grains at x (n, 3) [m] with moments (n, 3) [A m²] in the frame of a body, and all levels of groups of them.
 
     A group of level l has up to 4ˡ neighbouring grains: the sum of their moments at the mean of their positions,
-    weighted by |μ|, about which the next term of equal dipoles vanishes.
+    weighted by |μ|, about which the next term of equal dipoles vanishes. Of other dipoles it is Σ|μ| a/d of the first
+    one, |Σμ|, with the radius a of the group in a distance d: so `reach` is the largest a Σ|μ|/|Σμ|, and a level with a
+    group whose moments cancel is not used at any distance.
     """
     strength = np.linalg.norm(moment, axis=1)
     weight = np.maximum(strength, 1e-6 * strength.max()) if strength.any() else np.ones(len(x))
@@ -31,7 +33,11 @@ def groups_of(x: np.ndarray, moment: np.ndarray) -> Groups:
         moments.append(total[:, 4:7])
         strengths.append(total[:, 7])
         first.append(first[-1] + len(begin))
-        reach.append(float(np.linalg.norm(x[order] - centre[group], axis=1).max()))
+        radius = np.maximum.reduceat(np.linalg.norm(x[order] - centre[group], axis=1), begin)
+        net, moving = np.linalg.norm(total[:, 4:7], axis=1), total[:, 7]
+        ratio = np.where(moving > 0.0, net / np.where(moving > 0.0, moving, 1.0), 1.0)
+        with np.errstate(divide="ignore"):
+            reach.append(float(np.where(radius > 0.0, radius / ratio, 0.0).max()))
     point = np.ascontiguousarray(np.concatenate(points).T)
     return Groups(
         point,

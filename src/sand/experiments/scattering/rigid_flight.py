@@ -3,7 +3,7 @@
 One step is kick, drift, kick of separation, relative velocity, orientations and angular momenta with the symplectic
 free rotor (`numerics.rotor`), so that spin costs no accuracy: bodies that turn a hundred times on their way need one
 sum over pairs of grains in about two radians.  At a distance a body is a few dipoles, sums of those of neighbouring
-grains.  Flights of `flight_driver`, of high order, are more accurate and ten times as expensive.
+grains, unless these cancel.  Flights of `flight_driver`, of high order, are more accurate and ten times as expensive.
 
 With the smallest gap g of two grains, D = g + 2 r_min, e = max(|x| + r) of both bodies, ω̂ = √(2 E_rot/I_min) ≥ |ω|,
 and W = Σ 2k|μ||μ′|/d³ + Σ|μ| B, a step is
@@ -48,7 +48,7 @@ LARGEST_TURN = 2.0
 TOUCH = 1e-3
 """Gap of a hit, in units of the smallest radius."""
 GROUP_SIZE = 0.25
-"""Largest radius of a group, in units of the gap of the bounding spheres."""
+"""Largest radius of a group times its Σ|μ|/|Σμ|, in units of the gap of the bounding spheres."""
 MOST_REVOLUTIONS = 100.0
 """Revolutions of the line of centres after which a pair is bound."""
 RESULTS = (
@@ -67,7 +67,7 @@ class Groups(NamedTuple):
     moment: np.ndarray  # (3, m) [A m²]
     strength: np.ndarray  # (m,) Σ|μ| [A m²]
     first: np.ndarray  # (levels + 1,) level l has the columns first[l] … first[l + 1] − 1
-    reach: np.ndarray  # (levels,) largest distance of a grain from the centre of its group [m]
+    reach: np.ndarray  # (levels,) largest radius of a group times its Σ|μ|/|Σμ| [m], ∞ if its moments cancel
 
 
 class Now(NamedTuple):
