@@ -43,6 +43,7 @@ CAPABILITIES = {
     "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 732,
     "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
     "filled again, populations as runs, charges, a field, kernel": 1962,
+    "bodies of dilute dust that keep momentum and spin between encounters": 242,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
