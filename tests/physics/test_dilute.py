@@ -331,7 +331,7 @@ def merged(a, b, state):
         mass=a.grains.mass + b.grains.mass, radius=np.cbrt(a.grains.radius**3 + b.grains.radius**3)
     )
     inertia = 0.4 * grains.mass * grains.radius**2
-    return Hit([(grains._replace(inertia=inertia), NO_CONTACTS)], 1, 0, 0, 0.0, 0, {})
+    return Hit([(grains._replace(inertia=inertia), NO_CONTACTS)], 1, 0, 0, 0.0, 0, {}, [(np.zeros(3), np.zeros(3))])
 
 
 @pytest.mark.validate

@@ -199,7 +199,7 @@ def test_moments_that_flip_within_a_flight_are_refused(tmp_path):
         ({"run__frame_every": "1 us"}, "frame_every"),
         ({"stepping__accuracy": 1e-6}, "stepping"),
         ({"method__kind": "boxes"}, "hits"),
-        ({"method__between": "own"}, "between"),
+        ({"method__between": "cold"}, "between"),
         ({"grains__spins": "none"}, "spins"),
     ],
 )

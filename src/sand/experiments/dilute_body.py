@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -19,6 +20,14 @@ from .scattering.two_aggregates import ANGULAR1, ANGULAR2, TURN1, TURN2
 NO_CONTACTS = StrainedContacts(np.zeros((0, 2), np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 VECTORS = ("position", "velocity", "spin", "moment", "body_moment")
 """Quantities of grains that turn with their body."""
+
+
+class Motion(NamedTuple):
+    """How a body moves between encounters."""
+
+    velocity: np.ndarray  # (3,) V of its centre of mass [m/s]
+    angular: np.ndarray  # (3,) L about it [J s]
+    own: np.ndarray  # (3,) L along the principal axes of the body when its last encounter ended
 
 
 @dataclass(frozen=True)
@@ -41,6 +50,8 @@ class Body:
         Number of draws when it formed; 0 for those of the start.
     copy : int
         0, or the number of the doubling in which it was copied.
+    motion : Motion or None
+        Its motion, if it keeps one between encounters.
     """
 
     grains: GrainArrays
@@ -52,6 +63,7 @@ class Body:
     number: int = 0
     born: int = 0
     copy: int = 0
+    motion: Motion | None = None
 
     def __len__(self) -> int:
         return self.grains.mass.size
@@ -60,6 +72,11 @@ class Body:
     def extent(self) -> float:
         """Outer radius e = max(|x| + r) about the centre of mass [m]."""
         return self.flying.extent
+
+    @property
+    def rotation(self) -> float:
+        """Energy of rotation ½ Σ L_k²/I_k [J]; 0 without a motion."""
+        return 0.0 if self.motion is None else float(0.5 * (self.motion.own**2 / self.flying.inertia).sum())
 
 
 def body_of(grains: GrainArrays, contacts: StrainedContacts, number: int = 0, born: int = 0) -> tuple[Body, np.ndarray]:
@@ -124,6 +141,15 @@ def part_of(grains: GrainArrays, contacts: StrainedContacts, own: np.ndarray) ->
     return GrainArrays(*(np.ascontiguousarray(array[..., own]) for array in grains)), chosen._replace(
         pair=number[chosen.pair]
     )
+
+
+def momenta_of(grains: GrainArrays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centre of mass [m], its velocity [m/s], and the angular momentum about it [J s] of grains, each (3,)."""
+    share = grains.mass / grains.mass.sum()
+    centre, velocity = grains.position @ share, grains.velocity @ share
+    arm, moving = grains.position - centre[:, None], grains.velocity - velocity[:, None]
+    spin = (grains.inertia * grains.spin).sum(axis=1)
+    return centre, velocity, (grains.mass * np.cross(arm, moving, axis=0)).sum(axis=1) + spin
 
 
 def closest_pair(a: int, grains: GrainArrays) -> tuple[int, int, float]:

@@ -20,7 +20,7 @@ from ..io import run_folder as files
 from ..simulation.condition import read_condition
 from .dilute_body import NO_CONTACTS
 from .dilute_conditions import FEWEST, check_forces, check_gas, check_moments
-from .dilute_growth import HITS, Grown, bodies_of, grow
+from .dilute_growth import BETWEEN, HITS, Grown, bodies_of, grow
 from .dilute_majorant import Majorant
 from .dilute_population import Population
 from .scattering.rigid_flight import contact_energy
@@ -46,8 +46,9 @@ class MethodSection(Section):
     kind: Annotated[str, Word("boxes", "encounters")] = "boxes"
     """`boxes`: N-body simulations of boxes; `encounters`: a Monte Carlo of encounters of two bodies in thin dust, whose
     cost does not depend on the density."""
-    between: Annotated[str, Word("thermal"), For("kind", "encounters")] = "thermal"
-    """What happens between encounters. `thermal`: the gas thermalises speed, spin and orientation of all bodies."""
+    between: Annotated[str, Word(*BETWEEN), For("kind", "encounters")] = "thermal"
+    """What happens between encounters. `thermal`: the gas thermalises speed, spin and orientation of all bodies; `own`:
+    bodies keep momentum and spin, as without a gas."""
     hits: Annotated[str, Word(*HITS), For("kind", "encounters")] = "resolve"
     """What becomes of two bodies that touch. `resolve`: contacts are computed until they are at rest; `stick`: the
     bodies join at the first touch."""
@@ -114,7 +115,7 @@ def check_dilute(content: dict[str, Any], name: str) -> DiluteCase:
 def _check_forces(case: Case, method: MethodSection, name: str) -> None:
     """Refuse forces that encounters do not have.  Raises BadInput."""
     with naming(f"{name}: forces"):
-        check_forces(case.forces.build(), method.hits)
+        check_forces(case.forces.build(), method.between, method.hits)
 
 
 def _table(content: dict[str, Any], name: str) -> dict[str, Any]:
@@ -144,11 +145,12 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
     checked = check_dilute(content, "case")
     checked.case.run.seed = seed
     start, temperature = start_of(checked.case), float(checked.case.grains.temperature)
-    _, _, gas = check_forces(checked.case.forces.build(), checked.method.hits)
+    method = checked.method
+    _, _, gas = check_forces(checked.case.forces.build(), method.between, method.hits)
     majorant, density = Majorant(temperature), checked.density
     bodies = bodies_of(start.grains, start.contacts or NO_CONTACTS)
     population = Population(bodies, len(bodies) / density, majorant)
-    check_gas(gas, start.grains, population)
+    check_gas(gas, start.grains, population, method.between)
     check_moments(start.grains, temperature, population)
     strongest = float(population.sizes.strength.max())
     capture = math.sqrt(3.0) * (contact_energy(strongest, strongest, 1.0, MAGNETIC) / majorant.heat) ** (1.0 / 3.0)
@@ -164,11 +166,12 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
     if capture > 0.0:
         text = f"{format_quantity(capture, 'm')} at {temperature:g} K; n b^3 = {density * capture**3:.2g}"
         rows.append(("thermal capture", text))
-    hits = "computed grain by grain until at rest" if checked.method.hits == "resolve" else "joined at the touch"
+    hits = "computed grain by grain until at rest" if method.hits == "resolve" else "joined at the touch"
     cost = expected_cost(checked, len(start.grains))
     if cost > 0.0:
         rows.append(("wall time", f"about {format_quantity(float(f'{cost:.2g}'), 's')} a population, a rough estimate"))
-    return [*rows, ("hits", hits)], numbers | {"cost": cost}
+    kept = "keep momentum and spin" if method.between == "own" else "are thermalised by the gas"
+    return [*rows, ("between", f"bodies {kept}"), ("hits", hits)], numbers | {"cost": cost}
 
 
 def run_population(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> str:
@@ -202,6 +205,7 @@ def population_of(content: dict[str, Any], seed: int, folder: str | Path, observ
         stop=run.stop,
         until=run.until,
         seed=seed,
+        between=checked.method.between,
         hits=checked.method.hits,
         contacts=start.contacts,
         observers=observers,

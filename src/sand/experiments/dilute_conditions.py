@@ -37,10 +37,12 @@ PROBE_SEED = 2**63
 BALLISTIC = 10.0
 """Least stopping length of a body in the gas, in units of the largest b at which it is captured."""
 THERMALISED = 3.0
-"""Least time between two encounters of a body, in stopping times."""
+"""Least time between two encounters of a body, in stopping times, if the gas thermalises it."""
+KEPT = 1.0 / 3.0
+"""Largest time between two encounters of a body, in stopping times, if it keeps momentum and spin."""
 
 
-def check_forces(forces: Sequence[Any], hits: str) -> tuple[Contact, list[Force], Gas | None]:
+def check_forces(forces: Sequence[Any], between: str, hits: str) -> tuple[Contact, list[Force], Gas | None]:
     """The contact model, the forces of contact phases, and the gas.
 
     Raises
@@ -58,6 +60,11 @@ def check_forces(forces: Sequence[Any], hits: str) -> tuple[Contact, list[Force]
         elif isinstance(force, Contact):
             contact = force
             own.append(force)
+        elif force.name == "field" and between == "own":
+            problems.append(
+                "field: bodies that keep their spins (between = 'own') would precess in it between encounters, which "
+                "this method does not know; leave it out, or give between = 'thermal'"
+            )
         elif force.name == "field" and field_of([force]) is not None:
             own.append(force)
         elif force.name in ("dipoles", "charges"):
@@ -128,10 +135,11 @@ def check_population(population: Population, rigid_flights: RigidFlights, densit
         )
 
 
-def check_gas(gas: Gas | None, grains: Grains, population: Population) -> None:
-    """Refuse a gas of another temperature, that acts within encounters, or does not thermalise bodies between them.
+def check_gas(gas: Gas | None, grains: Grains, population: Population, between: str) -> None:
+    """Refuse a gas that acts within encounters, does not do what `between` says, or is not as warm as thermal bodies.
 
-    Stopping times are those of grains: of the body whose flights feel the gas most, and of the slowest grain.
+    Stopping times are those of grains: of the body whose flights feel the gas most, and of the slowest grain if the gas
+    thermalises bodies, or the fastest one if it must not.
 
     Raises BadInput.
     """
@@ -139,7 +147,7 @@ def check_gas(gas: Gas | None, grains: Grains, population: Population) -> None:
         return
     majorant, size, problems = population.majorant, population.sizes, []
     temperature = majorant.heat / BOLTZMANN
-    if not math.isclose(gas.temperature, temperature, rel_tol=1e-9):
+    if between == "thermal" and not math.isclose(gas.temperature, temperature, rel_tol=1e-9):
         problems.append(
             f"gas: its temperature is {gas.temperature:g} K, and that of the bodies {temperature:g} K; thermal bodies "
             "have that of the gas: give one temperature"
@@ -149,19 +157,26 @@ def check_gas(gas: Gas | None, grains: Grains, population: Population) -> None:
     reaches = majorant.bound(size, size, speed) + 2.0 * size.extent
     worst = int(np.argmin(lengths / reaches))
     length, reach = float(lengths[worst]), float(reaches[worst])
-    time = float(_stopping_times(grains.arrays, gas).max())
-    between = len(population.bodies) / (2.0 * population.rate)
+    times = _stopping_times(grains.arrays, gas)
+    time = float(times.max() if between == "thermal" else times.min())
+    free = len(population.bodies) / (2.0 * population.rate)
     if length < BALLISTIC * reach:
         problems.append(
             f"gas: the stopping length of grains, {format_quantity(length, 'm')}, is less than {BALLISTIC:g} times "
             f"{format_quantity(reach, 'm')}, the distance of an encounter: flights would feel the gas; grow boxes "
             "(kind = 'boxes'), or give a thinner gas"
         )
-    if between < THERMALISED * time:
+    both = f"gas: bodies meet after {format_quantity(free, 's')}, and the gas thermalises them in "
+    both += f"{format_quantity(time, 's')}; "
+    if between == "thermal" and free < THERMALISED * time:
         problems.append(
-            f"gas: bodies meet after {format_quantity(between, 's')}, and the gas thermalises them in "
-            f"{format_quantity(time, 's')}; between = 'thermal' needs {THERMALISED:g} times as long: give a lower "
-            "number_density, or grow boxes (kind = 'boxes')"
+            f"{both}between = 'thermal' needs {THERMALISED:g} times as long: give a lower number_density, or grow "
+            "boxes (kind = 'boxes')"
+        )
+    if between == "own" and free > KEPT * time:
+        problems.append(
+            f"{both}between = 'own' needs at most {KEPT:.2g} of that: give a thinner gas or a higher number_density, "
+            "between = 'thermal', or grow boxes (kind = 'boxes')"
         )
     if problems:
         raise BadInput(problems)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..basics.errors import BadInput
 from ..simulation.contact_phase import CHANGES
-from .dilute_body import Body, body_of
+from .dilute_body import Body, Motion, body_of
 from .dilute_flight import FlightResult, RigidFlights, kepler_start, start_distance
 from .dilute_hits import Hit, HitRule
 from .dilute_majorant import Approach
+from .dilute_own import OWN_START, centre_velocity, own_start, parted, repelled, turned_copy
 from .dilute_population import Population, sizes_of
 from .scattering.event_draws import event_uniforms
 from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
@@ -94,16 +97,29 @@ def draw_flight(
     i, j, kernel = population.draw(*uniforms[1:3])
     a, b = population.bodies[i], population.bodies[j]
     approach = population.majorant.draw(sizes_of(a), sizes_of(b), uniforms[3:6])
-    start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
-    if start is None:
+    flight = _fly(a, b, approach, rigid_flights, event)
+    if flight is None:
         return Drawn(i, j, kernel, approach, None, 0.0)
-    flight = rigid_flights.thermal(a, b, *start, event)
     rate = float(population.sums[i] + population.sums[j] - 2.0 * kernel) / population.volume
     return Drawn(i, j, kernel, approach, flight, rate * flight.time)
 
 
+def _fly(
+    a: Body, b: Body, approach: Approach, rigid_flights: RigidFlights, event: tuple[int, int]
+) -> FlightResult | None:
+    """The flight of two bodies, thermal or with their own motion; None if charges repel them before its start."""
+    if a.motion is None:
+        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+        return start and rigid_flights.thermal(a, b, *start, event)
+    state = own_start(a, b, approach, start_distance(a, b, approach.bound, OWN_START), event)
+    if state is None:
+        return None
+    # until they are as far from each other again: their motion afterwards is kept
+    return rigid_flights.onward(a, b, state, float(np.linalg.norm(state[:3])))
+
+
 class Encounters:
-    """Growth of a population whose gas thermalises all bodies between two encounters.
+    """Growth of a population; bodies are thermal at each encounter, or keep their motion if they have one.
 
     Parameters
     ----------
@@ -153,6 +169,8 @@ class Encounters:
         drawn = _drawn(self.event, self.time, a, b) | approach._asdict() | {"kernel": kernel}
         self.event += 1
         if flight is None:
+            if a.motion is not None:
+                population.replace(i, j, repelled(a, b, approach, (self.seed, self.event - 1)))
             return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=REPELLED)
         self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flight.time)
         self.bound += flight.end == BOUND
@@ -160,9 +178,13 @@ class Encounters:
         if flight.end == FLIGHT_FAILED:
             raise BadInput(f"the flight of event {self.event - 1} failed: its state is not finite")
         if flight.end != HIT:
+            if flight.end == MISS and a.motion is not None:
+                population.replace(i, j, parted(a, b, flight.state))
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[flight.end])
         hit = self.rule(a, b, flight.state)
         if hit.is_miss:
+            if a.motion is not None and len(hit.pieces) == 2:
+                population.replace(i, j, pieces_of(a, b, hit, [(each.number, each.born, each.copy) for each in (a, b)]))
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[MISS])
         self._replace(i, j, hit)
         self.hits_seen, self.others = self.hits_seen + 1, self.others + met
@@ -171,13 +193,27 @@ class Encounters:
 
     def _replace(self, i: int, j: int, hit: Hit) -> None:
         """The bodies of a hit; all are copied when half of their number at the start is left."""
-        new = []
-        for grains, contacts in hit.pieces:
-            new.append(body_of(grains, contacts, self.numbers, self.event)[0])
-            self.numbers += 1
-        self.population.replace(i, j, new)
-        if 2 * len(self.population.bodies) <= self.population.start:
-            self.population.double()
+        population, numbers = self.population, range(self.numbers, self.numbers + len(hit.pieces))
+        a, b = population.bodies[i], population.bodies[j]
+        population.replace(i, j, pieces_of(a, b, hit, [(number, self.event, 0) for number in numbers]))
+        self.numbers += len(hit.pieces)
+        if 2 * len(population.bodies) <= population.start:
+            turn = None if a.motion is None else lambda body, place: turned_copy(body, self.seed, place)
+            population.double(turn)
+
+
+def pieces_of(a: Body, b: Body, hit: Hit, identities: Sequence[tuple[int, int, int]]) -> list[Body]:
+    """The bodies of a hit of a and b, with (number, born, copy) of each; they move if a and b did.
+
+    Each has the momentum and the angular momentum of its grains; of two bodies that join it is that of both.
+    """
+    found = []
+    for (grains, contacts), (velocity, angular), identity in zip(hit.pieces, hit.motions, identities, strict=True):
+        (body, axes), (number, born, copy), motion = body_of(grains, contacts), identity, None
+        if a.motion is not None:
+            motion = Motion(centre_velocity(a, b) + velocity, angular, axes.T @ angular)
+        found.append(dataclasses.replace(body, number=number, born=born, copy=copy, motion=motion))
+    return found
 
 
 def net_moment(body: Body) -> float:

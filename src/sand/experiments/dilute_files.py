@@ -42,6 +42,14 @@ LEDGER_COLUMNS = (
 [m³], n/n₀, flights, hits, flights without hit or escape, mean number of encounters with others during flights that
 hit; then sums over all hits [J]: kinetic energy that bodies leave to the gas, error of flights, energy at the touch,
 and changes in contact phases by channel."""
+OWN_COLUMNS = ("translation", "rotation")
+"""Columns of a population whose bodies keep their motion, instead of `to_gas`: mean energies of motion and of rotation
+of a body [k_BT], 3/2 each in equilibrium."""
+
+
+def ledger_columns(own: bool) -> tuple[str, ...]:
+    """Columns of the ledger of a population; `own` of one whose bodies keep their motion."""
+    return (*(name for name in LEDGER_COLUMNS if name != "to_gas"), *OWN_COLUMNS) if own else LEDGER_COLUMNS
 
 
 def ledger_row(now: Encounters, start: float, before: dict[str, Any], hit: Encounter | None) -> dict[str, Any]:
@@ -54,6 +62,7 @@ def ledger_row(now: Encounters, start: float, before: dict[str, Any], hit: Encou
         "number_ratio": len(population.bodies) / population.volume / start, "flights": now.flights,
         "hits": now.hits_seen, "bound": now.bound, "others": now.others / max(now.hits_seen, 1),
     }  # fmt: skip
+    row |= dict(zip(OWN_COLUMNS, population.temperatures, strict=True))
     sums = {name: before.get(name, 0.0) for name in LEDGER_COLUMNS if name not in row}
     if hit is not None:
         kinetic = hit.touch_kinetic + hit.touch_rotation
@@ -89,17 +98,21 @@ class PopulationFiles:
         Grains whose materials and own quantities all grains have.
     kept : tuple or None, optional
         Arrays and metadata of the checkpoint from which it continues.
+    own : bool, optional
+        Whether bodies keep their motion.
     """
 
-    def __init__(self, folder: Path, case: dict[str, Any], kind: Grains, kept: tuple[dict, dict] | None = None):
-        self.folder, self.case, self.kind = folder, case, kind
+    def __init__(
+        self, folder: Path, case: dict[str, Any], kind: Grains, kept: tuple[dict, dict] | None = None, own: bool = False
+    ):
+        self.folder, self.case, self.kind, self.columns = folder, case, kind, ledger_columns(own)
         arrays, meta = kept or ({}, {})
-        rows = [dict(zip(LEDGER_COLUMNS, row, strict=True)) for row in arrays.get("ledger", np.zeros((0, 0))).tolist()]
+        rows = [dict(zip(self.columns, row, strict=True)) for row in arrays.get("ledger", np.zeros((0, 0))).tolist()]
         self.rows = [row | {name: int(row[name]) for name in WHOLE} for row in rows]
         self.frame_times: list[float] = arrays.get("frame_times", np.zeros(0)).tolist()
         resumed, drawn = kept is not None, meta.get("event")
         files.write_toml(folder / files.CASE, case, "settings of a population of dilute dust, read by sand resume")
-        self.ledger = LedgerFile(folder / files.LEDGER, LEDGER_COLUMNS, self.rows)
+        self.ledger = LedgerFile(folder / files.LEDGER, self.columns, self.rows)
         self.table = GrowingTable(folder / files.ENCOUNTERS, ENCOUNTER_COLUMNS, resume=resumed, most=drawn)
         last = self.frame_times[-1] if self.frame_times else -math.inf
         self.trajectory = TrajectoryWriter(folder / files.TRAJECTORY, last if resumed else None, self.frame_times)
@@ -115,6 +128,7 @@ class PopulationFiles:
 
     def add_row(self, row: dict[str, Any]) -> None:
         """A row of the ledger."""
+        row = {name: row[name] for name in self.columns}
         self.rows.append(row)
         self.ledger.append(row)
 
@@ -151,7 +165,7 @@ class PopulationFiles:
         self.waiting = []
         self.trajectory.close()
         arrays, meta = arrays_of(now)
-        arrays |= {"ledger": np.array([[row[name] for name in LEDGER_COLUMNS] for row in self.rows])}
+        arrays |= {"ledger": np.array([[row[name] for name in self.columns] for row in self.rows])}
         arrays |= {"frame_times": np.array(self.frame_times)}
         write_checkpoint(self.folder, arrays, {"steps": now.event, "case": self.case, "kind": POPULATION, **meta})
         self.saved = monotonic()

@@ -153,7 +153,7 @@ def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: floa
     return near, offset, math.sqrt(radius**2 - offset**2)
 
 
-def start_distance(a: Body, b: Body, bound: float) -> float:
+def start_distance(a: Body, b: Body, bound: float, start: float = START) -> float:
     """Distance [m] of the plane on which a flight starts: 2 b̂, but at least that at which the bodies are clear."""
     widest = max(float(a.grains.radius.max()), float(b.grains.radius.max()))
-    return max(START * bound, a.extent + b.extent + 4.0 * widest)
+    return max(start * bound, a.extent + b.extent + 4.0 * widest)

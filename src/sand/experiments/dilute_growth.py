@@ -40,14 +40,17 @@ from .dilute_conditions import (
     field_of,
 )
 from .dilute_encounters import RECENT, Encounters
-from .dilute_files import LEDGER_COLUMNS, PopulationFiles, kept_population
+from .dilute_files import PopulationFiles, kept_population, ledger_columns
 from .dilute_flight import RigidFlights
 from .dilute_hits import HitRule, Resolve, Stick
 from .dilute_kernel import Kernel, kernel_of
 from .dilute_majorant import Majorant
+from .dilute_own import OwnMajorant, thermal_body
 from .dilute_population import Population
 from .dilute_state import SINGLE_NUMBERS, population_from
 
+BETWEEN = ("thermal", "own")
+"""What happens between encounters: the gas thermalises all bodies, or they keep momentum and spin."""
 HITS = ("resolve", "stick")
 """What becomes of two bodies that touch: contacts are computed until at rest, or they join as they are."""
 NOT_BINARY = "not binary"
@@ -71,7 +74,7 @@ class Grown:
 
     @cached_property
     def ledger(self) -> Any:
-        """Columns of the ledger by name (K,), see `dilute_files.LEDGER_COLUMNS`."""
+        """Columns of the ledger by name (K,), see `dilute_files.ledger_columns`."""
         return Run(self.folder).ledger
 
     @cached_property
@@ -105,7 +108,7 @@ class Settings(NamedTuple):
     temperature: float  # [K]
     condition: Condition | None
     until: float  # [s]
-    hits: str
+    method: tuple[str, str]  # of `BETWEEN` and `HITS`
     seed: int
 
 
@@ -120,19 +123,20 @@ def grow(
     stop: str | None = None,
     until: Any = None,
     seed: int = 0,
+    between: str = "thermal",
     hits: str = "resolve",
     contacts: StrainedContacts | None = None,
     overwrite: bool = False,
     observers: Sequence[Any] = (),
     case: dict[str, Any] | None = None,
 ) -> Grown:
-    """Grow a population of thermal bodies to its end; called again, it continues an interrupted one with equal bits.
+    """Grow a population of bodies to its end; called again, it continues an interrupted one with equal bits.
 
     Bodies, the clusters of the grains, are in a volume at a number density; between two encounters speeds, spins and
-    orientations are those of thermal equilibrium.  Pairs of bodies are drawn in
-    proportion to an upper bound of their collision rate, and fly from far away as rigid bodies; if they touch, their
-    collision is computed grain by grain until the grains are at rest.  When half of the bodies are left, all are
-    copied, and the volume is doubled.
+    orientations are those of thermal equilibrium, or momenta and spins those after the last encounter.  Pairs of bodies
+    are drawn in proportion to an upper bound of their collision rate, and fly from far away as rigid bodies; if they
+    touch, their collision is computed grain by grain until the grains are at rest.  When half of the bodies are left,
+    all are copied, and the volume is doubled.
 
     Parameters
     ----------
@@ -152,6 +156,9 @@ def grow(
         End [s]; this or `stop` is required.
     seed : int, optional
         Seed of all random numbers, 0 ≤ seed < 2⁶³.
+    between : str, optional
+        "thermal": a gas thermalises all bodies between two encounters; "own": they keep momentum and spin, as without
+        a gas, and have those of thermal equilibrium at the start.
     hits : str, optional
         "resolve": contacts are computed until at rest; "stick": bodies join at the first touch.
     contacts : StrainedContacts or None, optional
@@ -169,7 +176,7 @@ def grow(
         If an argument is wrong, the dust is too dense, or the gas acts within encounters; if the folder holds something
         else; or if a contact phase fails.
     """
-    settings = _checked(grains, forces, number_density, temperature, (stop, until), hits, seed, contacts)
+    settings = _checked(grains, forces, number_density, temperature, (stop, until), (between, hits), seed, contacts)
     described = case or _describe(settings, number_density, temperature, stop, until)
     folder = Path(out)
     kept = kept_population(folder) if folder.is_dir() and not overwrite else None
@@ -180,7 +187,7 @@ def grow(
         files.make_folder(folder, overwrite=overwrite)
     with writing(folder):
         now, start = begun if kept is None else _begin(settings, kept)
-        record = PopulationFiles(folder, files.plain(described), settings.grains, kept)
+        record = PopulationFiles(folder, files.plain(described), settings.grains, kept, settings.method[0] == "own")
         record.begin(now, start)
         outcome = _advance(now, record, settings, start, observers)
         record.finish(now, outcome)
@@ -229,12 +236,13 @@ def _advance(
 
 def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]] | None) -> tuple[Encounters, float]:
     """The encounters at the start, or as they were at a checkpoint; and n₀ [1/m³]."""
-    majorant = Majorant(settings.temperature)
-    contact, forces, gas = check_forces(settings.forces, settings.hits)
+    between, hits = settings.method
+    majorant = (OwnMajorant if between == "own" else Majorant)(settings.temperature)
+    contact, forces, gas = check_forces(settings.forces, *settings.method)
     rigid_flights = RigidFlights(majorant.heat, field=field_of(forces) or (0.0, 0.0, 0.0))
     check_charges(settings.forces, settings.grains)
     rule: HitRule = Stick(contact, settings.grains.materials)
-    if settings.hits == "resolve":
+    if hits == "resolve":
         rule = Resolve(ContactPhase(settings.grains, forces), rigid_flights)
     if kept is not None:
         arrays, meta = kept
@@ -243,10 +251,14 @@ def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]
             setattr(now, name, meta[name])
         return now, settings.density
     bodies = bodies_of(settings.grains, settings.contacts)
-    population = Population(bodies, len(bodies) / settings.density, majorant)
+    # bodies that keep their motion begin with that of equilibrium: conditions at the start are those of thermal ones
+    population = Population(bodies, len(bodies) / settings.density, Majorant(settings.temperature))
     check_moments(settings.grains, settings.temperature, population)
-    check_gas(gas, settings.grains, population)
+    check_gas(gas, settings.grains, population, between)
     check_population(population, rigid_flights, settings.density)
+    if between == "own":
+        bodies = [thermal_body(body, majorant.heat, settings.seed, k) for k, body in enumerate(bodies)]
+        population = Population(bodies, population.volume, majorant)
     return Encounters(population, rigid_flights, rule, settings.seed), settings.density
 
 
@@ -267,11 +279,17 @@ def _checked(
     density: Any,
     temperature: Any,
     ends: tuple[Any, Any],
-    hits: str,
+    method: tuple[str, str],
     seed: int,
     contacts: StrainedContacts | None,
 ) -> Settings:
     """Arguments of `grow`.  Raises BadInput."""
+    between, hits = method
+    if between not in BETWEEN:
+        raise BadInput(
+            f"between = {shown(between)} must be 'thermal' (a gas thermalises all bodies between encounters) or 'own' "
+            "(they keep momentum and spin)"
+        )
     if hits not in HITS:
         raise BadInput(
             f"hits = {shown(hits)} must be 'resolve' (contacts until at rest) or 'stick' (joined at the touch)"
@@ -281,7 +299,7 @@ def _checked(
         raise BadInput("stop is missing; give one, such as stop='mean_cluster_size >= 30', or until='10 d'")
     condition = None if stop is None else read_condition(stop)
     if condition is not None:
-        condition.check(LEDGER_COLUMNS)
+        condition.check(ledger_columns(between == "own"))
     return Settings(
         grains,
         contacts or NO_CONTACTS,
@@ -290,7 +308,7 @@ def _checked(
         si(temperature, "K", "temperature", above=0.0),
         condition,
         math.inf if until is None else si(until, "s", "until", above=0.0),
-        hits,
+        method,
         seed,
     )
 
@@ -301,7 +319,7 @@ def _describe(settings: Settings, density: Any, temperature: Any, stop: Any, unt
     run = {"stop": stop, "until": until and si(until, "s", "until"), "seed": settings.seed}
     return {
         "run": {name: value for name, value in run.items() if value is not None},
-        "method": {"kind": "encounters", "between": "thermal", "hits": settings.hits},
+        "method": {"kind": "encounters", "between": settings.method[0], "hits": settings.method[1]},
         "grains": {
             "kind": "given",
             "number": len(grains),

@@ -13,7 +13,7 @@ from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import Material
 from ..contact.model import Contact
 from ..simulation.contact_phase import CHANGES, ContactPhase
-from .dilute_body import Body, body_of, closest_pair, in_space, part_of
+from .dilute_body import Body, body_of, closest_pair, in_space, momenta_of, part_of
 from .dilute_flight import RigidFlights
 from .scattering.flight_driver import HIT
 
@@ -31,6 +31,7 @@ class Hit(NamedTuple):
     time: float  # of contact phases, and of flights between them [s]
     steps: int  # contact steps
     energies: dict[str, float]  # changes [J] by channel: `simulation.contact_phase.CHANGES`
+    motions: list[tuple[np.ndarray, np.ndarray]]  # of the pieces: velocity in the frame of the pair, and L
 
     @property
     def is_miss(self) -> bool:
@@ -70,7 +71,8 @@ class Stick:
         none = np.zeros((1, 3))
         more = StrainedContacts(np.array([[i, j]]), none, none, np.zeros(1))
         joined = StrainedContacts(*(np.concatenate(both) for both in zip(contacts, more, strict=True)))
-        return Hit([(grains._replace(position=position), joined)], 1, 0, 0, 0.0, 0, {})
+        # the shift changes no momentum: L is that of the touch
+        return Hit([(grains._replace(position=position), joined)], 1, 0, 0, 0.0, 0, {}, [momenta_of(grains)[1:]])
 
 
 class Resolve:
@@ -108,11 +110,15 @@ class Resolve:
             time += flight.time
             energies["kinetic"] += flight.energy - flight.potential - (flight.energy_start - flight.potential_start)
             energies["distant"] += flight.potential - flight.potential_start
-            if flight.end != HIT:
-                break
             grains, contacts = in_space(one, two, flight.state)
+            if flight.end != HIT:
+                count = len(one)
+                own = np.arange(count), np.arange(count, grains.mass.size)
+                pieces = [part_of(grains, contacts, part) for part in own]
+                break
         made, slipped, broken = counts.tolist()
-        return Hit(pieces, made, slipped, broken, time, steps, energies)
+        motions = [momenta_of(part)[1:] for part, _ in pieces]
+        return Hit(pieces, made, slipped, broken, time, steps, energies, motions)
 
 
 def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple[Body, Body, np.ndarray]:
@@ -120,15 +126,12 @@ def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple
     bodies, centres, velocities, turns, momenta = [], [], [], [], []
     for grains, contacts in pieces:
         body, axes = body_of(grains, contacts)
-        share = grains.mass / body.mass
-        centre, velocity = grains.position @ share, grains.velocity @ share
-        arm, moving = grains.position - centre[:, None], grains.velocity - velocity[:, None]
-        spin = (grains.inertia * grains.spin).sum(axis=1)
+        centre, velocity, angular = momenta_of(grains)
         bodies.append(body)
         centres.append(centre)
         velocities.append(velocity)
         turns.append(Rotation.from_matrix(axes).as_quat())
-        momenta.append((grains.mass * np.cross(arm, moving, axis=0)).sum(axis=1) + spin)
+        momenta.append(angular)
     apart = centres[0] - centres[1], velocities[0] - velocities[1]
     return bodies[0], bodies[1], np.concatenate([*apart, *turns, *momenta])
 

@@ -40,12 +40,15 @@ MEANS = tuple(2.0 ** (0.5 * p) * math.gamma(0.5 * (3.0 + p)) / math.gamma(1.5) f
 
 
 class Sizes(NamedTuple):
-    """What the bound of a body needs, a number or (N,): m [kg], Σ|μ| [A m²], extent [m], Σ|q| [C]."""
+    """What the bound of a body needs, a number or (N,): m [kg], Σ|μ| [A m²], extent [m], Σ|q| [C], V [m/s]."""
 
     mass: Any
     strength: Any
     extent: Any
     charge: Any
+    vx: Any = 0.0  # of bodies that keep their motion
+    vy: Any = 0.0
+    vz: Any = 0.0
 
 
 class Approach(NamedTuple):

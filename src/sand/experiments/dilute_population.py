@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -43,7 +43,8 @@ class Population:
         self.start = start or len(self.bodies)
         self._table = np.array([sizes_of(body) for body in self.bodies]).T
         self._grains = np.array([len(body) for body in self.bodies], float)
-        self._sums = np.array([self.row(k).sum() for k in range(len(self.bodies))]) if sums is None else sums.copy()
+        self._rotation = np.array([body.rotation for body in self.bodies])
+        self._sums = self._new_sums() if sums is None else sums.copy()
 
     @property
     def sizes(self) -> Sizes:
@@ -64,6 +65,13 @@ class Population:
     def grains(self) -> np.ndarray:
         """Numbers of grains (N,)."""
         return self._grains[: len(self.bodies)]
+
+    @property
+    def temperatures(self) -> tuple[float, float]:
+        """Mean energies of motion ½mV² and of rotation of the bodies [k_BT]; 0 if they keep none."""
+        sizes, heat = self.sizes, self.majorant.heat
+        motion = 0.5 * sizes.mass * (sizes.vx**2 + sizes.vy**2 + sizes.vz**2)
+        return float(motion.mean()) / heat, float(self._rotation[: len(self.bodies)].mean()) / heat
 
     @property
     def mean_size(self) -> float:
@@ -96,7 +104,7 @@ class Population:
             self._sums[: len(self.bodies)] -= self.row(k)
             last = len(self.bodies) - 1  # the last one fills the gap
             self.bodies[k] = self.bodies[last]
-            for table in (self._table, self._grains, self._sums):
+            for table in (self._table, self._grains, self._rotation, self._sums):
                 table[..., k] = table[..., last]
             self.bodies.pop()
         for body in new:
@@ -105,24 +113,38 @@ class Population:
                 more = (0, SPARE_COLUMNS)
                 self._table = np.pad(self._table, ((0, 0), more))
                 self._grains, self._sums = np.pad(self._grains, more), np.pad(self._sums, more)
+                self._rotation = np.pad(self._rotation, more)
             row = self.kernel_with(sizes_of(body))
             self._sums[:count] += row
             self._sums[count], self._table[:, count], self._grains[count] = row.sum(), sizes_of(body), len(body)
+            self._rotation[count] = body.rotation
             self.bodies.append(body)
 
-    def double(self) -> None:
+    def double(self, turn: Callable[[Body, int], Body] | None = None) -> None:
         """Append a copy of each body, and double the volume (Liffman 1992): the number density stays.
 
-        Copies are correlated with their originals, of which `Body.copy` and `Body.number` tell.
+        Copies are correlated with their originals, of which `Body.copy` and `Body.number` tell.  `turn` gives a copy
+        another motion; its second argument is the place of the body.
         """
         own = np.asarray(self.majorant.kernel(self.sizes, self.sizes))  # of each body with its copy
-        self._sums = np.tile(2.0 * self.sums + own, 2)
+        sums = np.tile(2.0 * self.sums + own, 2)
         self._table, self._grains = np.tile(self._table[:, : len(own)], 2), np.tile(self.grains, 2)
+        self._rotation = np.tile(self._rotation[: len(own)], 2)
         self.doublings += 1
         self.bodies += [dataclasses.replace(body, copy=self.doublings) for body in self.bodies]
         self.volume *= 2.0
+        if turn is not None:
+            self.bodies[len(own) :] = [turn(body, k) for k, body in enumerate(self.bodies[len(own) :])]
+            self._table = np.array([sizes_of(body) for body in self.bodies]).T
+            sums = self._new_sums()
+        self._sums = sums
+
+    def _new_sums(self) -> np.ndarray:
+        """Σ_j K̂_ij of each body, anew."""
+        return np.array([self.row(k).sum() for k in range(len(self.bodies))])
 
 
 def sizes_of(body: Body) -> Sizes:
     """Sizes of one body."""
-    return Sizes(body.mass, body.strength, body.extent, body.charge)
+    velocity = () if body.motion is None else body.motion.velocity
+    return Sizes(body.mass, body.strength, body.extent, body.charge, *velocity)

@@ -40,8 +40,13 @@ def orientation_in_field(moment: np.ndarray, field: np.ndarray, heat: float, uni
     own = moment / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
     along = field / strength if strength > 0.0 else np.array([0.0, 0.0, 1.0])
     target = direction(cosine_in_field(size * strength / heat, uniforms[0]), uniforms[1], along)
-    about = Rotation.from_rotvec([0.0, 0.0, 2.0 * math.pi * uniforms[2]]).as_matrix()
-    return _frame(target) @ about @ _frame(own).T
+    return rotation_onto(own, target, uniforms[2])
+
+
+def rotation_onto(own: np.ndarray, target: np.ndarray, uniform: float) -> np.ndarray:
+    """Rotation (3, 3) of one unit vector onto another, with a random angle about it."""
+    about = Rotation.from_rotvec([0.0, 0.0, 2.0 * math.pi * uniform]).as_matrix()
+    return np.asarray(_frame(target) @ about @ _frame(own).T)
 
 
 def start_in_field(

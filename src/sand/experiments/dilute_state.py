@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ..basics.grains import GrainArrays, Grains
 from ..basics.initial_pairs import StrainedContacts
-from .dilute_body import Body, body_at_rest
+from .dilute_body import Body, Motion, body_at_rest
 from .dilute_encounters import Encounters
 from .dilute_majorant import Majorant
 from .dilute_population import Population
@@ -47,6 +48,8 @@ def arrays_of(now: Encounters) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         "bodies/identity": np.array([(body.number, body.born, body.copy) for body in bodies]),
         "bodies/sums": population.sums.copy(),
     }
+    motions = [body.motion for body in bodies if body.motion is not None]
+    arrays |= {f"motion/{name}": np.array([getattr(each, name) for each in motions]) for name in Motion._fields}
     numbers = {name: getattr(now, name) for name in SINGLE_NUMBERS}
     more = {"volume": population.volume, "start": population.start, "doublings": population.doublings}
     return arrays, numbers | more
@@ -60,6 +63,7 @@ def population_from(arrays: dict[str, np.ndarray], meta: dict[str, Any], majoran
     grains = GrainArrays(**rest | {name: arrays[f"grains/{name}"] for name in STORED})
     contacts = StrainedContacts(*(arrays[f"contacts/{name}"] for name in StrainedContacts._fields))
     ends, joints = np.cumsum(arrays["bodies/grains"]), np.cumsum(arrays["bodies/contacts"])
+    motions = [arrays[f"motion/{name}"] for name in Motion._fields]
     bodies = []
     for k, (count, links) in enumerate(zip(arrays["bodies/grains"], arrays["bodies/contacts"], strict=True)):
         own, part = slice(ends[k] - count, ends[k]), slice(joints[k] - links, joints[k])
@@ -67,7 +71,10 @@ def population_from(arrays: dict[str, np.ndarray], meta: dict[str, Any], majoran
         members = GrainArrays(*(np.ascontiguousarray(array[..., own]) for array in grains))
         identity = tuple(int(each) for each in arrays["bodies/identity"][k])
         moved = mine._replace(pair=mine.pair - int(ends[k] - count))
-        bodies.append(body_at_rest(members, moved, arrays["bodies/inertia"][k], identity))  # type: ignore[arg-type]
+        body = body_at_rest(members, moved, arrays["bodies/inertia"][k], identity)  # type: ignore[arg-type]
+        if len(motions[0]):
+            body = dataclasses.replace(body, motion=Motion(*(array[k] for array in motions)))
+        bodies.append(body)
     found = Population(bodies, meta["volume"], majorant, arrays["bodies/sums"], meta["start"])
     found.doublings = meta["doublings"]
     return found
