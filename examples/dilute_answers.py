@@ -20,16 +20,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from sand.analysis.clusters import cluster_labels
-from sand.analysis.fits import power_law
 from sand.analysis.growth_law import local_degrees
 from sand.basics.errors import BadInput
 from sand.basics.units import si
 from sand.basics.version import __version__
 from sand.experiments.dilute_case import population_of
 from sand.experiments.dilute_kernel import CLASSES, capture_sums
+from sand.experiments.dilute_results import RANGE, RATIOS, degree, exponents, scaled_time
 from sand.experiments.executors import executor_for, results_of
 from sand.experiments.seed_table import Interval, mean_of
 from sand.io.checkpoint_files import checkpoint_files
@@ -59,11 +58,9 @@ ENDS = {"resolve": (30,), "stick": (30, 100)}
 """S at which populations are measured."""
 LEVELS = (1.5, 2, 3, 4, 6, 8, 11, 16, 20, 24, 30, 45, 64, 80, 96)
 """S whose times are in the tables."""
-RATIOS = (0.5, 0.2)
-"""n/n₀ whose times are in the tables."""
 KEY = ("case", "hits", "seed", "end")
-SMALL, LARGE = (3, 100), (30, 150)
-"""Ranges of N of the fits of γ and D_f."""
+LARGE = (30, 150)
+"""Range of N of further fits of γ and D_f."""
 POINTS = 40
 
 
@@ -106,27 +103,14 @@ def populations(number: int, out: Path, ends: Sequence[float], item: tuple[str, 
 
 def growth_of(ledger: Any) -> dict[str, float]:
     """Times n₀t [s/m³] at sizes S and ratios n/n₀, and degrees λ of fits in S = 2–20 and 2–96; NaN beyond the end."""
-    size, scaled = ledger["mean_cluster_size"], ledger["time"] * ledger["clusters"][0] / ledger["volume"][0]
-
-    def at(reached: np.ndarray) -> float:
-        return float(scaled[np.argmax(reached)]) if reached.any() else math.nan
-
-    row = {f"t_{level:g}": at(size >= level) for level in LEVELS}
-    row |= {f"t_ratio_{ratio:g}": at(ledger["number_ratio"] <= ratio) for ratio in RATIOS}
+    size = ledger["mean_cluster_size"]
+    row = {f"t_{level:g}": scaled_time(ledger, size >= level) for level in LEVELS}
+    row |= {f"t_ratio_{ratio:g}": scaled_time(ledger, ledger["number_ratio"] <= ratio) for ratio in RATIOS}
     for largest in (20, 96):
         sizes = np.geomspace(2.0, largest, POINTS)
-        times = np.array([at(size >= each) for each in sizes])
+        times = np.array([scaled_time(ledger, size >= each) for each in sizes])
         row[f"lambda_{largest}"] = degree(sizes, times) if np.isfinite(times).all() else math.nan
     return row
-
-
-def degree(sizes: np.ndarray, times: np.ndarray) -> float:
-    """λ of dS/dt = S^λ/τ from S = 1 at t = 0: least squares of ln t with t = τ (S^(1−λ) − 1)/(1 − λ)."""
-
-    def scatter(value: float) -> float:
-        return float(np.var(np.log(times) - np.log(np.expm1((1.0 - value) * np.log(sizes)) / (1.0 - value))))
-
-    return float(minimize_scalar(scatter, bounds=(-3.0, 0.999), method="bounded").x)
 
 
 def shapes_of(grown: Any) -> dict[str, float]:
@@ -141,10 +125,8 @@ def shapes_of(grown: Any) -> dict[str, float]:
     grains, gyration = found["grains"][own], found["gyration_radius"][own] / radius
     net = found["moment"][own] / moment if moment > 0.0 else np.zeros(len(own))
     row: dict[str, float] = {}
-    for name, (low, high) in (("", SMALL), ("_large", LARGE)):
-        inside = (grains >= low) & (grains <= high)
-        slope = exponent(grains[inside], gyration[inside])
-        row |= {f"dimension{name}": 1.0 / slope, f"gamma{name}": exponent(grains[inside], net[inside])}
+    for name, between in (("", RANGE), ("_large", LARGE)):
+        row[f"gamma{name}"], row[f"dimension{name}"] = exponents(found, between)
     magnetic = moments > 0.0
     row |= shares(magnetic, cluster_labels(len(magnetic), frame.pair)) if (~magnetic).any() and magnetic.any() else {}
     sums = capture_sums(grown.encounters, TEMPERATURE, mass)
@@ -157,14 +139,6 @@ def shapes_of(grown: Any) -> dict[str, float]:
         row |= {f"larger_{least}": float(sums.sizes[k]), f"hits_{least}": float(sums.hits[k])}
         row |= {f"expected_{least}": float(sums.expected[k])}
     return row
-
-
-def exponent(grains: np.ndarray, values: np.ndarray) -> float:
-    """Exponent of values over numbers of grains; NaN with fewer than ten."""
-    used = values > 0.0
-    if used.sum() < 10 or np.ptp(grains[used]) == 0.0:
-        return math.nan
-    return power_law(grains[used], values[used]).exponent
 
 
 def shares(magnetic: np.ndarray, labels: np.ndarray) -> dict[str, float]:
