@@ -26,12 +26,12 @@ class Kernel(NamedTuple):
     draws: np.ndarray  # (C, C)
     sizes: np.ndarray  # (C,) mean number of grains in the draws of a class
 
-    def rows(self, mass: float) -> list[tuple[float, float, float, float]]:
+    def rows(self, mass: float, draws: int = 1) -> list[tuple[float, float, float, float]]:
         """Rows (m1, m2, K over 1 m/s, 1 m/s) of all pairs of classes with hits, as `kernel_table.measured` takes them.
 
-        `mass` is that of a grain [kg].
+        `mass` is that of a grain [kg]; pairs with fewer than `draws` draws, whose K is uncertain, are left out.
         """
-        pairs = zip(*np.nonzero(np.triu(self.hits)), strict=True)
+        pairs = zip(*np.nonzero(np.triu(self.hits) * (self.draws >= draws)), strict=True)
         return [(mass * self.sizes[i], mass * self.sizes[j], self.value[i, j], 1.0) for i, j in pairs]
 
 
