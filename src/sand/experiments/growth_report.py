@@ -126,7 +126,7 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     drawn = []
     for one in ensembles:
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
-        rows = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
+        rows: dict[str, Any] = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
         rows["sizes"] = last_sizes(one.boxes)
         if one.kernel is not None:
             rows |= {"coagulation": (one.kernel.time, one.kernel.size)}
