@@ -40,8 +40,8 @@ class CaptureLaw(NamedTuple):
 
     def kernel(self, radius: Any, mass: Any, moment: Any, temperature: Any) -> CollisionKernel:
         """The kernel for radius [m], mass [kg] and moment [A m²] of a grain, and T [K]: `theory.kinetics.capture`."""
-        law: dict[str, Any] = {"exponent": self.exponent.value, "reading": "aligned", "speed": "thermal", "c": self.factor.value}
-        return capture(radius, mass, moment, temperature, **law)
+        gamma, c = self.exponent.value, self.factor.value
+        return capture(radius, mass, moment, temperature, exponent=gamma, reading="aligned", speed="thermal", c=c)
 
 
 def capture_law(
