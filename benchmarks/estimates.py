@@ -82,8 +82,8 @@ def cases(folder: Path) -> list[Path]:
 
 
 def _shortened(content: dict[str, Any], share: float) -> dict[str, Any]:
-    """A case that ends after a part of its time, if it is one of a run."""
-    if "run" not in content:
+    """A case that ends after a part of its time, if it is one of a run that ends at a time."""
+    if "until" not in content.get("run", {}):
         return content
     number, unit = content["run"]["until"].split()
     return content | {"run": content["run"] | {"until": f"{float(number) * share:g} {unit}"}}

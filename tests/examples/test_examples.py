@@ -401,3 +401,31 @@ def test_thermal_capture():
         "10 nm", example["MASS"], 200 * example["MASS"], "100 K", reading="aligned", speed="thermal"
     )
     assert rate / c == pytest.approx(kernel(example["MASS"], example["MASS"]), rel=1e-9, abs=0.0)
+
+
+@pytest.mark.validate
+def test_dilute_answers(tmp_path, monkeypatch, capsys):
+    """Tables of two populations of two cases; nothing is computed twice; shares of a known mixture.
+
+    Grains 0 to 3 are magnetic.  Clusters {0, 1, 4}, {2}, {3}, {5, 6}, {7}: 2 of 4 magnetic grains and 3 of 4 others are
+    in aggregates, which have 2 magnetic grains of 5; of those with two magnetic ones 2 of 3.  Of the half magnetic dust
+    magnetic grains are in aggregates, K of the others being 50 times smaller.
+    """
+    example = loaded("dilute_answers")
+    found = example.shares(np.arange(8) < 4, np.array([0, 0, 1, 2, 0, 3, 3, 4]))
+    assert list(found.values()) == pytest.approx([0.5, 0.75, 0.4, 2.0 / 3.0], rel=1e-12, abs=0.0)
+    words = ["dilute_answers.py", "--cases", "magnetic", "half", "--hits", "stick", "--seeds", "1", "2"]
+    words += ["--grains", "200", "--until", "3", "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", words)
+    example.main()
+    assert "half, stick, seed 2: S = 3" in capsys.readouterr().out
+    table = (tmp_path / "out" / "half.csv").read_text("utf-8")
+    rows = list(csv.DictReader(table.splitlines()))
+    assert [row["seed"] for row in rows] == ["1", "2"] and all(float(row["purity"]) > 0.8 for row in rows)
+    assert all(float(row["t_2"]) < float(row["t_3"]) and row["t_8"] == "" for row in rows)
+    example.main()
+    assert "seed" not in capsys.readouterr().out and (tmp_path / "out" / "half.csv").read_text("utf-8") == table
+    answers = list(csv.DictReader((tmp_path / "out" / "answers.csv").read_text("utf-8").splitlines()))
+    mean = next(float(row["value"]) for row in answers if (row["case"], row["quantity"]) == ("half", "t_2"))
+    assert mean == pytest.approx(np.mean([float(row["t_2"]) for row in rows]), rel=1e-4, abs=0.0)
+    assert all((tmp_path / "out" / f"{name}.png").stat().st_size > 10_000 for name in ("sizes", "shapes", "kernel"))

@@ -46,6 +46,7 @@ CAPABILITIES = {
     "figures in the width and style of a journal, several runs in one figure, s² n_s, stills as outlines, percolating "
     "packings inside the box, shares of each value of a sweep, materials of files in methods": 759,
     "bodies of dilute dust that keep momentum and spin between encounters": 242,
+    "populations of dilute dust in sweeps, their template, and the kernel of several with the fit of Eq. 14": 285,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

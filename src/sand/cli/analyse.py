@@ -90,6 +90,7 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
             ("moments", _law(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
             ("", _law(one, "moment_without_rings", "without rings N^") if one["moment"] else ""),
             ("D_f", _law(one, "dimension", "", " from N(r_g)")),
+            ("kernel", _capture(one)),
             *_temperatures(one["temperatures"]),
         ]
         report.show(one["name"], [row for row in rows if row[1]])
@@ -119,6 +120,19 @@ def _local_degrees(one: dict[str, Any]) -> str:
         f"{found['degree']:.2f}{_error(found['error'])} (S {found['low_size']:.3g} to {found['high_size']:.3g})"
         for found in one["local_degrees"]
     )
+
+
+def _capture(one: dict[str, Any]) -> str:
+    """c and γ of the kernel of populations of dilute dust; empty for others."""
+    law = one.get("kernel", {}).get("law")
+    if law is None:
+        return ""
+    texts = {
+        name: f"{found['value']:.3g} (95 % from {found['low']:.3g} to {found['high']:.3g})"
+        for name, found in law.items()
+    }
+    power, net = f"{texts['factor']} with μ = μ₁ N^{texts['exponent']}", f"{texts['net_factor']} with net moments"
+    return f"c ⟨π b_max² v⟩, c = {power}, {net}"
 
 
 def _temperatures(kinds: dict[str, Any]) -> list[tuple[str, str]]:

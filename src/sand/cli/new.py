@@ -11,8 +11,11 @@ from ..basics.errors import BadInput
 from ..config.commands import PACKINGS
 from . import options, parsing, report
 
-COMMANDS = ("run", "collide", "scatter", "grow", *PACKINGS, "sweep")
-"""Commands that read a case file; as `experiments.templates.TEMPLATES`, which takes long to import."""
+OF_GROW = "encounters"
+"""Kind of cases of `sand grow`."""
+KINDS = ("run", "collide", "scatter", "grow", OF_GROW, *PACKINGS, "sweep")
+"""Commands that read a case file, and kinds of their cases; as `experiments.templates.TEMPLATES`, which takes long to
+import."""
 
 
 @parsing.command("new", short_help="Write a case file with every key.")
@@ -20,10 +23,10 @@ COMMANDS = ("run", "collide", "scatter", "grow", *PACKINGS, "sweep")
 @click.option(
     "--for",
     "reader",
-    type=click.Choice(COMMANDS),
+    type=click.Choice(KINDS),
     default="run",
     show_default=True,
-    help="The command that reads the file.",
+    help="The command that reads the file, or a kind of its cases.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 @options.output
@@ -31,15 +34,16 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
     """Write NAME.toml, a case file with every key, its meaning, unit, default and allowed values.
 
     \b
-    run       a gas of silica grains
-    collide   two fluffy aggregates of silica
-    scatter   cross-sections of two magnetic grains of iron
-    grow      the gas, for several seeds
-    compress  a fluffy aggregate of ice, in a periodic box
-    stretch   a compact aggregate of ice, between two walls
-    shear     a compact aggregate of ice, between two walls
-    elastic   a fluffy aggregate of ice, compressed in a periodic box
-    sweep     the aggregates, for several speeds, impact parameters and seeds
+    run         a gas of silica grains
+    collide     two fluffy aggregates of silica
+    scatter     cross-sections of two magnetic grains of iron
+    grow        the gas, for several seeds
+    encounters  magnetic grains of iron in dilute dust, for sand grow
+    compress    a fluffy aggregate of ice, in a periodic box
+    stretch     a compact aggregate of ice, between two walls
+    shear       a compact aggregate of ice, between two walls
+    elastic     a fluffy aggregate of ice, compressed in a periodic box
+    sweep       the aggregates, for several speeds, impact parameters and seeds
 
     It can be run as it is; keys that are not in use are comments.
     """
@@ -52,6 +56,7 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
     if not path.parent.is_dir():
         raise BadInput(f"there is no folder {path.parent}; make it first")
     replace_file(path, TEMPLATES[reader](str(path)).encode())
+    command = "grow" if reader == OF_GROW else reader
     quoted = shlex.quote(str(path))
-    rows = [("file", str(path)), ("check with", f"sand info {quoted}"), ("run with", f"sand {reader} {quoted}")]
-    report.answer({"file": str(path), "command": reader}, f"new {path}", rows, **output)
+    rows = [("file", str(path)), ("check with", f"sand info {quoted}"), ("run with", f"sand {command} {quoted}")]
+    report.answer({"file": str(path), "command": command}, f"new {path}", rows, **output)

@@ -9,48 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..basics.constants import BOLTZMANN, MAGNETIC
 from ..plotting.papers import Curve, Guide, Panel, panels_figure
-from .dilute_kernel import CLASSES
-from .dilute_majorant import mean_power
-from .scattering.rigid_flight import contact_energy
+from .dilute_kernel import CLASSES, capture_sums
 
 POINTS = 40
 """Points of S(t)."""
 LEAST_HITS = 10
 """Fewest hits of a class in the figure."""
-
-
-def capture_share(encounters: Mapping[str, np.ndarray], temperature: float, mass: float) -> tuple[np.ndarray, ...]:
-    """c = K/⟨π b_max² v⟩ with the actual net moments (Eq. 14), by the number of grains of the larger body.
-
-    The mean of 1/K̂ times that kernel over draws, and hits, give c = Σ hits/Σ (K_14/K̂): both are unbiased.
-
-    Parameters
-    ----------
-    encounters : mapping
-        Columns of encounters.csv.
-    temperature, mass : float
-        T [K], and the mass of a grain [kg].
-
-    Returns
-    -------
-    sizes, value, error, hits : ndarray
-        Mean number of grains of the classes with at least one hit, c, its standard error and hits.
-    """
-    first, second = encounters["grains1"] * mass, encounters["grains2"] * mass
-    reduced = first * second / (first + second)
-    alpha = contact_energy(encounters["moment1"], encounters["moment2"], 1.0, MAGNETIC)
-    spread = np.sqrt(BOLTZMANN * temperature / reduced)
-    law = math.pi * 3.0 * np.cbrt(alpha / reduced) ** 2 * mean_power(-1.0 / 3.0, spread)
-    larger = np.maximum(encounters["grains1"], encounters["grains2"])
-    number = np.searchsorted(CLASSES, larger, "right") - 1
-    is_hit, count = encounters["end"] == 0, len(CLASSES)
-    hits, expected = np.bincount(number, is_hit, count), np.bincount(number, law / encounters["kernel"], count)
-    sizes = np.bincount(number, larger, count) / np.maximum(np.bincount(number, minlength=count), 1)
-    chosen = (hits > 0.0) & (expected > 0.0)
-    value = hits[chosen] / expected[chosen]
-    return sizes[chosen], value, value / np.sqrt(hits[chosen]), hits[chosen]
 
 
 def dilute_figure(
@@ -87,10 +52,11 @@ def dilute_figure(
     if moment > 0.0:
         of_moments = [_means(grains, aggregates["moment"] / moment, "μ/μ₁")]
         law = [Guide("N^0.63, the paper", np.array([2.0, grains.max()]), np.array([2.0, grains.max()]) ** 0.63)]
-        number, value, error, hits = capture_share(encounters, temperature, mass)
+        number, hits, expected = capture_sums(encounters, temperature, mass)
         enough = hits >= LEAST_HITS
-        low, high = value - error, value + error
-        share = Curve("c", number[enough], value[enough], low[enough], high[enough])
+        value = hits[enough] / expected[enough]
+        error = value / np.sqrt(hits[enough])
+        share = Curve("c", number[enough], value, value - error, value + error)
         panels += [
             Panel("grains N", "μ/μ₁", of_moments, law, log="xy"),
             Panel("grains of the larger body", "c = K/⟨π b_max² v⟩", [share]),

@@ -8,6 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..basics.constants import BOLTZMANN, MAGNETIC
+from .dilute_majorant import mean_power
+from .scattering.rigid_flight import contact_energy
+
 CLASSES = (1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513, 1025)
 """Smallest numbers of grains of the classes: 1, 2, 3–4, 5–8, …"""
 
@@ -22,12 +26,12 @@ class Kernel(NamedTuple):
     draws: np.ndarray  # (C, C)
     sizes: np.ndarray  # (C,) mean number of grains in the draws of a class
 
-    def rows(self, mass: float) -> list[tuple[float, float, float, float]]:
+    def rows(self, mass: float, draws: int = 1) -> list[tuple[float, float, float, float]]:
         """Rows (m1, m2, K over 1 m/s, 1 m/s) of all pairs of classes with hits, as `kernel_table.measured` takes them.
 
-        `mass` is that of a grain [kg].
+        `mass` is that of a grain [kg]; pairs with fewer than `draws` draws, whose K is uncertain, are left out.
         """
-        pairs = zip(*np.nonzero(np.triu(self.hits)), strict=True)
+        pairs = zip(*np.nonzero(np.triu(self.hits) * (self.draws >= draws)), strict=True)
         return [(mass * self.sizes[i], mass * self.sizes[j], self.value[i, j], 1.0) for i, j in pairs]
 
 
@@ -67,3 +71,36 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
     total = value, error, hits.sum(axis=0), draws.sum(axis=0)
     both = [np.triu(each) + np.triu(each, 1).T for each in total]
     return Kernel(bounds.astype(int), both[0], both[1], both[2], both[3], grains / np.maximum(bodies, 1.0))
+
+
+class CaptureSums(NamedTuple):
+    """Hits, and those expected of Eq. 14, by classes of the larger body; c = hits/expected."""
+
+    sizes: np.ndarray  # (C,) mean number of grains of the larger body, 0 without draws
+    hits: np.ndarray  # (C,)
+    expected: np.ndarray  # (C,)
+
+
+def capture_sums(encounters: Mapping[str, np.ndarray], temperature: float, mass: float) -> CaptureSums:
+    """Hits, and Σ ⟨π b_max² v⟩/K̂ over draws: the ratio is c = K/⟨π b_max² v⟩ with the actual net moments (Eq. 14).
+
+    Both sums are unbiased, as a pair is drawn at the rate K̂/V. Draws of bodies without a moment are left out.
+
+    Parameters
+    ----------
+    encounters : mapping
+        Columns of encounters.csv.
+    temperature, mass : float
+        T [K], and the mass of a grain [kg].
+    """
+    columns = ("grains1", "grains2", "moment1", "moment2", "kernel", "end")
+    magnetic = (encounters["moment1"] > 0.0) & (encounters["moment2"] > 0.0)
+    grains1, grains2, moment1, moment2, kernel, end = (encounters[name][magnetic] for name in columns)
+    reduced = mass * grains1 * grains2 / (grains1 + grains2)
+    alpha = contact_energy(moment1, moment2, 1.0, MAGNETIC)
+    spread = np.sqrt(BOLTZMANN * temperature / reduced)
+    law = math.pi * 3.0 * np.cbrt(alpha / reduced) ** 2 * mean_power(-1.0 / 3.0, spread)
+    larger = np.maximum(grains1, grains2)
+    number, count = np.searchsorted(CLASSES, larger, "right") - 1, len(CLASSES)
+    sizes = np.bincount(number, larger, count) / np.maximum(np.bincount(number, minlength=count), 1)
+    return CaptureSums(sizes, np.bincount(number, end == 0, count), np.bincount(number, law / kernel, count))

@@ -16,10 +16,13 @@ from ..basics.errors import naming
 from ..basics.paths import user_path
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
+from .dilute_law import PopulationKernel, kernel_of_populations
 from .growth import BoxResult, GrowthResult, Temperatures, all_aggregates, boxes_in, growth_of, joined, read_box
 
 NAMES = ("analysis.json", "growth.csv", "degrees.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
+KERNEL_CSV = "kernel.csv"
+"""One more file, if populations of dilute dust are among the runs."""
 SAME_TIME = 1e-9
 """Relative difference of the times of frames up to which they are of one time."""
 
@@ -30,6 +33,7 @@ class Ensemble(NamedTuple):
     name: str
     growth: GrowthResult
     boxes: list[BoxResult]
+    kernel: PopulationKernel | None = None  # of populations of dilute dust
 
 
 def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
@@ -49,7 +53,8 @@ def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None)
     """
     boxes = [read_box(one) for one in boxes_in(folder)]
     with naming(folder):
-        return Ensemble(user_path(folder).absolute().name, growth_of(boxes, window), boxes)
+        kernel = kernel_of_populations([box.folder for box in boxes])
+        return Ensemble(user_path(folder).absolute().name, growth_of(boxes, window), boxes, kernel)
 
 
 def ensemble_summary(one: Ensemble) -> dict[str, Any]:
@@ -69,6 +74,7 @@ def ensemble_summary(one: Ensemble) -> dict[str, Any]:
         "local_degrees": None if growth.local_degrees is None else [one._asdict() for one in growth.local_degrees],
         "missing": growth.missing,
         "temperatures": {kind: _described(found) for kind, found in growth.temperatures.items()},
+        **({} if one.kernel is None else {"kernel": one.kernel.to_dict()}),
     }
 
 
@@ -114,11 +120,16 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     write_table(folder / NAMES[1], [row for one in ensembles for row in _growth_rows(one, most)])
     write_table(folder / NAMES[2], [row for one in ensembles for row in _degree_rows(one)])
     write_table(folder / NAMES[3], [row for one in ensembles for row in _aggregate_rows(one)])
+    kernels = [{"ensemble": one.name, **row} for one in ensembles if one.kernel for row in one.kernel.rows()]
+    if kernels:
+        write_table(folder / KERNEL_CSV, kernels)
     drawn = []
     for one in ensembles:
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
-        rows = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
+        rows: dict[str, Any] = all_aggregates(one.boxes) | units | {"temperatures": temperatures_over_time(one.boxes)}
         rows["sizes"] = last_sizes(one.boxes)
+        if one.kernel is not None:
+            rows |= {"coagulation": (one.kernel.time, one.kernel.size)}
         drawn.append((one.name, one.growth, rows))
     save(growth_figure(drawn, guides), folder / NAMES[4])
 

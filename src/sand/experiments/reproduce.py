@@ -23,7 +23,8 @@ from .job import Progress, ignored
 from .laboratory_case import LaboratoryCase
 from .laboratory_job import LaboratoryJob
 from .paper_figure import Compared, PaperFigure, Row
-from .sweep_cases import Expected, SweptLoading
+from .sweep_case import Expected
+from .sweep_cases import SweptLoading
 from .sweep_design import changed_content
 from .sweep_job import ROW_BYTES, SweepJob
 from .sweep_row import Row as Run

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any
 
 from ..basics.errors import BadInput, warn
 from ..config.build import resume, simulation_of
 from ..config.case import Case, check_case, material_errors
+from ..config.commands import command_for
 from ..config.key_errors import validate
 from ..config.sections import with_integrator
 from ..io.checkpoint_files import checkpoint_files
@@ -21,6 +22,7 @@ from ..simulation.outcome import Outcome
 from ..simulation.run_writer import summary_of
 from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
+from .dilute_case import is_dilute
 from .elastic_job import measured
 from .growth_case import GrowSection
 from .laboratory import simulation_of as simulation_of_plan
@@ -28,82 +30,13 @@ from .laboratory import slow_from
 from .laboratory_case import OF_COMMAND, check_laboratory, model_of
 from .laboratory_job import loaded
 from .sequential import SequenceCase
+from .sweep_case import Expected, SweptCase
+from .sweep_population import SweptPopulation
 
+ENCOUNTERS = "encounters"
+"""Kind of cases of `sand grow` whose populations grow by encounters."""
 SEQUENCE = ("outcome", "impact_energy", "contacts_before", "contacts_after", "gyration_after", "time", "steps", "drift")
 """Results of each collision of a sequence."""
-
-
-class Expected(NamedTuple):
-    """Expected cost of a run; None where the case does not determine it."""
-
-    seconds: float | None  # wall time [s]
-    memory: float  # [bytes]
-    disk: float | None  # of all its files but the row [bytes]
-
-
-class SweptCase:
-    """The case of a command, as a sweep uses it.
-
-    Parameters
-    ----------
-    content : dict
-        Content of a case file, without [sweep].
-    name : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    BadInput
-        All errors of the case.
-
-    Attributes
-    ----------
-    case : Section
-        The case, checked.
-    seeds : list of int
-        Its seeds.
-    NAME : str
-        What is varied, for people.
-    GIVEN : tuple of str
-        Keys of seeds and of the folder, which the sweep gives itself.
-    """
-
-    NAME: ClassVar[str]
-    GIVEN: ClassVar[tuple[str, ...]]
-    case: Any
-    seeds: list[int]
-
-    def __init__(self, content: dict[str, Any], name: str):
-        raise NotImplementedError
-
-    @staticmethod
-    def model(content: dict[str, Any]) -> type:
-        """Model of the case file."""
-        raise NotImplementedError
-
-    def expected(self, seed: int) -> Expected:
-        """Set up a run in memory, which finds all further errors, and estimate its cost.  Raises BadInput."""
-        raise NotImplementedError
-
-    def run(self, seed: int, folder: Path | None, observers: Sequence[Any] = ()) -> dict[str, Any]:
-        """Compute a run, or continue the one in the folder.
-
-        Parameters
-        ----------
-        folder : Path or None
-            Folder for its files; None for no files.
-
-        Returns
-        -------
-        dict
-            Results, which must not depend on the machine or on interruptions; with `TABLE` rows of the run's own.
-
-        Raises
-        ------
-        BadInput
-            If it failed, also for physical reasons.
-        """
-        raise NotImplementedError
 
 
 class SweptRun(SweptCase):
@@ -341,6 +274,7 @@ def _without_figure(cost: Any) -> float | None:
 CASES: dict[str, type[SweptCase]] = {
     "run": SweptRun,
     "grow": SweptRun,
+    ENCOUNTERS: SweptPopulation,
     "collide": SweptCollision,
     "sequence": SweptSequence,
     "scatter": SweptScattering,
@@ -348,3 +282,11 @@ CASES: dict[str, type[SweptCase]] = {
     "elastic": SweptElastic,
 }
 """The cases that a sweep can vary, by the command that reads them: one line for each."""
+
+
+def case_kind(content: dict[str, Any]) -> str:
+    """Which of `CASES` the content of a case file is; "" if none of them, or no case."""
+    if is_dilute(content):
+        return ENCOUNTERS
+    found = command_for(content)
+    return found if found in CASES else ""

@@ -18,18 +18,18 @@ from ..basics.arguments import checked
 from ..basics.errors import BadInput, ErrorCollector, import_optional, naming, shown, warn
 from ..basics.paths import user_path
 from ..config.case import with_absolute_files
-from ..config.commands import command_for
 from ..config.folders import content_of
 from ..config.key_errors import validate
 from ..io import run_folder as files
 from ..io.damage import digest_of
-from ..io.lock import holder, writing
+from ..io.lock import CLAIM, holder, writing
 from ..io.run_folder import ROW, RUNS
-from ..io.sweep_files import CLAIM, DONE, FAILED, PARQUET, STATE, read_row, read_rows, read_sweep, write_row
+from ..io.sweep_files import DONE, FAILED, PARQUET, STATE, read_row, read_rows, read_sweep, write_row
 from ..results import Sweep
 from .executors import results_of
 from .job import Job, Progress, ignored
-from .sweep_cases import CASES, Expected
+from .sweep_case import Expected
+from .sweep_cases import CASES, case_kind
 from .sweep_design import (
     DESIGNS,
     EVERY,
@@ -110,8 +110,8 @@ class SweepJob(Job):
         self.section = validate(SweepSection, _replaced(own, settings or {}), str(path), table="sweep")
         self.folder = user_path(folder or self.section.out or f"{self.path.stem}-sweep", "folder")
         self.retry, self.parquet = retry, parquet or (self.folder / PARQUET).exists()
-        self.command = command_for(self.content) or ""
-        if self.command not in CASES:
+        self.command = case_kind(self.content)
+        if not self.command:
             raise BadInput(f"{path} is no case that a sweep can vary; write one with sand new NAME --for sweep")
         self.kind, self._is_set_up = CASES[self.command], False
         self.notes: list[str] = []  # warnings of the runs that were set up
@@ -133,7 +133,7 @@ class SweepJob(Job):
             design = Design(self.section, partial(takes_whole_numbers, model))
         self.seeds = self.section.seeds or errors.take(self._seeds, next(design.combinations()), instead=[0])
         self.content = without_keys(self.content, list(given))
-        self.command = command_for(self.content) or ""  # of boxes of sand grow: run, as that of case.toml
+        self.command = case_kind(self.content)  # of boxes of sand grow: run, as that of case.toml
         self.defaults = self._defaults(keys)
         found, again = dict[str, Row](), list[Row]()
         for values in design.combinations():

@@ -14,9 +14,9 @@ from ..basics.errors import BadInput, FilesFailed
 from ..basics.version import __version__
 from ..compiler.jit import cache_folder
 from ..io import run_folder as files
-from ..io.lock import FolderLock
+from ..io.lock import CLAIM, FolderLock
 from ..io.run_folder import RUNS
-from ..io.sweep_files import CLAIM, DONE, FAILED, STATE, read_row, write_row
+from ..io.sweep_files import DONE, FAILED, STATE, read_row, write_row
 from ..simulation.displays import DISPLAYS
 from .sweep_cases import CASES
 from .sweep_design import changed_content

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from ..config.case import RunSection
 from ..config.template import (
     EXAMPLES,
     REQUIRED,
@@ -20,11 +21,15 @@ from ..config.template import (
     summary,
     template,
 )
+from ..forces.registry import FORCES
+from ..setup.grain_classes import GrainClass
 from .collision_case import BodySection, ImpactSection
+from .dilute_case import NOT_OF_GRAINS, NOT_OF_RUN, MethodSection
 from .growth_case import GrowSection
 from .laboratory_case import CASES, OF_COMMAND, PackingSection
 from .scattering.scatter_case import FlightSection, MeasureSection, ScatterBody
 from .sweep_design import SweepSection
+from .sweep_population import DiluteGrains
 
 BODY = {"kind": "bpca", "grains": 16, "radius": "0.1 um", "material": "silica"}
 COLLISION: Values = {
@@ -42,6 +47,31 @@ SCATTERING: Values = {
 """Keys in use of `sand scatter`: cross-sections of two magnetic grains of iron at two speeds."""
 GROWTH: Values = {**EXAMPLES, "grow": {"seeds": [1, 2, 3, 4]}, "run": {"until": "20 us", "frame_every": "0.1 us"}}
 """Keys in use of `sand grow`: the gas of the case of `sand run`, for four seeds."""
+DILUTE: Values = {
+    "method": {"kind": "encounters", "hits": "resolve"},
+    "run": {"stop": "mean_cluster_size >= 10"},
+    "grow": {"seeds": [1, 2]},
+    "grains": {
+        "kind": "gas",
+        "number": 500,
+        "number_density": "3e8 /m^3",
+        "radius": "10 nm",
+        "material": "iron",
+        "moment": "200 A m^2/kg",
+        "temperature": "100 K",
+    },
+    "forces.contact": {"damping": "critical", "damping_ratio": 0.2, "settling_time": "5 ns"},
+    "forces.dipoles": {"cutoff": "auto"},
+}
+"""Keys in use of `sand grow` with encounters: magnetic grains of iron, 10 au from the Sun, for two seeds."""
+DILUTE_FORCES = {
+    "contact": None,
+    "dipoles": ("cutoff",),
+    "charges": ("cutoff",),
+    "field": ("flux_density",),
+    "gas": None,
+}
+"""Forces that encounters have, and which of their keys; None: all."""
 DAMPED = {"damping": "constant", "damping_constant": "2.2e-10 kg/s"}
 PACKED = {"kind": "rbd", "grains": 64, "radius": "0.1 um", "material": "ice"}
 LOADINGS: dict[str, Values] = {
@@ -133,12 +163,37 @@ def _growth(name: str) -> str:
     return template(name, "grow", [grow, run._replace(keys=kept), *others], GROWTH)
 
 
+def _encounters(name: str) -> str:
+    """Case of `sand grow` with encounters, which has no box and chooses its steps."""
+    left = {"run": {*NOT_OF_RUN, "seed"}, "grains": {*NOT_OF_GRAINS, "classes"}}
+    sections = {"run": RunSection, "grow": GrowSection, "grains": DiluteGrains}
+    notes = {"grow": "One population for each seed, all alike otherwise."}
+    method = Table(
+        "[method]", summary(MethodSection).removeprefix("Section [method] of `sand grow`: "), keys_of(MethodSection)
+    )
+    tables = [
+        Table(f"[{table}]", notes.get(table, ""), [key for key in keys_of(kind) if key.name not in left.get(table, ())])
+        for table, kind in sections.items()
+    ]
+    forces = [
+        Table(
+            f"[forces.{force}]",
+            summary(FORCES[force]),
+            [key for key in keys_of(FORCES[force]) if own is None or key.name in own],
+        )
+        for force, own in DILUTE_FORCES.items()
+    ]
+    classes = Table("[[grains.classes]]", summary(GrainClass), keys_of(GrainClass))
+    return template(name, "grow", [method, *tables, classes, material_table(), *forces], DILUTE)
+
+
 TEMPLATES: dict[str, Callable[[str], str]] = {
     "run": template,
     "collide": _collision,
     "scatter": _scattering,
     "grow": _growth,
+    "encounters": _encounters,
     **{command: partial(_loading, command=command) for command in LOADINGS},
     "sweep": _sweep,
 }
-"""Text of a case file, from its name, by command."""
+"""Text of a case file, from its name, by command, or by kind of cases of one."""

@@ -20,6 +20,8 @@ from ..basics.errors import BadInput, FilesFailed
 
 LOCK = ".lock"
 """The lock file in a folder."""
+CLAIM = ".claim"
+"""File in the folder of a run of a sweep that is locked by who computes it."""
 READ_ATTEMPTS, READ_SECONDS = 5, 0.1
 """Attempts to read the pid in a lock file, and the time [s] for all of them."""
 _written: set[str] = set()

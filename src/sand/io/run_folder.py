@@ -21,7 +21,7 @@ from typing import Any, BinaryIO
 from ..basics.errors import BadInput, FilesFailed, shown, warn
 from ..basics.paths import user_path
 from .damage import DAMAGED, DIGEST, digest_of
-from .lock import LOCK, refuse_locked, writing
+from .lock import CLAIM, LOCK, refuse_locked, writing
 
 OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS_CSV, FLIGHTS,
@@ -175,8 +175,8 @@ def _of_earlier_results(folder: Path) -> list[Path]:
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a folder exists and holds more than a lock file, and the one by which `make_folder` finds it writable."""
-    return folder.is_dir() and any(not one.name.startswith(LOCK) for one in folder.iterdir())
+    """Whether a folder exists and holds more than lock files, and the one by which `make_folder` finds it writable."""
+    return folder.is_dir() and any(not one.name.startswith((LOCK, CLAIM)) for one in folder.iterdir())
 
 
 def replace_file(path: str | Path, content: bytes) -> None:

@@ -13,8 +13,6 @@ from .damage import sealed
 from .run_folder import ROW, ROWS_CSV, RUNS, SWEEP_CSV, plain, read_json, replacing, write_json
 from .table import read_table, write_table
 
-CLAIM = ".claim"
-"""File in the folder of a run that is locked by who computes it."""
 PARQUET = "sweep.parquet"
 """The table for programs that read Apache Parquet."""
 STATE, DONE, FAILED = "state", "done", "failed"

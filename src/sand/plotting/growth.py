@@ -30,7 +30,8 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
         For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
         `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain, `temperatures` (K, 4), times [s]
-        and `BodyTemperatures` [K], and `sizes`, grains of each cluster in the last frames of all boxes.
+        and `BodyTemperatures` [K], and `sizes`, grains of each cluster in the last frames of all boxes; with
+        `coagulation`, times [s] and S of the coagulation equation, if solved.
     guides : bool, optional
         Whether lines show the power laws of the paper.
     """
@@ -40,6 +41,9 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
         size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _draw_growth(left, name, growth, size, colour, guides)
+            time, mean = rows.get("coagulation", ((), ()))
+            if len(time):
+                left.plot(time[1:] / size, mean[1:], color=colour, lw=1.2, ls=":", label="Smoluchowski, its kernel")
             _draw_degrees(degrees, name, growth, colour)
             _draw_moments(middle, growth, rows, colour, guides)
             _draw_dimension(right, growth, rows, colour)

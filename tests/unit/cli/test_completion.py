@@ -45,7 +45,7 @@ def completed(words, capsys, monkeypatch):
         (["analyse", "first", "fi"], ["first", "first-again"]),
         (
             ["new", "x", "--for", ""],
-            ["run", "collide", "scatter", "grow", "compress", "stretch", "shear", "elastic", "sweep"],
+            ["run", "collide", "scatter", "grow", "encounters", "compress", "stretch", "shear", "elastic", "sweep"],
         ),
         (["plot", "first", "--dp"], ["--dpi"]),
         (["run", "x", "--until", "1kg", "--import", "nowhere", "--over"], ["--overwrite"]),

@@ -23,11 +23,13 @@ from sand.config.case import (
 from sand.config.key_errors import keys_at
 from sand.config.template import EXAMPLES, REQUIRED, keys_of, template
 from sand.experiments.collision_case import CollisionCase
+from sand.experiments.dilute_case import NOT_FOR, NOT_OF_GRAINS, NOT_OF_RUN
 from sand.experiments.growth_case import GrowSection
 from sand.experiments.laboratory_case import CASES as LOADINGS
 from sand.experiments.scattering.scatter_case import ScatterCase
 from sand.experiments.sweep_design import SweepSection
-from sand.experiments.templates import TEMPLATES
+from sand.experiments.sweep_population import SweptPopulation
+from sand.experiments.templates import DILUTE_FORCES, TEMPLATES
 from sand.forces.registry import FORCES
 from sand.integrate.registry import INTEGRATORS
 from sand.neighbours.search import Neighbours
@@ -117,6 +119,8 @@ def test_parts_of_a_class_are_documented():
 
 
 MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case, "sweep": CollisionCase} | LOADINGS
+MODEL["encounters"] = SweptPopulation.model({})
+READER = {command: command for command in TEMPLATES} | {"encounters": "grow"}
 
 
 @pytest.mark.parametrize("command", list(TEMPLATES))
@@ -124,10 +128,12 @@ def test_each_command_has_a_case_with_all_its_keys(command):
     """Keys of each table are those that the reader of the command accepts, by its model; each has a meaning."""
     text, model = TEMPLATES[command]("a.toml"), MODEL[command]
     ignored = {"run": {"stop", "seed", "out"}} if command == "grow" else {}  # of sand run alone
+    if command == "encounters":
+        ignored = {"run": {"seed", *NOT_OF_RUN}, "grains": {*NOT_OF_GRAINS}}
     found = {}
     for head, lines in tables_of(text):
         found.setdefault(head.strip("[]"), set()).update(line.lstrip("#").split(" =")[0] for line in lines)
-    if command == "grow":
+    if READER[command] == "grow":
         assert found.pop("grow") == set(GrowSection.model_fields)
     if command == "sweep":
         assert found.pop("sweep") == set(SweepSection.model_fields)
@@ -141,6 +147,10 @@ def test_each_command_has_a_case_with_all_its_keys(command):
     if "forces" in model.model_fields:
         expected |= {f"forces.{name}": set(keys_at(model, ("forces", name))) for name in FORCES}
         expected["stepping"] = {"method"}.union(*({key.name for key in keys_of(kind)} for kind in INTEGRATORS.values()))
+    if command == "encounters":
+        kept = {f"forces.{name}": own and set(own) for name, own in DILUTE_FORCES.items()}
+        expected = {k: kept.get(k) or v for k, v in expected.items() if k not in NOT_FOR and k != "stepping"}
+        expected = {k: v for k, v in expected.items() if not k.startswith("forces.") or k in kept}
     assert found == expected
     before = ""
     for line in text.splitlines():
@@ -148,7 +158,7 @@ def test_each_command_has_a_case_with_all_its_keys(command):
             assert before.startswith("# "), line
         before = line
     assert max(map(len, text.splitlines())) <= 120
-    assert f"sand {command} a.toml" in text.splitlines()[0]
+    assert f"sand {READER[command]} a.toml" in text.splitlines()[0]
 
 
 @pytest.mark.parametrize("command", list(TEMPLATES))
@@ -183,11 +193,11 @@ def test_info_describes_each_case(command, tmp_path, monkeypatch, capsys):
     """`sand new NAME --for COMMAND` writes a case that `sand info` accepts for that command."""
     monkeypatch.chdir(tmp_path)
     assert main(["new", "my case", "--for", command, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"file": "my case.toml", "command": command}
+    assert json.loads(capsys.readouterr().out) == {"file": "my case.toml", "command": READER[command]}
     assert main(["info", "my case.toml"]) == 0
     out = capsys.readouterr().out
     assert "a valid" in out
-    assert (f"sand {command} 'my case.toml'" in out) is (command != "run")
+    assert (f"sand {READER[command]} 'my case.toml'" in out) is (command != "run")
     assert tomllib.loads((tmp_path / "my case.toml").read_text("utf-8")) == tomllib.loads(TEMPLATES[command]("x"))
 
 

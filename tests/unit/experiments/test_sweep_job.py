@@ -17,12 +17,13 @@ import sand
 from sand.basics.errors import BadInput, FilesFailed
 from sand.cli.main import main
 from sand.experiments import sweep_job, sweep_row, sweep_table
-from sand.experiments.sweep_cases import Expected, SweptCollision
+from sand.experiments.sweep_case import Expected
+from sand.experiments.sweep_cases import SweptCollision
 from sand.experiments.sweep_job import SweepJob
 from sand.experiments.sweep_row import run_row
-from sand.io.lock import FolderLock
+from sand.io.lock import CLAIM, FolderLock
 from sand.io.run_folder import make_folder, write_json
-from sand.io.sweep_files import CLAIM, COST
+from sand.io.sweep_files import COST
 
 CASE = """
 [target]

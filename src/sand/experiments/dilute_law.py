@@ -1,0 +1,171 @@
+"""Kernel of several populations of dilute dust: c times Eq. 14 with μ = μ₁ N^γ, a table, and Smoluchowski's S(t)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.fits import jackknife
+from ..basics.errors import BadInput
+from ..basics.units import si
+from ..results import Run
+from ..theory.kinetics import CollisionKernel, capture
+from ..theory.smoluchowski import coagulate, log_sizes
+from .dilute_case import is_dilute
+from .dilute_growth import Grown
+from .dilute_kernel import Kernel, capture_sums, kernel_of
+from .kernel_table import measured
+from .seed_table import Interval
+
+EXPONENTS = (-0.5, 2.0)
+"""Range of γ of the fit."""
+LEAST_DRAWS = 30
+"""Fewest draws of a pair of classes in the table for the coagulation equation."""
+BEYOND = 300.0
+"""Largest size of the grid, in units of the largest S: few clusters are larger."""
+POINTS = 60
+"""Times of the solution."""
+
+
+class CaptureLaw(NamedTuple):
+    """K(N, N') = c ⟨π b_max² v⟩ (Eq. 14 at thermal speed), with 95 % intervals by a jackknife over populations."""
+
+    factor: Interval  # c with μ = μ₁ N^γ
+    exponent: Interval  # γ
+    net_factor: Interval  # c with the actual net moments
+
+    def kernel(self, radius: Any, mass: Any, moment: Any, temperature: Any) -> CollisionKernel:
+        """The kernel for radius [m], mass [kg] and moment [A m²] of a grain, and T [K]: `theory.kinetics.capture`."""
+        gamma, c = self.exponent.value, self.factor.value
+        return capture(radius, mass, moment, temperature, exponent=gamma, reading="aligned", speed="thermal", c=c)
+
+
+def capture_law(
+    encounters: Sequence[Mapping[str, np.ndarray]], radius: float, mass: float, moment: float, temperature: float
+) -> CaptureLaw:
+    """Fit c and γ of K = c ⟨π b_max² v⟩ with μ = μ₁ N^γ to the hits of populations of equal magnetic grains.
+
+    A draw of a pair hits with the probability K/K̂, so that the likelihood of all hits, a Poisson process, is largest
+    for the γ of the largest Σ_hits ln f − H ln Σ_draws f/K̂ with f(N, N'; γ) ∝ K, and c = H/Σ_draws f/K̂.
+
+    Parameters
+    ----------
+    encounters : sequence of mapping
+        Columns of encounters.csv of each population.
+    radius, mass, moment, temperature : float
+        Of a grain [m], [kg], [A m²], and T [K].
+
+    Raises
+    ------
+    BadInput
+        If there are no moments, or no hits of bodies of different sizes.
+    """
+    if not moment > 0.0:
+        raise BadInput("the law of capture needs grains with a moment")
+    flat = capture(radius, mass, moment, temperature, exponent=0.0, reading="aligned", speed="thermal")
+    parts, sums = [], []
+    for each in encounters:
+        own = each["body1"] != each["body2"]
+        first, second = each["grains1"][own], each["grains2"][own]
+        weight = flat(mass * first, mass * second) / each["kernel"][own]
+        parts.append((np.log(first * second), each["end"][own] == 0, weight))
+        net = capture_sums({name: column[own] for name, column in each.items()}, temperature, mass)
+        sums.append((net.hits.sum(), net.expected.sum()))
+    if not any(np.ptp(size[is_hit]) > 0.0 for size, is_hit, _ in parts if is_hit.any()):
+        raise BadInput("the law of capture needs hits of bodies of different sizes; grow the dust further")
+
+    def fitted(chosen: Sequence[int]) -> tuple[float, float, float]:
+        size, is_hit, weight = (np.concatenate([parts[k][n] for k in chosen]) for n in range(3))
+        hits, expected = (math.fsum(sums[k][n] for k in chosen) for n in range(2))
+        return (*_likeliest(size, is_hit, weight), hits / expected)
+
+    everything = range(len(parts))
+    found = fitted(everything)
+    without = [fitted([k for k in everything if k != left]) for left in everything] if len(parts) > 1 else []
+    ends = [jackknife(value, np.array([one[n] for one in without]))[1:] for n, value in enumerate(found)]
+    return CaptureLaw(*(Interval(value, *end) for value, end in zip(found, ends, strict=True)))
+
+
+def _likeliest(size: np.ndarray, is_hit: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """c and γ; α ∝ (N N')^γ, and f ∝ α^(2/3)."""
+    from scipy.optimize import minimize_scalar
+
+    hits, total = int(is_hit.sum()), float(size[is_hit].sum())
+
+    def expected(exponent: float) -> float:
+        return float((weight * np.exp(2.0 / 3.0 * exponent * size)).sum())
+
+    def loss(exponent: float) -> float:
+        return hits * math.log(expected(exponent)) - 2.0 / 3.0 * exponent * total
+
+    exponent = float(minimize_scalar(loss, bounds=EXPONENTS, method="bounded").x)
+    return hits / expected(exponent), exponent
+
+
+class PopulationKernel(NamedTuple):
+    """Kernel of the populations of a case."""
+
+    kernel: Kernel  # by classes of sizes
+    law: CaptureLaw | None  # None without moments
+    mass: float  # of a grain [kg]
+    time: np.ndarray  # (K,) [s]
+    size: np.ndarray  # (K,) S of the coagulation equation with this kernel
+
+    def table(self) -> CollisionKernel:
+        """K(m1, m2) from the classes, for the coagulation equation and `kernel_table`."""
+        return measured(self.kernel.rows(self.mass, LEAST_DRAWS), extrapolate=True)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of analysis.json; K in m³/s by pairs of classes, None where unknown."""
+        law = self.law and {name: value._asdict() for name, value in self.law._asdict().items()}
+        return {"law": law, "grain_mass": self.mass, "classes": self.rows()}
+
+    def rows(self) -> list[dict[str, Any]]:
+        """K of each pair of classes with hits, which have at least `grains1` and `grains2` grains."""
+        found = self.kernel
+        return [
+            {
+                "grains1": int(found.edges[i]),
+                "grains2": int(found.edges[j]),
+                "mean1": float(found.sizes[i]),
+                "mean2": float(found.sizes[j]),
+                "kernel": float(found.value[i, j]),
+                "error": float(found.error[i, j]),
+                "hits": int(found.hits[i, j]),
+            }
+            for i, j in zip(*np.nonzero(np.triu(found.hits)), strict=True)
+        ]
+
+
+def kernel_of_populations(folders: Sequence[Path]) -> PopulationKernel | None:
+    """Kernel of populations of a case, and S(t) of the coagulation equation with it.
+
+    None for boxes, and for grains that differ in radius, mass, moment or charge: K depends on more than sizes then.
+    """
+    runs = [Run(folder) for folder in folders]
+    if not all(is_dilute(run.case) for run in runs):
+        return None
+    first = runs[0].frames[0]
+    moments = np.linalg.norm(first.moment, axis=1)
+    if any(np.ptp(each) > 1e-6 * np.abs(each).max() for each in (first.radius, first.mass, moments)):
+        return None
+    if np.ptp(np.asarray(getattr(first, "charge", np.zeros(1)))) > 0.0:
+        return None
+    mass, moment, radius = (float(each[0]) for each in (first.mass, moments, first.radius))
+    temperature = si(runs[0].case["grains"]["temperature"], "K", "temperature")
+    encounters = [Grown(folder, "").encounters for folder in folders]
+    law = capture_law(encounters, radius, mass, moment, temperature) if moment > 0.0 else None
+    found = PopulationKernel(kernel_of(encounters), law, mass, np.zeros(0), np.zeros(0))
+    ledgers = [run.ledger for run in runs]
+    density = float(ledgers[0]["clusters"][0] / ledgers[0]["volume"][0])
+    end, largest = (max(float(ledger[name][-1]) for ledger in ledgers) for name in ("time", "mean_cluster_size"))
+    try:
+        grid, times = log_sizes(BEYOND * largest), np.linspace(0.0, end, POINTS)
+        solved = coagulate(found.table(), grid, density, times, mass=mass, accuracy=1e-6)
+    except BadInput:  # fewer than two classes have enough draws
+        return found
+    return found._replace(time=solved.times, size=solved.mean_size)
