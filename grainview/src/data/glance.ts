@@ -21,14 +21,18 @@ function rowAt(times: number[], time: number): number {
   return low;
 }
 
-/** Energy lost by each mechanism since the start, as the ledger has it at the time of the frame. */
+/** Energy lost by each mechanism since the start, as the ledger has it at the time of the frame; gains have no share. */
 function losses(series: Series, time: number, dark: boolean): Shares[] {
   const plot = series.plots.find((p) => p.id === "losses");
   const row = rowAt(series.time, time);
   if (!plot?.lines.length || row < 0) return [];
-  const found = plot.lines.map((line) => (
-    { text: line.label, colour: dark ? line.dark : line.light, size: Math.abs(line.values[row] ?? 0) }
-  )).filter((one) => one.size > 0).sort((a, b) => b.size - a.size);
+  const all = plot.lines.map((line) => (
+    { text: line.label, colour: dark ? line.dark : line.light, size: line.values[row] ?? 0 }
+  ));
+  const found = all.filter((one) => one.size > 0).sort((a, b) => b.size - a.size);
+  const gains = all.filter((one) => one.size < 0).map(({ text, colour, size }) => (
+    { colour, text: `${text}: gained ${quantity(-size, plot.unit, 2)}` }
+  ));
   const total = found.reduce((sum, one) => sum + one.size, 0);
   const rows = found.slice(0, MAX_ROWS).map(({ text, colour, size }) => (
     { colour, text: `${text} ${percent(size / total)}` }
@@ -37,7 +41,7 @@ function losses(series: Series, time: number, dark: boolean): Shares[] {
   return [{
     title: `energy lost: ${quantity(total, plot.unit, 3)}`,
     shares: found.map(({ colour, size }) => ({ colour, share: size / total })),
-    rows: others ? [...rows, { colour: null, text: `others ${percent(others / total)}` }] : rows,
+    rows: [...rows, ...(others ? [{ colour: null, text: `others ${percent(others / total)}` }] : []), ...gains],
   }];
 }
 

@@ -75,7 +75,9 @@ function drawRows(pen: Pen, x: number, y: number, scale: number, rows: Swatch[],
 function drawShares(pen: Pen, x: number, y: number, scale: number, { shares }: Shares, theme: Theme): number {
   if (!shares.length) return 0;
   pen.fillStyle = theme.line;
+  pen.globalAlpha = 0.3;
   pen.fillRect(x, y - 4 * scale, 200 * scale, 10 * scale);
+  pen.globalAlpha = 1;
   let left = x;
   for (const { colour, share } of shares) {
     pen.fillStyle = colour;

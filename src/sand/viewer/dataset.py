@@ -299,13 +299,20 @@ class RunDataset:
                 self._ranges = (count, quantity_ranges(self.frames))
             return self._ranges[1]
 
+    def flux_density(self, time: float) -> Sequence[float] | None:
+        """External flux density [T] at a time [s]; None without a field."""
+        return None if self._field is None else self._field.flux_density(time)
+
     def _field_entry(self, numbers: np.ndarray) -> dict[str, Any] | None:
         if self._field is None or not numbers.size:
             return None
         new_times = self.frames.times[len(self._flux_densities) :]
         self._flux_densities += [[float(b) for b in self._field.flux_density(float(t))] for t in new_times]
         densities = [self._flux_densities[k] for k in numbers.tolist()]
-        sizes, directions = [_rounded(float(np.linalg.norm(b))) for b in densities], [_unit_vector(b) for b in densities]
+        sizes, directions = (
+            [_rounded(float(np.linalg.norm(b))) for b in densities],
+            [_unit_vector(b) for b in densities],
+        )
         entry: dict[str, Any] = {"text": self._field.text, "direction": directions[0], "size": sizes[0]}
         if np.ptp(np.array(directions), axis=0).max() >= DIRECTION_TOLERANCE:
             entry["directions"] = directions
