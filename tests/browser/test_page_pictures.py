@@ -90,12 +90,12 @@ def kept(screen: str, theme: str) -> Image.Image:
 def test_the_page_equals_the_stored_picture(page, address, screen, theme):
     now, path = shot(opened(page, address, screen, theme)), PICTURES / f"page-{screen}-{theme}.png"
     if os.environ.get("SAND_KEEP_PICTURES"):
-        now.quantize(128, dither=Image.Dither.NONE).save(path, optimize=True)
+        now.save(path, optimize=True)
     assert path.stat().st_size < LARGEST
     assert changed(now, kept(screen, theme)) < SHARE
 
 
-CHANGES = {  # in the page
+CHANGES = {
     "the other theme": "app.state.set('theme', 'dark')",
     "no picture": "app.page.canvas.style.visibility = 'hidden'",
     "values over the picture": "Object.assign(app.page.glance.style, { position: 'fixed', left: '30%', top: '30%' })",

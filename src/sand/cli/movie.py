@@ -84,8 +84,9 @@ def write_movie(dataset: Any, target: Path, given: Mapping[str, Any], silent: bo
     BadInput
         If it cannot be written; before a frame is drawn where that is possible.
     """
-    from ..viewer.film import plotted_pictures, write_film
+    from ..viewer.film import write_film
     from ..viewer.headless import page_pictures, why_no_page
+    from .plotted_film import plotted_pictures
 
     size, rate = given["size"] or SIZE, given["fps"] or RATE
     renderer, settings = given["renderer"], given["settings"] or ""

@@ -179,7 +179,8 @@ def test_without_a_browser(tmp_path, monkeypatch, capsys):
         "sand.viewer.headless.why_no_page", lambda: "Playwright is not installed: pip install playwright"
     )
     monkeypatch.setattr(
-        film, "still_picture", lambda frame, size, **_: type("S", (), {"image": lambda _: Image.new("RGB", size)})()
+        "sand.cli.plotted_film.still_picture",
+        lambda frame, size, **_: type("S", (), {"image": lambda _: Image.new("RGB", size)})(),
     )
     path = apart(tmp_path / "run.gsd", [2.0, 3.0])
     words = ["view", str(path), "--movie", str(tmp_path / "a.gif")]
