@@ -45,6 +45,7 @@ CAPABILITIES = {
     "filled again, populations as runs, charges, a field, kernel": 1933,
     "figures in the width and style of a journal, several runs in one figure, s² n_s, stills as outlines, percolating "
     "packings inside the box, shares of each value of a sweep, materials of files in methods": 759,
+    "films of runs by the page in a browser without a window or by the renderer of figures (sand view --movie)": 353,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
