@@ -21,7 +21,7 @@ function rowAt(times: number[], time: number): number {
   return low;
 }
 
-/** Energy lost by each mechanism since the start, as the ledger has it at the time of the frame; gains have no share. */
+/** Energy lost by each mechanism since the start, by the ledger at the time of the frame; gains have no share. */
 function losses(series: Series, time: number, dark: boolean): Shares[] {
   const plot = series.plots.find((p) => p.id === "losses");
   const row = rowAt(series.time, time);
