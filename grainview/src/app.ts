@@ -4,10 +4,12 @@ import { actionsOf } from "./actions";
 import { AddressBar } from "./address";
 import { CameraController } from "./camera";
 import { Frames } from "./data/frames";
-import { awakeGrains, type Dataset, fieldDirection } from "./data/quantities";
+import { type Told, toldOf } from "./data/glance";
+import { awakeGrains, type Dataset } from "./data/quantities";
 import type { Frame, Manifest, Series, Source } from "./data/types";
 import { Exporter } from "./exporter";
-import { headerButtons, type Layout } from "./layout";
+import { Film } from "./film";
+import { headerButtons, type Layout, togglePanel } from "./layout";
 import { appendFrames, type LiveRun, offerChoices, runStatus } from "./live";
 import { type FrameDisplay, FrameNavigation } from "./navigation";
 import { Picture } from "./picture";
@@ -21,7 +23,7 @@ import { openDialog } from "./ui/dialogs";
 import { onClick, replaceKeepingFocus } from "./ui/dom";
 import { Inspector } from "./ui/inspector";
 import { type Action, Keys } from "./ui/keys";
-import { legend } from "./ui/legend";
+import { legend, sharesOf } from "./ui/legend";
 import { Note } from "./ui/note";
 import { Overlay } from "./ui/overlay";
 import { Panel } from "./ui/panel";
@@ -52,6 +54,7 @@ export class App implements FrameDisplay, LiveRun {
   readonly keys: Keys;
   readonly camera: CameraController;
   readonly exporter: Exporter;
+  readonly film: Film;
   readonly note: Note;
   private readonly address: AddressBar | null;
 
@@ -92,16 +95,17 @@ export class App implements FrameDisplay, LiveRun {
     this.camera = new CameraController(stage, this.picture, this.selection);
     this.exporter = new Exporter({
       root: page.root, world: this.world, manifest: dataset.manifest, settings: state, picture: this.picture,
-      playback: { stop: () => this.player.stop(), go }, isDark: () => isDark(state),
-      notify: (message) => this.notify(message),
+      playback: { stop: () => this.player.stop(), go }, isDark: () => isDark(state), told: () => this.told(),
+      notify: this.notify,
     });
+    this.film = new Film(this);
     this.address = ownsAddress
       ? new AddressBar(state, (text) => void this.applyAddress(text), (message) => this.note.showBriefly(message))
       : null;
     this.panel = new Panel(state);
     const commands = {
       help: () => void openDialog(page.root, "Keys and help", ...this.keys.help()),
-      togglePanel: () => this.togglePanel(),
+      togglePanel: () => togglePanel(page),
       copyAddress: this.address && ((): void => void this.address?.copy()),
     };
     const { camera, selection, exporter } = this;
@@ -126,27 +130,21 @@ export class App implements FrameDisplay, LiveRun {
     return this.dataset.manifest;
   }
 
-  get isConnected(): boolean {
-    return this.page.root.isConnected;
-  }
-
   private fillPage(): void {
-    const { page } = this;
+    const { page, manifest } = this;
     page.root.dataset.lmSuppressShortcuts = "true"; // JupyterLab turns its shortcuts off while the page has the focus
-    page.title.textContent = this.manifest.name;
-    page.view.append(this.overlay.element, this.inspector.element);
-    page.side.append(this.panel.element);
+    page.title.textContent = manifest.name;
+    page.view.append(this.overlay.element);
+    page.side.append(this.inspector.element, this.panel.element);
     page.bottom.append(this.timeline.element, this.plot.element);
-    this.timeline.setFrames(this.manifest.times, this.series.events);
-    this.showStatus();
-    if (page.root.clientWidth < NARROW || page.root.clientHeight < LOW) this.togglePanel();
+    this.timeline.setFrames(manifest.times, this.series.events);
+    page.status.textContent = page.status.title = runStatus(manifest);
+    if (page.root.clientWidth < NARROW || page.root.clientHeight < LOW) togglePanel(page);
   }
 
   private connectStage(): void {
-    const { stage, page, state } = this;
-    const resize = (): void => stage.resize(page.view.clientWidth, page.view.clientHeight);
-    new ResizeObserver(resize).observe(page.view);
-    resize();
+    const { stage, state } = this;
+    stage.fill(this.page.view);
     const drawWorld = stage.onDraw;
     stage.onDraw = () => {
       drawWorld();
@@ -224,15 +222,24 @@ export class App implements FrameDisplay, LiveRun {
     this.world.setTheme(dark ? DARK : LIGHT);
     this.timeline.drawTicks();
     this.showPlot();
+    this.showTold();
+  }
+
+  /** What is told of the frame as a whole. */
+  private told(): Told {
+    return toldOf(this.dataset, this.series, this.picture.frame, isDark(this.state));
+  }
+
+  private showTold(): void {
+    const { glance, directions } = this.told();
+    this.overlay.directions = directions;
+    this.page.glance.replaceChildren(...sharesOf(glance));
+    this.page.glance.hidden = !glance.length;
   }
 
   private showPlot(): void {
     const plot = this.series.plots.find((p) => p.id === this.state.get("plot")) ?? this.series.plots[0];
     if (plot) this.plot.show(this.series, plot, isDark(this.state));
-  }
-
-  private showStatus(): void {
-    this.page.status.textContent = this.page.status.title = runStatus(this.manifest);
   }
 
   showFrame(k: number, frame: Frame): void {
@@ -258,7 +265,7 @@ export class App implements FrameDisplay, LiveRun {
     if (!picture.frame) return;
     picture.update(this.player.playing);
     this.stage.reach = picture.reachFrom(this.stage.look.target);
-    this.overlay.field = fieldDirection(this.manifest, picture.frame.frame);
+    this.showTold();
     this.selection.show();
     replaceKeepingFocus(this.page.legend, legend(picture.key, (grain) => this.selection.selectGrain(grain)));
     const scaled = picture.quantity.kind === "sequential";
@@ -268,28 +275,21 @@ export class App implements FrameDisplay, LiveRun {
 
   /** Add new frames of a running simulation; advance to the newest if the last one is shown and "live" is set. */
   append(more: Manifest, series: Series): void {
-    const { manifest, state, picture, player } = this;
+    const { manifest, page, state, picture, player } = this;
     const atEnd = state.number("frame") >= manifest.times.length - 1;
     appendFrames(manifest, more);
     this.series = series;
     for (const id of offerChoices(state, this.dataset, series)) this.panel.refill(id);
     this.timeline.setFrames(manifest.times, series.events);
     this.showPlot();
-    this.showStatus();
+    page.status.textContent = page.status.title = runStatus(manifest);
     const advance = atEnd && state.get<boolean>("live") && !player.playing && !this.exporter.busy;
     if (advance) void this.navigation.go(Infinity);
     else if (picture.frame) this.timeline.show(picture.frame.frame, picture.frame.step, awakeGrains(picture.frame));
     if (!advance && !player.playing) this.refresh(); // the ranges of the colour scales may have changed
   }
 
-  notify(message: string): void {
-    this.note.show(message);
-  }
-
-  private togglePanel(): void {
-    const hidden = this.page.root.classList.toggle("gv-panel-hidden");
-    this.page.header.querySelector(".gv-shows-panel")?.setAttribute("aria-expanded", String(!hidden));
-  }
+  readonly notify = (message: string): void => this.note.show(message);
 
   dispose(): void {
     this.player.stop();

@@ -1,5 +1,6 @@
 // Saving pictures and movies: the dialog, drawing of the frames, and the download.
 
+import type { Told } from "./data/glance";
 import type { KeyPart } from "./data/key";
 import type { Frame, Manifest } from "./data/types";
 import { quantity } from "./data/units";
@@ -20,6 +21,7 @@ export interface ExportContext {
   picture: { readonly frame: Frame | null; readonly key: KeyPart[]; complete: boolean };
   playback: { stop(): void; go(frame: number): Promise<void> };
   isDark: () => boolean;
+  told: () => Told;
   notify: Notify;
 }
 
@@ -72,22 +74,24 @@ export class Exporter {
     }
   }
 
-  image(request: ExportRequest): Promise<Blob> {
+  /** @param withTold write what is told of the frame as a whole, too */
+  image(request: ExportRequest, withTold = false): Promise<Blob> {
     const write = request.caption
-      ? (pen: CanvasRenderingContext2D): void => this.write(pen, !request.transparent)
+      ? (pen: CanvasRenderingContext2D): void => this.write(pen, !request.transparent, withTold)
       : null;
     return renderPng(this.context.world, { ...request, dark: this.context.isDark(), write });
   }
 
   /** Write time, legend and scale bar on a copy of the canvas. */
-  private write(pen: CanvasRenderingContext2D, halo: boolean): void {
-    const { picture, manifest, world: { stage }, isDark } = this.context;
+  private write(pen: CanvasRenderingContext2D, halo: boolean, withTold = false): void {
+    const { picture, manifest, world: { stage }, isDark, told } = this.context;
     const { width, height } = pen.canvas;
     const maxLength = Math.min(140 * captionScale(width, height), 0.25 * width) * (stage.width / width);
     const bar = lengthBar(stage, manifest.unit, maxLength);
     bar.pixels *= width / stage.width; // the canvas of a movie has device pixels
     const time = `t = ${quantity(picture.frame?.time ?? NaN, "s")}`;
-    writeCaption(pen, { time, key: picture.key, bar, theme: isDark() ? DARK : LIGHT, halo });
+    const caption = { time, key: picture.key, bar, theme: isDark() ? DARK : LIGHT, halo };
+    writeCaption(pen, withTold ? { ...caption, ...told() } : caption, stage);
   }
 
   /** A canvas from which a movie is recorded; `copy` draws the current canvas and the caption on it. */

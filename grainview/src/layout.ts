@@ -9,10 +9,11 @@ export interface Layout {
   title: HTMLElement;
   status: HTMLElement;
   canvas: HTMLCanvasElement;
-  view: HTMLElement; // canvas with inspector and overlay
+  view: HTMLElement; // canvas with overlay
   legend: HTMLElement; // over the canvas, or beside it on a small screen
   bottom: HTMLElement;
-  side: HTMLElement;
+  side: HTMLElement; // what is told of the frame and of the selection, and the settings
+  glance: HTMLElement;
   note: HTMLElement;
 }
 
@@ -26,11 +27,18 @@ export function layout(parent: HTMLElement): Layout {
   const view = h("div", { class: "gv-view" }, canvas, note);
   const scene = h("div", { class: "gv-scene" }, view, legend);
   const bottom = h("div", { class: "gv-bottom" });
-  const side = h("div", { class: "gv-side" });
+  const glance = h("section", { class: "gv-glance", "aria-label": "Frame" });
+  const side = h("div", { class: "gv-side" }, glance);
   const header = h("header", {}, h("div", { class: "gv-names" }, title, status));
   const root = h("div", { class: "gv", tabindex: -1 }, header, h("main", {}, scene, side), bottom);
   parent.replaceChildren(root);
-  return { root, header, title, status, canvas, view, legend, bottom, side, note };
+  return { root, header, title, status, canvas, view, legend, bottom, side, glance, note };
+}
+
+/** Show or hide the settings. */
+export function togglePanel({ root, header }: Layout): void {
+  const hidden = root.classList.toggle("gv-panel-hidden");
+  header.querySelector(".gv-shows-panel")?.setAttribute("aria-expanded", String(!hidden));
 }
 
 /** Show an error message in place of the page. */

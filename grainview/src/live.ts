@@ -12,8 +12,8 @@ const MAX_FAILURES = 5;
 /** The page, as polling needs it. */
 export interface LiveRun {
   readonly manifest: Manifest;
-  /** False once the page has been removed from its document. */
-  readonly isConnected: boolean;
+  /** The page; it is not connected once it has been removed from its document. */
+  readonly page: { readonly root: { readonly isConnected: boolean } };
   /** Add the frames of a partial manifest, and replace the series. */
   append(more: Manifest, series: Series): void;
   notify(message: string): void;
@@ -47,7 +47,7 @@ export function runStatus(manifest: Manifest): string {
 export function appendFrames(manifest: Manifest, more: Manifest): void {
   manifest.times.push(...more.times);
   manifest.steps.push(...more.steps);
-  if (manifest.field && more.field?.directions) manifest.field.directions = more.field.directions;
+  if (manifest.field && more.field) Object.assign(manifest.field, more.field);
   const { running, outcome, note, bytes, ranges } = more;
   Object.assign(manifest, { running, outcome, note, bytes, ranges });
 }
@@ -57,7 +57,7 @@ export async function pollRun(run: LiveRun, source: Pick<Source, "manifest" | "s
   let failures = 0;
   while (run.manifest.running) {
     await new Promise((resolve) => setTimeout(resolve, 1000 * INTERVAL));
-    if (!run.isConnected) return;
+    if (!run.page.root.isConnected) return;
     try {
       const more = await source.manifest(run.manifest.times.length);
       if (more.generation !== run.manifest.generation) {

@@ -5,7 +5,7 @@ export type Value = number | boolean | string;
 export interface Setting {
   id: string;
   label: string;
-  group: "Colour" | "Show" | "Contacts" | "Camera" | "Time" | "";
+  group: "Picture" | "Colour" | "Show" | "Camera" | "Time" | ""; // those of Picture are never folded
   kind: "toggle" | "choice" | "range" | "number" | "hidden";
   initial: Value;
   options?: [value: string, label: string][];
@@ -18,7 +18,10 @@ export interface Setting {
 }
 
 const SETTINGS: Setting[] = [
-  { id: "colour", label: "Colour by", group: "Colour", kind: "choice", initial: "cluster", options: [], key: "c" },
+  { id: "colour", label: "Colour by", group: "Picture", kind: "choice", initial: "cluster", options: [], key: "c" },
+  { id: "bonds", label: "Contacts", group: "Picture", kind: "choice", initial: "plain", key: "b",
+    options: [["off", "hidden"], ["plain", "plain"], ["load", "by normal force"], ["mode", "by limit reached"]] },
+  { id: "plot", label: "Plot", group: "Picture", kind: "choice", initial: "", options: [], key: "p" },
   { id: "palette", label: "Colour scale", group: "Colour", kind: "choice", initial: "", options: [] },
   { id: "log", label: "Logarithmic", group: "Colour", kind: "toggle", initial: false, key: "q" },
   { id: "low", label: "Minimum", group: "Colour", kind: "number", initial: NaN },
@@ -36,9 +39,7 @@ const SETTINGS: Setting[] = [
     key: "t", down: "T" },
   { id: "shade", label: "Shading and haze", group: "Show", kind: "range", initial: 0.5, from: 0, to: 1, by: 0.1,
     key: "h", down: "H" },
-  { id: "bonds", label: "Contacts", group: "Contacts", kind: "choice", initial: "plain", key: "b",
-    options: [["off", "hidden"], ["plain", "plain"], ["load", "by normal force"], ["mode", "by limit reached"]] },
-  { id: "bar", label: "Thickness", group: "Contacts", kind: "range", initial: 0.45, from: 0.05, to: 0.8, by: 0.05,
+  { id: "bar", label: "Contact thickness", group: "Show", kind: "range", initial: 0.45, from: 0.05, to: 0.8, by: 0.05,
     key: "}", down: "{" },
   { id: "ortho", label: "Orthographic", group: "Camera", kind: "toggle", initial: false, key: "o" },
   { id: "follow", label: "Follow the selected cluster", group: "Camera", kind: "toggle", initial: false, key: "g" },
@@ -47,7 +48,6 @@ const SETTINGS: Setting[] = [
     key: "+", down: "-" },
   { id: "loop", label: "Loop", group: "Time", kind: "toggle", initial: false, key: "l" },
   { id: "live", label: "Advance with the run", group: "Time", kind: "toggle", initial: true, key: "a" },
-  { id: "plot", label: "Plot", group: "Time", kind: "choice", initial: "", options: [], key: "p" },
   { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0, from: 0 },
   { id: "grain", label: "Selected grain", group: "", kind: "hidden", initial: -1, from: -1 },
   // "i-j": both grains; one or two grains; ten numbers (scene/look.ts)

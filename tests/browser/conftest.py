@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import pytest
@@ -102,9 +102,9 @@ def view(tab: Driven) -> Driven:
     return tab
 
 
-def page_of(browser: Browser) -> Iterator[Page]:
-    """Implementation of the fixture `page`."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
+def page_of(browser: Browser, **options: Any) -> Iterator[Page]:
+    """Implementation of the fixture `page`; `options` of the browser's context."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, **options)
     context.set_default_timeout(PATIENCE)
     tab = context.new_page()
     errors: list[str] = []

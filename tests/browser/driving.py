@@ -33,9 +33,11 @@ CANVAS = """() => document.querySelector("canvas.gv-canvas").toDataURL("image/pn
 
 
 @contextmanager
-def served(folder: Path, field: Any = FIELD) -> Iterator[Server]:
-    """A server of the run."""
-    server = Server(run_dataset(folder, field))
+def served(folder: Path, field: Any = FIELD, frames: slice = slice(None)) -> Iterator[Server]:
+    """A server of the run, or of some of its frames."""
+    dataset = run_dataset(folder, field)
+    dataset.select(frames)
+    server = Server(dataset)
     server.start()
     try:
         yield server
@@ -113,7 +115,10 @@ class Driven:
         self.settle()
 
     def control(self, setting: str) -> Locator:
-        """The form element of a setting."""
+        """The form element of a setting; its group is unfolded."""
+        self.tab.evaluate(
+            "() => document.querySelectorAll('.gv-panel details').forEach((part) => { part.open = true; })"
+        )
         return self.tab.locator(f"#gv-{setting}")
 
     def look(self) -> dict[str, Any]:

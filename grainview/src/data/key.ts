@@ -19,6 +19,13 @@ export interface Bar {
   numbers: string[];
 }
 
+/** A bar divided into shares of a whole; what they leave is empty. */
+export interface Shares {
+  title: string;
+  shares: { colour: string; share: number }[];
+  rows: Swatch[];
+}
+
 export type KeyPart = Bar | { title: string; rows: Swatch[] };
 
 const MAX_CLUSTERS = 6; // rows for clusters

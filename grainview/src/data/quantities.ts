@@ -57,6 +57,11 @@ export function fieldDirection(manifest: Manifest, frame: number): number[] | nu
   return field?.directions?.[frame] ?? field?.direction ?? null;
 }
 
+/** The flux density of the magnetic field in a frame [T], or null. */
+export function fieldSize({ field }: Manifest, frame: number): number | null {
+  return field?.sizes?.[frame] ?? field?.size ?? null;
+}
+
 function kineticEnergy(frame: Frame, { grains, manifest }: Dataset): Float32Array {
   const out = new Float32Array(grains.mass.length);
   for (let i = 0; i < out.length; i++) {

@@ -5,6 +5,9 @@ export type Colour3 = [number, number, number];
 export interface Field {
   text: string;
   direction?: number[];
+  /** Flux density [T] at the first frame; of each frame, if it varies. */
+  size?: number;
+  sizes?: number[];
   directions?: number[][];
 }
 

@@ -109,6 +109,13 @@ export class Stage {
     this.onLook();
   }
 
+  /** Have the size of an element, also when it changes. */
+  fill(element: HTMLElement): void {
+    const resize = (): void => this.resize(element.clientWidth, element.clientHeight);
+    new ResizeObserver(resize).observe(element);
+    resize();
+  }
+
   resize(width: number, height: number): void {
     if (width < 1 || height < 1) return;
     [this.width, this.height] = [width, height];

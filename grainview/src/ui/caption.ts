@@ -1,6 +1,8 @@
 // The caption of saved pictures and movies: time, legend and scale bar.
 
-import type { Bar, KeyPart } from "../data/key";
+import { FIELD, MOMENT } from "../data/glance";
+import type { Bar, KeyPart, Shares, Swatch } from "../data/key";
+import { armsOf, type DirectedView, type Directions } from "../scene/directions";
 import type { Theme } from "../scene/world";
 import type { LengthBar } from "./overlay";
 
@@ -9,6 +11,8 @@ export interface Caption {
   key: KeyPart[];
   bar: LengthBar;
   theme: Theme;
+  glance?: Shares[]; // what is told of the frame as a whole, at the upper right
+  directions?: Directions; // axes, field and net moment, at the lower left
   halo: boolean; // outline around letters, so that they can be read in front of grains
 }
 
@@ -52,34 +56,70 @@ function drawBar(pen: Pen, x: number, y: number, scale: number, part: Bar, capti
   return 30 * scale;
 }
 
-/** Time and legend, downwards from the upper left corner. */
-function drawKey(pen: Pen, scale: number, caption: Caption): void {
-  const x = 14 * scale;
-  let y = 20 * scale;
-  pen.textAlign = "left";
-  font(pen, scale, true);
-  write(pen, caption.time, x, y, scale, caption);
-  y += 26 * scale;
-  for (const part of caption.key) {
+/** Rows with dots, downwards from y; returns their height. */
+function drawRows(pen: Pen, x: number, y: number, scale: number, rows: Swatch[], caption: Caption): number {
+  rows.forEach(({ colour, text }, k) => {
+    const middle = y + (5 + 20 * k) * scale;
+    if (colour !== null) {
+      pen.fillStyle = colour;
+      pen.beginPath();
+      pen.arc(x + 5.5 * scale, middle, 5.5 * scale, 0, 2 * Math.PI);
+      pen.fill();
+    }
+    write(pen, text, x + (colour === null ? 0 : 17 * scale), middle, scale, caption);
+  });
+  return 20 * rows.length * scale;
+}
+
+/** A bar of shares; returns its height. */
+function drawShares(pen: Pen, x: number, y: number, scale: number, { shares }: Shares, theme: Theme): number {
+  if (!shares.length) return 0;
+  pen.fillStyle = theme.line;
+  pen.globalAlpha = 0.3;
+  pen.fillRect(x, y - 4 * scale, 200 * scale, 10 * scale);
+  pen.globalAlpha = 1;
+  let left = x;
+  for (const { colour, share } of shares) {
+    pen.fillStyle = colour;
+    pen.fillRect(left, y - 4 * scale, 200 * scale * share, 10 * scale);
+    left += 200 * scale * share;
+  }
+  return 14 * scale;
+}
+
+/** Parts of a legend, downwards from a point. */
+function drawParts(pen: Pen, x: number, y: number, scale: number, parts: (KeyPart | Shares)[], caption: Caption): void {
+  for (const part of parts) {
     font(pen, scale, true);
     write(pen, part.title, x, y, scale, caption);
     font(pen, scale);
     y += 14 * scale;
-    if ("bar" in part) {
-      y += drawBar(pen, x, y, scale, part, caption);
-    } else {
-      for (const { colour, text } of part.rows) {
-        if (colour !== null) {
-          pen.fillStyle = colour;
-          pen.beginPath();
-          pen.arc(x + 5.5 * scale, y + 5 * scale, 5.5 * scale, 0, 2 * Math.PI);
-          pen.fill();
-        }
-        write(pen, text, x + (colour === null ? 0 : 17 * scale), y + 5 * scale, scale, caption);
-        y += 20 * scale;
-      }
+    if ("bar" in part) y += drawBar(pen, x, y, scale, part, caption);
+    else {
+      if ("shares" in part) y += drawShares(pen, x, y, scale, part, caption.theme);
+      y += drawRows(pen, x, y, scale, part.rows, caption);
     }
     y += 14 * scale;
+  }
+}
+
+function drawDirections(pen: Pen, scale: number, caption: Caption, view: DirectedView): void {
+  if (!caption.directions) return;
+  const { theme } = caption;
+  const colours = { "": theme.line, field: FIELD[Number(theme.dark)], moment: MOMENT[Number(theme.dark)] };
+  pen.textAlign = "center";
+  for (const { kind, name, from, to, label, head } of armsOf(view, caption.directions, scale)) {
+    pen.strokeStyle = pen.fillStyle = colours[kind];
+    pen.lineWidth = 1.6 * scale;
+    pen.beginPath();
+    pen.moveTo(...from);
+    pen.lineTo(...to);
+    pen.stroke();
+    pen.beginPath();
+    for (const corner of head) pen.lineTo(...corner);
+    pen.fill();
+    font(pen, 0.92 * scale, kind !== "");
+    write(pen, name, ...label, scale, { ...caption, theme: { ...theme, ink: colours[kind] } });
   }
 }
 
@@ -101,9 +141,15 @@ function drawScaleBar(pen: Pen, scale: number, caption: Caption): void {
   write(pen, caption.bar.text, right, bottom - 12 * scale, scale, caption);
 }
 
-/** Draw the caption on a picture. */
-export function writeCaption(pen: Pen, caption: Caption): void {
+/** Draw the caption on a picture of a view. */
+export function writeCaption(pen: Pen, caption: Caption, view: DirectedView): void {
   const scale = captionScale(pen.canvas.width, pen.canvas.height);
-  drawKey(pen, scale, caption);
+  const x = 14 * scale;
+  pen.textAlign = "left";
+  font(pen, scale, true);
+  write(pen, caption.time, x, 20 * scale, scale, caption);
+  drawParts(pen, x, 46 * scale, scale, caption.key, caption);
+  drawParts(pen, pen.canvas.width - 214 * scale, 20 * scale, scale, caption.glance ?? [], caption);
+  drawDirections(pen, scale, caption, view);
   drawScaleBar(pen, scale, caption);
 }

@@ -1,6 +1,6 @@
 // The legend on the page: a colour bar with range and unit, or a list of names.
 
-import type { KeyPart, Swatch } from "../data/key";
+import type { KeyPart, Shares, Swatch } from "../data/key";
 import { h } from "./dom";
 
 function bar(colours: string[], numbers: string[]): HTMLElement[] {
@@ -15,6 +15,20 @@ function row({ colour, text, grain }: Swatch, select: (grain: number) => void): 
   dot.style.background = colour;
   const attributes = { type: "button", title: "select this cluster", click: () => select(grain ?? -1) };
   return h("li", {}, dot, grain === undefined ? text : h("button", attributes, text));
+}
+
+/** Elements of what is told of the frame as a whole: a title, a bar of shares, and rows. */
+export function sharesOf(parts: Shares[]): HTMLElement[] {
+  return parts.map(({ title, shares, rows }) => {
+    const bar = h("div", { class: "gv-shares" }, ...shares.map(({ colour, share }) => {
+      const piece = h("span", {});
+      piece.style.background = colour;
+      piece.style.width = `${100 * share}%`;
+      return piece;
+    }));
+    const list = h("ul", {}, ...rows.map((swatch) => row(swatch, () => undefined)));
+    return h("div", {}, h("div", { class: "gv-glance-title" }, title), ...(shares.length ? [bar] : []), list);
+  });
 }
 
 /** Elements of the legend; a click on a row of a cluster selects it. */

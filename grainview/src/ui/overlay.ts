@@ -1,10 +1,8 @@
 // Overlay of the canvas: axes, direction of the magnetic field, scale bar, measured distance.
 
-import * as three from "three";
 import { quantity } from "../data/units";
+import { type Arm, armsOf, type DirectedView, type Directions } from "../scene/directions";
 import { svg } from "./dom";
-
-const ARM = 26; // length of the axes [pixels]
 
 /** Scale of the view. */
 export interface ViewScale {
@@ -13,10 +11,8 @@ export interface ViewScale {
 }
 
 /** Projection of the scene on the canvas. */
-export interface Projection extends ViewScale {
+export interface Projection extends ViewScale, DirectedView {
   readonly width: number;
-  readonly height: number;
-  readonly camera: { readonly matrixWorldInverse: three.Matrix4 };
   screenOf(position: ArrayLike<number>): [number, number, number] | null;
 }
 
@@ -42,7 +38,7 @@ export function lengthBar(view: ViewScale, unit: number, max: number): LengthBar
 export class Overlay {
   readonly element = svg("svg", { class: "gv-overlay", "aria-hidden": "true" });
   measured: [number[], number[], string] | null = null;
-  field: number[] | null = null;
+  directions: Directions = { field: null, moment: null };
   axes = true;
 
   constructor(
@@ -52,31 +48,19 @@ export class Overlay {
 
   draw(): void {
     const elements: SVGElement[] = [];
-    if (this.axes) elements.push(...this.triad());
+    if (this.axes) elements.push(...armsOf(this.view, this.directions).flatMap((arm) => this.arm(arm)));
     elements.push(...this.scaleBar(), ...this.ruler());
     this.element.replaceChildren(...elements);
   }
 
-  /** Projection of a direction: components to the right and down. */
-  private projected(direction: number[]): [number, number] {
-    const size = Math.hypot(...direction);
-    const v = new three.Vector3(...direction).transformDirection(this.view.camera.matrixWorldInverse);
-    return [size * v.x, -size * v.y];
-  }
-
-  private axis(x: number, y: number, direction: number[], name: string, kind: string): SVGElement[] {
-    const [dx, dy] = this.projected(direction);
-    const line = svg("line", { x1: x, y1: y, x2: x + ARM * dx, y2: y + ARM * dy, class: `gv-axis ${kind}` });
-    const text = svg("text", { x: x + (ARM + 9) * dx, y: y + (ARM + 9) * dy + 4, class: `gv-axis-name ${kind}` });
+  private arm({ kind, name, from, to, label, head }: Arm): SVGElement[] {
+    const own = kind && `gv-${kind}`;
+    const line = svg("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], class: `gv-axis ${own}` });
+    const text = svg("text", { x: label[0], y: label[1] + 4, class: `gv-axis-name ${own}` });
     text.textContent = name;
-    return [line, text];
-  }
-
-  private triad(): SVGElement[] {
-    const [x, y] = [44, this.view.height - 44];
-    const axes = ["x", "y", "z"].flatMap((name, a) => this.axis(x, y, [0, 1, 2].map((b) => Number(a === b)), name, ""));
-    if (this.field) axes.push(...this.axis(x, y, this.field.map((v) => 1.6 * v), "B", "gv-field"));
-    return axes;
+    if (!kind) return [line, text];
+    const dot = svg("circle", { cx: from[0], cy: from[1], r: 2, class: `gv-head ${own}` });
+    return [line, dot, svg("polygon", { points: head.flat().join(" "), class: `gv-head ${own}` }), text];
   }
 
   private scaleBar(): SVGElement[] {

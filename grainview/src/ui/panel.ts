@@ -3,7 +3,8 @@
 import type { Setting, Settings } from "../state";
 import { h } from "./dom";
 
-const GROUPS = ["Colour", "Show", "Contacts", "Camera", "Time"];
+/** The first group is always open, the others are folded until they are asked for. */
+const GROUPS = ["Picture", "Colour", "Show", "Camera", "Time"];
 
 /** Settings that controls show and change. */
 export interface ControlledSettings extends Settings {
@@ -18,7 +19,9 @@ export class Panel {
 
   constructor(private readonly settings: ControlledSettings) {
     for (const group of GROUPS) {
-      const part = h("fieldset", {}, h("legend", {}, group));
+      const part = group === GROUPS[0]
+        ? h("div", { role: "group", "aria-label": group, class: "gv-group" })
+        : h("details", { "aria-label": group, class: "gv-group" }, h("summary", {}, group));
       for (const setting of settings.settings.filter((s) => s.group === group && s.kind !== "hidden")) {
         if (setting.kind === "choice" && !setting.options?.length) continue;
         const row = this.row(setting);

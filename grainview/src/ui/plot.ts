@@ -5,9 +5,9 @@ import type { Plot, Series } from "../data/types";
 import { digits, prefixed } from "../data/units";
 import { h } from "./dom";
 
-/** Values of the lines; on a logarithmic axis without zeros and negative values. */
+/** Values of the lines; on a logarithmic axis magnitudes without zeros. */
 function drawable(plot: Plot): (number | null)[][] {
-  return plot.lines.map((line) => (plot.log ? line.values.map((v) => (v !== null && v > 0 ? v : null)) : line.values));
+  return plot.lines.map((line) => (plot.log ? line.values.map((v) => (v ? Math.abs(v) : null)) : line.values));
 }
 
 function largest(lines: (number | null)[][]): number {

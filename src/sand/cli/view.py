@@ -15,7 +15,7 @@ import click
 from ..basics.errors import BadInput
 from ..config.folders import without_run
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY, holds_sweep
-from . import options, parsing, report
+from . import movie, options, parsing, report
 
 WAIT = 60.0
 """Longest wall time [s] to wait for the first frame of a run, which may have to compile first."""
@@ -23,11 +23,14 @@ YOUNG = 5.0
 """Age [s] of a trajectory up to which its first frame may still be missing."""
 
 
-@parsing.command("view", short_help="Show the grains of a run in the browser.")
+@parsing.command(
+    "view", short_help="Show the grains of a run in the browser, or write a page or a film.", check=movie.check
+)
 @click.argument("folder", metavar="DIR", type=options.RUN)
 @click.option(
     "--html", "html", metavar="FILE", type=options.FILE, help="Write one self-contained page instead, to keep or send."
 )
+@movie.movie_options
 @click.option("--every", metavar="K", type=options.WholeNumber(min=1), default=1, help="Only every K-th frame.")
 @options.frames
 @click.option(
@@ -54,12 +57,17 @@ def command(
 
     New frames of a running simulation appear as they are written; if there is none yet, the first one is waited for.
     The page can be opened on this machine only; Ctrl-C ends the server.
+
+    A film shows all frames, or those of --frames and --every, in the view that contains all grains. For another one,
+    set up the page, copy its address (key j) and give it to --settings.
     """
     from ..viewer.html import frame_slice, write_page
 
-    target = None if html is None else Path(html)
+    of_film = {name: how.pop(name) for name in ("movie", *movie.OF_FILMS)}
+    is_film = of_film["movie"] is not None
+    target = Path(of_film["movie"]) if is_film else None if html is None else Path(html)
     if target is not None:
-        _refuse_target(target, overwrite)
+        _refuse_target(target, overwrite, of_film if is_film else None)
     selection = frame_slice(frames, every)
     silent, given = how["quiet"] or how["as_json"], {name: how.pop(name) for name in options.READING}
     dataset = _open_dataset(Path(folder), given, verbose=not silent)
@@ -70,6 +78,16 @@ def command(
         dataset.select(selection, ", ".join(parts))
     if target is None:
         _serve(dataset, folder, port, not no_browser, as_json=how["as_json"], silent=silent)
+        return
+    if is_film:
+        told = movie.write_movie(dataset, target, of_film, silent)
+        rows = [
+            ("file", str(target)),
+            ("frames", f"{told['frames']}, {told['fps']} per second"),
+            ("size", f"{told['bytes'] / 1e6:.3g} MB"),
+        ]
+        rows += [("picture", "{} x {} pixels".format(*told["size"])), ("drawn by", told["renderer"])]
+        report.answer(told, f"view {folder}", rows, **how)
         return
     with report.progress_bar(len(dataset), silent, desc=report.clean(target.name), unit="frame") as bar:
         size = write_page(dataset, target, progress=bar.update)
@@ -130,14 +148,19 @@ def _is_beginning(path: Path, seen_before: bool) -> bool:
     return seen_before and age < YOUNG
 
 
-def _refuse_target(target: Path, overwrite: bool) -> None:
-    """Raise BadInput if the file exists, or its folder does not."""
+def _refuse_target(target: Path, overwrite: bool, of_film: Mapping[str, Any] | None) -> None:
+    """Raise BadInput if the file exists, its folder does not, or a film of this kind cannot be written."""
+    option, example = ("--html", "view.html") if of_film is None else ("--movie", "film.mp4")
     if target.is_dir():
-        raise BadInput(f"{target} is a folder; give --html the name of a file, such as {target / 'view.html'}")
-    if target.suffix.lower() not in (".html", ".htm"):
+        raise BadInput(f"{target} is a folder; give {option} the name of a file, such as {target / example}")
+    if of_film is not None:
+        from ..viewer.film import check_film
+
+        check_film(target, of_film["size"] or movie.SIZE)
+    elif target.suffix.lower() not in (".html", ".htm"):
         raise BadInput(f"--html {target}: the name of a page must end in .html or .htm, such as {target.stem}.html")
     if target.exists() and not overwrite:
-        raise BadInput(f"{target} exists; give another --html, or --overwrite")
+        raise BadInput(f"{target} exists; give another {option}, or --overwrite")
     if not target.parent.is_dir():
         raise BadInput(f"there is no folder {target.parent}; make it first")
 

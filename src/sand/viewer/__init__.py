@@ -1,1 +1,1 @@
-"""Interactive viewer: data of a run, HTTP server, single-file page, notebook widget."""
+"""Interactive viewer: data of a run, HTTP server, single-file page, notebook widget, films."""

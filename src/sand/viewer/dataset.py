@@ -34,7 +34,7 @@ MAX_TRACKED = 8_000_000
 REQUESTS = {"manifest": ("since",), "grains": (), "series": (), "frame": ("k",), "dimension": ("k", "grain")}
 """Requests of the page, and the names of the numbers in them."""
 DIRECTION_TOLERANCE = 1e-9
-"""Field directions that differ by less count as constant."""
+"""Field directions, and relative magnitudes, that differ by less count as constant."""
 
 
 class RunDataset:
@@ -93,7 +93,7 @@ class RunDataset:
         self._lineage = Lineage(self.grains_count, self.frames.pairs)
         self._largest: dict[str, int] | None = None
         self._ranges: tuple[int, dict[str, list[float]]] | None = None
-        self._directions: list[list[float]] = []
+        self._flux_densities: list[list[float]] = []
         self._generation = self.frames.generation
         self._selection = _absolute_slice(self._requested, len(self.frames))
 
@@ -299,15 +299,26 @@ class RunDataset:
                 self._ranges = (count, quantity_ranges(self.frames))
             return self._ranges[1]
 
+    def flux_density(self, time: float) -> Sequence[float] | None:
+        """External flux density [T] at a time [s]; None without a field."""
+        return None if self._field is None else self._field.flux_density(time)
+
     def _field_entry(self, numbers: np.ndarray) -> dict[str, Any] | None:
         if self._field is None or not numbers.size:
             return None
-        new_times = self.frames.times[len(self._directions) :]
-        self._directions += [_unit_vector(self._field.flux_density(float(t))) for t in new_times]
-        directions = [self._directions[k] for k in numbers.tolist()]
-        constant = np.ptp(np.array(directions), axis=0).max() < DIRECTION_TOLERANCE
-        entry: dict[str, Any] = {"text": self._field.text, "direction": directions[0]}
-        return entry if constant else entry | {"directions": directions}
+        new_times = self.frames.times[len(self._flux_densities) :]
+        self._flux_densities += [[float(b) for b in self._field.flux_density(float(t))] for t in new_times]
+        densities = [self._flux_densities[k] for k in numbers.tolist()]
+        sizes, directions = (
+            [_rounded(float(np.linalg.norm(b))) for b in densities],
+            [_unit_vector(b) for b in densities],
+        )
+        entry: dict[str, Any] = {"text": self._field.text, "direction": directions[0], "size": sizes[0]}
+        if np.ptp(np.array(directions), axis=0).max() >= DIRECTION_TOLERANCE:
+            entry["directions"] = directions
+        if np.ptp(sizes) > DIRECTION_TOLERANCE * max(sizes):
+            entry["sizes"] = sizes
+        return entry
 
 
 def _absolute_slice(selection: slice, count: int) -> slice:
@@ -321,7 +332,12 @@ def _absolute_slice(selection: slice, count: int) -> slice:
 
 def _unit_vector(vector: Sequence[float]) -> list[float]:
     size = float(np.linalg.norm(vector))
-    return [float(f"{component / size:.9g}") if size > 0.0 else 0.0 for component in vector]
+    return [_rounded(component / size) if size > 0.0 else 0.0 for component in vector]
+
+
+def _rounded(value: float) -> float:
+    """The number with nine digits, to shorten what is sent."""
+    return float(f"{value:.9g}")
 
 
 def frames_dataset(path: Path, frames: Any, field: FieldDescription | None = None) -> RunDataset:

@@ -19,6 +19,7 @@ from ..plotting.panels import (
     column,
     energies_drawn,
     has_temperatures,
+    losses,
     losses_drawn,
     peak,
 )
@@ -115,8 +116,12 @@ def _energies(ledger: LedgerColumns) -> dict[str, Any]:
 
 
 def _losses(ledger: LedgerColumns) -> dict[str, Any]:
-    drawn = losses_drawn(ledger).items()
-    lines = [_line(CHANNEL_LABELS.get(name, name), colour, size) for name, (size, colour) in drawn if peak(size)]
+    signed = losses(ledger)  # the page draws magnitudes, and tells losses from gains
+    lines = [
+        _line(CHANNEL_LABELS.get(name, name), colour, np.copysign(size, signed[name]))
+        for name, (size, colour) in losses_drawn(ledger).items()
+        if peak(size)
+    ]
     return _plot("losses", "Losses", lines, "J", log=True)
 
 

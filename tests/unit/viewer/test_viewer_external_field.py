@@ -18,6 +18,13 @@ def test_description_of_a_field(finished_run):
     assert np.array(description["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
     steady = run_dataset(folder, describe_field([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
     assert steady["direction"] == [0.0, 0.6, 0.8] and "directions" not in steady
+    assert steady["size"] == pytest.approx(5e-3, rel=1e-9, abs=0.0) and "sizes" not in steady
+    assert description["size"] == pytest.approx(1e-3, rel=1e-9, abs=0.0) and "sizes" not in description
+    times = np.array(sim.ledger["time"])
+    ramp = sand.Field("1 mT", "ramp", final="2 mT", end=times[-1])
+    rising = run_dataset(folder, describe_field([ramp])).manifest()["field"]
+    assert rising["sizes"] == pytest.approx((1e-3 * (1.0 + times / times[-1])).tolist(), rel=1e-8, abs=0.0)
+    assert "directions" not in rising
     assert describe_field([sand.Field(0.0)]) is None and run_dataset(folder).manifest()["field"] is None
     texts = {
         "constant": describe_field([sand.Field("2 mT")])[0],

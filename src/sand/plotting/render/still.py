@@ -31,7 +31,7 @@ from ..style import (
 )
 from .colouring import ColourKey, coloured
 from .legend import Share, draw_colour_keys, draw_directions
-from .scene import Scene, camera_rotation, draw_scale_bar, largest_clusters, make_scene, view_window
+from .scene import Scene, camera_rotation, draw_scale_bar, fit_window, largest_clusters, make_scene, view_window
 from .shading import Lighting
 from .spheres import Rods, Spheres, render_spheres
 from .vector import Outlines, draw_spheres
@@ -109,6 +109,7 @@ def still_picture(
     cluster: int | None = None,
     perspective: bool = False,
     field: Sequence[float] | None = None,
+    window: Sequence[float] | None = None,
 ) -> Still:
     """Render an image of a frame, without a browser or graphics card; equal input gives equal pixels.
 
@@ -145,6 +146,9 @@ def still_picture(
         Perspective projection; the default is parallel projection, in which lengths can be measured.
     field : sequence of float, optional
         (3,) external flux density [T], whose direction is shown.
+    window : sequence of float, optional
+        Left, right, bottom and top [m] of what has to be in view, in the plane through the centre of the scene, such as
+        that of several pictures; by default the grains and the box.
 
     Returns
     -------
@@ -177,7 +181,7 @@ def still_picture(
     with figure_format(width, style), plot_style():
         figure = Still(figsize=(pixels[0] / dpi, pixels[1] / dpi), dpi=dpi)
         figure.scene, figure.rotation, figure.pixels_per_inch = scene, rotation, dpi
-        place = _place(figure, pixels, share, perspective)
+        place = _place(figure, pixels, share, perspective, window)
         _draw_background(figure, dark, transparent)
         (_draw_outlines if vector else _draw)(figure, (contacts, fronts), pixels, dark, place)
         _annotate(figure, frame, keys, flux_density, dark, share)
@@ -195,6 +199,15 @@ def _pixels(size: tuple[int, int] | None, width: str | None, dpi: int) -> tuple[
     share = max(LEAST_TEXT / (TEXT * own), 1.0)
     ratio = RATIO if share == 1.0 else NARROW_RATIO
     return (round(printed * dpi), round(printed * dpi / ratio)), (share, share * ratio / RATIO)
+
+
+def _checked_window(window: Sequence[float]) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top [m].  Raises BadInput."""
+    bounds = si_array(window, "m", "window")
+    if bounds.shape != (4,) or not np.isfinite(bounds).all() or bounds[1] <= bounds[0] or bounds[3] <= bounds[2]:
+        raise BadInput(f"window = {shown(window)} must be left < right and bottom < top [m], four finite numbers")
+    left, right, bottom, top = map(float, bounds)
+    return left, right, bottom, top
 
 
 def check_picture_options(
@@ -325,13 +338,22 @@ class _Place(NamedTuple):
     pixel: float  # [m]
 
 
-def _place(figure: Still, size: tuple[int, int], share: Share, perspective: bool) -> _Place:
+def _place(
+    figure: Still,
+    size: tuple[int, int],
+    share: Share,
+    perspective: bool,
+    window: Sequence[float] | None,
+) -> _Place:
     """Set the window of the picture, with space for keys and caption, which are larger by `share`."""
     scene, rotation = figure.scene, figure.rotation
     left, bottom = _VIEWPORT[0], _VIEWPORT[2]
     right, top = 1.0 - _VIEWPORT[1] * share[0], 1.0 - _VIEWPORT[3] * share[1]
     aspect = size[0] * (right - left) / (size[1] * (top - bottom))
-    x0, x1, y0, y1 = view_window(scene, aspect, 0.03, rotation)
+    if window is None:
+        x0, x1, y0, y1 = view_window(scene, aspect, 0.03, rotation)
+    else:
+        x0, x1, y0, y1 = fit_window(_checked_window(window), aspect, 0.03)
     spheres = scene.projected(rotation)
     depth = float(spheres.centre[:, 2].min() + spheres.centre[:, 2].max()) / 2
     eye = 2.6 * float(np.hypot(x1 - x0, np.ptp(spheres.centre[:, 2]))) if perspective else None
