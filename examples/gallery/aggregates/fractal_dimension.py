@@ -25,6 +25,9 @@ for build in (sand.setup.bpca, sand.setup.dla, sand.setup.bcca):
     ]
     slope = np.polyfit(np.log(radii), np.log(sizes), 1)[0]
     plt.loglog(np.array(radii) / 1e-7, sizes, "o-", label=f"{build.__name__}: D = {slope:.2f}")
+plt.minorticks_off()
+plt.xticks([4, 8, 16, 32], ["4", "8", "16", "32"])
+plt.yticks(sizes, [str(n) for n in sizes])
 plt.xlabel("radius of gyration / grain radius")
 plt.ylabel("grains")
 plt.legend()

@@ -2,11 +2,12 @@
 Aggregates from generators
 ==========================
 
-Six ways to build an aggregate of 125 to 150 grains without a simulation, from compact to open. Titles state the radius of
-gyration in grain radii and the mean number of contacts of a grain.
+Six ways to build an aggregate of 125 to 150 grains without a simulation, from compact to open. Titles state the radius
+of gyration in grain radii and the mean number of contacts of a grain.
 """
 
 import matplotlib.pyplot as plt
+import numpy as np
 
 import sand
 from sand.analysis import shape
@@ -26,7 +27,8 @@ for ax, (name, body) in zip(axes.flat, bodies.items(), strict=True):
     sim = sand.Simulation(body, [sand.Contact()], out=name)
     sim.run(steps=1)
     image = sand.open(name).picture(0, colour="coordination", size=(900, 700)).grains_only
-    ax.imshow(image)
+    rows, columns = np.nonzero(image[..., 3])
+    ax.imshow(image[rows.min() : rows.max(), columns.min() : columns.max()])
     ax.axis("off")
     neighbours = 2 * len(sim.contacts["pair"]) / len(body)
     ax.set_title(f"{name}\n$r_g$ = {shape.gyration_radius(body.position) / radius:.1f} r, Z = {neighbours:.1f}")

@@ -23,7 +23,7 @@ shares = [sim.ledger["lost_" + name] / result.impact_energy for name in names]
 plt.stackplot(1e9 * sim.ledger["time"], shares, labels=[name.replace("_", ", ") for name in names])
 plt.xlabel("time [ns]")
 plt.ylabel("dissipated / impact energy")
-plt.legend(loc="upper left", fontsize="small")
+plt.legend(loc="lower right", fontsize="small")
 
 # %%
 # The bodies at the end:

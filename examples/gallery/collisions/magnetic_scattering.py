@@ -7,7 +7,6 @@ limit, the capture radius, the grains collide. The moments are aligned, the grai
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 from sand.experiments.scattering import flight, trajectory
 
@@ -20,15 +19,16 @@ setup = flight(
     speed_unit="thermal",
     orientation="aligned",
 )
+limit = setup.scales.capture
 for b in ("0.9 b_max", "0.95 b_max", "1.0 b_max", "1.05 b_max", "1.2 b_max"):
     path = trajectory(setup, b)
-    relative = (path.projectile - path.target) / 1e-8
-    near = np.abs(relative).max(axis=1) < 150
-    plt.plot(relative[near, 0], relative[near, 1], label=f"{b.replace('b_max', '$b_{max}$')}: {path.end}")
+    relative = (path.projectile - path.target) / limit
+    plt.plot(relative[:, 0], relative[:, 1], label=f"{b.replace('b_max', '$b_{max}$')}: {path.end}")
 plt.plot(0, 0, "ko")
-plt.xlabel("x / radius")
-plt.ylabel("y / radius")
-plt.axis("equal")
+plt.xlabel("x / $b_{max}$")
+plt.ylabel("y / $b_{max}$")
+plt.axis([-2, 2, -1.5, 1.5])
+plt.gca().set_aspect("equal")
 plt.legend(fontsize="small")
 
 # %%

@@ -23,7 +23,7 @@ grown = dilute_growth.grow(
     out="dilute",
 )
 print(
-    f"{grown.ledger['time'][-1] / 86400:.1f} days, the largest aggregate has {grown.aggregates['grains'].max()} grains"
+    f"{grown.ledger['time'][-1] / 86400:.1f} days, the largest aggregate has {grown.aggregates['grains'].max():.0f} grains"
 )
 
 # %%

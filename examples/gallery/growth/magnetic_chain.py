@@ -3,7 +3,7 @@ Magnetic grains form a chain
 ============================
 
 A hundred magnetic iron grains of 20 nm at 100 K attract each other and stick. The picture shows the largest cluster
-after 2 µs, with the magnetic moment of each grain as an arrow.
+after 5 µs, with the magnetic moment of each grain as an arrow.
 """
 
 import sand
@@ -14,7 +14,7 @@ contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 n
 sim = sand.Simulation(
     grains, [contact, sand.Dipoles(periodic="ewald")], box=box, stepping=sand.RigidClusters(), out="magnetic-chain"
 )
-print(sim.run(until="2 us"))
+print(sim.run(until="5 us"))
 print(f"mean cluster size S = {sim.ledger['mean_cluster_size'][-1]:.1f}, {int(sim.ledger['contacts'][-1])} contacts")
 
 # %%
@@ -29,5 +29,5 @@ picture.savefig("magnetic-chain/chain.png")
 #
 # * `temperature`: at 10 K grains of low speed are captured from farther away, at 1000 K from less far.
 # * `moment="20 A m^2/kg"`: a tenth of the moment, and the attraction is a hundred times weaker.
-# * `until="5 us"`: clusters meet and join.
+# * `until="10 us"`: clusters meet and join.
 # * `seed`: another gas, and another chain.

@@ -13,7 +13,7 @@ import sand
 
 chain = sand.setup.chain(6, radius="10 nm", material="iron", moment="200 A m^2/kg", moments="aligned")
 gas = sand.Gas("300 K", pressure="0.5 bar", cross_section="2e-19 m^2", brownian=False)
-contact = sand.Contact(damping="critical", damping_ratio=0.2)
+contact = sand.Contact(damping="critical", damping_ratio=0.2, settling_time="5 ns")
 
 for frequency in ("1 MHz", "20 MHz"):
     field = sand.Field(0, shape="rotating", amplitude=["5 mT", 0, 0], frequency=frequency, axis=[0, 0, 1])

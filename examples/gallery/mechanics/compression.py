@@ -23,6 +23,8 @@ slow = np.array([row["rate_ratio"] for row in loaded.table[1:]]) < 1
 plt.loglog(filling, pressure, "o", fillstyle="none", label="too fast to be at rest")
 plt.loglog(filling[slow], np.array(pressure)[slow], "o", color="C0", label="slow enough")
 plt.loglog(filling, kataoka_pressure(filling, loaded.plan.scales.pressure), label="Kataoka et al. (2013)")
+plt.minorticks_off()
+plt.xticks([0.02, 0.05, 0.1, 0.2, 0.4], ["0.02", "0.05", "0.1", "0.2", "0.4"])
 plt.xlabel("filling factor")
 plt.ylabel("pressure [Pa]")
 plt.legend(fontsize="small")

@@ -33,9 +33,9 @@ corners = [(x, y, z) for x in (-2e-6, 2e-6) for y in (-2.2e-6, 2.2e-6) for z in 
 grains = sand.Grains(corners, "0.5 um", "silica")
 forces = [sand.Contact(), trap(stiffness="200 nN/m"), soft_repulsion(strength="1 aJ", length="0.5 um")]
 sim = sand.Simulation(grains, forces)
-print(sim.run(until="0.3 ms"))
+print(sim.run(until="0.2 ms"))
 
-for name in ("kinetic", "trap", "soft_repulsion", "total"):
+for name in ("translation", "trap", "soft_repulsion", "total"):
     plt.plot(1e3 * sim.ledger["time"], sim.ledger[name], label=name.replace("_", " "))
 plt.xlabel("time [ms]")
 plt.ylabel("energy [J]")
