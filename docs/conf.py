@@ -68,7 +68,7 @@ nb_render_markdown_format = "myst"
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 os.environ["SAND_EXAMPLES"] = str(HERE.parent / "examples")
 
-sphinx_gallery_conf = configuration(HERE.parent / "examples" / "gallery")
+sphinx_gallery_conf = configuration(HERE, HERE.parent / "examples" / "gallery")
 
 html_theme = "furo"
 html_title = f"SAND {release}"

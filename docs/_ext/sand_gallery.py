@@ -5,6 +5,7 @@ The scripts run in a copy of their folder, so that the files that they write are
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 import warnings
@@ -48,18 +49,19 @@ def quiet(gallery_conf: dict[str, Any], name: str) -> None:
         warnings.filterwarnings("ignore", message=start)
 
 
-def configuration(examples: Path) -> dict[str, Any]:
-    """The settings `sphinx_gallery_conf` for a folder of scripts."""
+def configuration(docs: Path, examples: Path) -> dict[str, Any]:
+    """The settings `sphinx_gallery_conf` of the folder of conf.py, for a folder of scripts."""
     place = Path(tempfile.mkdtemp(prefix="sand-gallery-")) / "gallery"
     shutil.copytree(examples, place)
     return {
         "examples_dirs": str(place),
         "gallery_dirs": "gallery",
         "filename_pattern": r"\.py",
-        "subsection_order": [str(place / name) for name in SECTIONS],
+        "subsection_order": [os.path.relpath(place / name, docs) for name in SECTIONS],
         "within_subsection_order": "FileNameSortKey",
         "image_scrapers": ("sand_gallery.scraped",),
         "reset_modules": ("matplotlib", "sand_gallery.quiet"),
+        "run_stale_examples": True,  # as all pages, they show what this version does
         "capture_repr": (),
         "nested_sections": False,
         "min_reported_time": 0,

@@ -11,6 +11,16 @@ import numpy as np
 
 import sand
 from sand.analysis import shape
+from sand.io.bodies import write_body
+from sand.io.file_frames import open_frames
+from sand.plotting.render.still import still_picture
+
+
+def frame_of(name: str, body: sand.Grains) -> object:
+    """The body as a frame of a file, as which `sand view` and other programs read it."""
+    write_body(f"{name}.gsd", body, overwrite=True)
+    return open_frames(f"{name}.gsd")[0]
+
 
 radius = 1e-7
 kind = {"radius": radius, "material": "silica"}
@@ -22,15 +32,14 @@ bodies = {
     "bcca": sand.setup.bcca(150, **kind, seed=1),
     "fractal, D = 1.6": sand.setup.fractal(150, dimension=1.6, prefactor=1.4, **kind, seed=1),
 }
-figure, axes = plt.subplots(2, 3, figsize=(10, 6.4))
+figure, axes = plt.subplots(2, 3, figsize=(10, 7), layout="constrained")
 for ax, (name, body) in zip(axes.flat, bodies.items(), strict=True):
-    sim = sand.Simulation(body, [sand.Contact()], out=name)
-    sim.run(steps=1)
-    image = sand.open(name).picture(0, colour="coordination", size=(900, 700)).grains_only
+    frame = frame_of(name, body)
+    image = still_picture(frame, colour="coordination", size=(750, 600)).grains_only
     rows, columns = np.nonzero(image[..., 3])
     ax.imshow(image[rows.min() : rows.max(), columns.min() : columns.max()])
     ax.axis("off")
-    neighbours = 2 * len(sim.contacts["pair"]) / len(body)
+    neighbours = 2 * len(frame.pair) / len(body)
     ax.set_title(f"{name}\n$r_g$ = {shape.gyration_radius(body.position) / radius:.1f} r, Z = {neighbours:.1f}")
 
 # %%

@@ -26,6 +26,8 @@ for speed in speeds:
     plt.semilogx([speed] * 3, efficiency, "o", color="C0")
     plt.semilogx(speed, np.mean(efficiency), "_", color="C1", markersize=20)
 plt.axhline(0, color="grey", linewidth=0.5)
+plt.minorticks_off()
+plt.xticks([5, 10, 20, 40, 80], ["5", "10", "20", "40", "80"])
 plt.xlabel("impact speed [m/s]")
 plt.ylabel("growth efficiency")
 

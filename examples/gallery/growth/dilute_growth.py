@@ -22,9 +22,7 @@ grown = dilute_growth.grow(
     seed=1,
     out="dilute",
 )
-print(
-    f"{grown.ledger['time'][-1] / 86400:.1f} days, the largest aggregate has {grown.aggregates['grains'].max():.0f} grains"
-)
+print(f"{grown.ledger['time'][-1] / 86400:.1f} days, largest aggregate {grown.aggregates['grains'].max():.0f} grains")
 
 # %%
 

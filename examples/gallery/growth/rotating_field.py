@@ -2,8 +2,8 @@
 A chain in a rotating field and a gas
 =====================================
 
-A chain of six magnetic grains in a gas follows a field that rotates ten times in 10 µs: slowly enough, and it turns
-with the field; too fast, and drag lets it fall behind. The diagram shows the angle of the chain for two frequencies.
+A chain of six magnetic grains in a gas and a rotating field. At 1 MHz the chain turns with the field; at 20 MHz the
+drag of the gas lets it fall behind. The diagram shows how many turns the chain makes.
 """
 
 import matplotlib.pyplot as plt

@@ -12,7 +12,8 @@ import sand
 
 box = sand.Box.periodic("0.5 um")
 grains = sand.setup.gas(
-    box=box,
+    60,
+    box,
     temperature="300 K",
     seed=2,
     classes=[

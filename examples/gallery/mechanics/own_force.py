@@ -31,8 +31,8 @@ def soft_repulsion(apart, a, b, p):
 
 corners = [(x, y, z) for x in (-2e-6, 2e-6) for y in (-2.2e-6, 2.2e-6) for z in (-2.4e-6, 2.4e-6)]
 grains = sand.Grains(corners, "0.5 um", "silica")
-forces = [sand.Contact(), trap(stiffness="200 nN/m"), soft_repulsion(strength="1 aJ", length="0.5 um")]
-sim = sand.Simulation(grains, forces)
+own = [trap(stiffness="200 nN/m"), soft_repulsion(strength="1 aJ", length="0.5 um")]
+sim = sand.Simulation(grains, [sand.Contact(damping="critical"), *own])
 print(sim.run(until="0.2 ms"))
 
 for name in ("translation", "trap", "soft_repulsion", "total"):
