@@ -2,8 +2,10 @@ r"""
 Sticking speed of two grains
 ============================
 
-Two grains of silica collide head-on. Below the sticking speed they stay together; above it they separate with the
-speed :math:`\sqrt{v^2-v_s^2}` of JKR theory. The diagram compares the coefficient of restitution with this closed form.
+Two grains of silica collide head-on. Below the sticking speed they stay together, above it they rebound. The diagram
+compares the coefficient of restitution with JKR theory.
+
+Grains that meet with a speed :math:`v` above the sticking speed :math:`v_s` part with :math:`\sqrt{v^2-v_s^2}`.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,10 @@ r"""
 Brownian motion in a thin gas
 =============================
 
-Five hundred grains in a gas move freely at first and diffuse later. The mean square displacement of the simulation is
-compared with Langevin's equation: :math:`\langle x^2\rangle=(6k_BT\tau/m)\,[t-\tau(1-e^{-t/\tau})]`.
+Five hundred grains in a gas move freely at first and diffuse later. The mean square displacement is compared with
+Langevin's equation.
+
+With the stopping time :math:`\tau` it is :math:`\langle x^2\rangle=(6k_BT\tau/m)\,[t-\tau(1-e^{-t/\tau})]`.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,11 @@ r"""
 Compression of a porous aggregate
 =================================
 
-A fluffy aggregate of ice is compressed by its periodic box: pressure over filling factor, with the law
-:math:`P=(E_\mathrm{roll}/r^3)\,\phi^3` of Kataoka et al. (2013).
+A fluffy aggregate of ice is compressed by its periodic box: pressure over filling factor, with two laws of the
+literature.
+
+Kataoka et al. (2013) have :math:`P=(E_\mathrm{roll}/r^3)\,\phi^3` for fluffy bodies, Tatsuuma et al. (2023) a law that
+rises towards the closest packing.
 """
 
 import matplotlib.pyplot as plt
@@ -11,7 +14,7 @@ import numpy as np
 
 import sand
 from sand.experiments.laboratory import Loading, load
-from sand.theory.compression import kataoka_pressure
+from sand.theory.compression import kataoka_pressure, tatsuuma_pressure
 
 body = sand.setup.bcca(128, radius="0.1 um", material="ice (Wada et al. 2013)", seed=1)
 contact = sand.Contact(damping="constant", damping_constant="2.2e-10 kg/s")
@@ -23,6 +26,7 @@ slow = np.array([row["rate_ratio"] for row in loaded.table[1:]]) < 1
 plt.loglog(filling, pressure, "o", fillstyle="none", label="too fast to be at rest")
 plt.loglog(filling[slow], np.array(pressure)[slow], "o", color="C0", label="slow enough")
 plt.loglog(filling, kataoka_pressure(filling, loaded.plan.scales.pressure), label="Kataoka et al. (2013)")
+plt.loglog(filling, tatsuuma_pressure(filling, loaded.plan.scales.pressure), label="Tatsuuma et al. (2023)")
 plt.minorticks_off()
 plt.xticks([0.02, 0.05, 0.1, 0.2, 0.4], ["0.02", "0.05", "0.1", "0.2", "0.4"])
 plt.xlabel("filling factor")

@@ -3,7 +3,9 @@ A chain is pulled apart
 =======================
 
 The first grain of a chain is held, the last one is pulled. The force rises until a contact breaks, at the pull-off
-force :math:`3\pi\gamma R` of two grains.
+force of two grains.
+
+It is :math:`3\pi\gamma R` with the surface energy :math:`\gamma` and the reduced radius :math:`R`.
 """
 
 import matplotlib.pyplot as plt
