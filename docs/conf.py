@@ -11,6 +11,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
 
 from benchmarks.quoted import quotable  # noqa: E402
+from sand_gallery import configuration  # noqa: E402
 
 from sand import __version__  # noqa: E402
 
@@ -21,6 +22,7 @@ version = release = __version__
 
 extensions = [
     "myst_nb",
+    "sphinx_gallery.gen_gallery",
     "sphinx.ext.autodoc",
     "numpydoc",
     "sphinx_click",
@@ -28,9 +30,10 @@ extensions = [
     "sphinx-mathjax-offline",
     "sand_docs",
     "offline",
+    "searched",
 ]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
+exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints", "gallery/**.ipynb"]
 nitpicky = True
 # aliases of types of other packages, whose pages would be needed to link them
 nitpick_ignore_regex = [("py:class", r"(collections|numpy|pathlib|typing)\..*")]
@@ -64,6 +67,8 @@ nb_render_markdown_format = "myst"
 # pages call the `sand` command of this very environment, and copy the examples of this checkout
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 os.environ["SAND_EXAMPLES"] = str(HERE.parent / "examples")
+
+sphinx_gallery_conf = configuration(HERE, HERE.parent / "examples" / "gallery")
 
 html_theme = "furo"
 html_title = f"SAND {release}"

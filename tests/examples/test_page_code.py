@@ -2,6 +2,7 @@
 
 import os
 import re
+import runpy
 import sys
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from benchmarks import page_code  # noqa: E402
 
 EXECUTED = [page for page in page_code.PAGES if page_code.cells(page)]
 FIRST = quoted.TOP / "docs" / "start.md"
+GALLERY = sorted((quoted.TOP / "examples" / "gallery").rglob("*.py"))
 SCRIPTS = [(page, k) for page in page_code.PAGES for k in range(len(page_code.scripts(page)))]
 
 
@@ -95,3 +97,14 @@ def test_readme_prints_its_result(as_docs, capsys):
 def test_pages(page, as_docs):
     """The cells of every page run one after the other; many end in assertions."""
     page_code.run_cells(page_code.cells(page))
+
+
+@pytest.mark.validate
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("script", GALLERY, ids=lambda script: script.stem)
+def test_gallery(script, as_docs):
+    """Every script of the gallery runs, draws something, and says what to change."""
+    code = script.read_text("utf-8")
+    assert "# What to change\n" in code
+    runpy.run_path(str(script))
+    assert plt.get_fignums() or list(Path.cwd().glob("*/*.png"))

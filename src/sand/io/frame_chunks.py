@@ -128,7 +128,7 @@ def stored_frame(
     if virial is not None:
         log[f"particles/{VIRIAL}"] = np.ascontiguousarray(virial.reshape(-1, 9), np.float32)
     if exact:
-        log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64) for name in IN_FULL}
+        log |= {f"particles/{name}": np.array(getattr(grains, name), np.float64, order="C") for name in IN_FULL}
     sides = np.array([*(np.array(lengths) / scale), 0.0, box.tilt / lengths[2], 0.0], np.float32)
     frame = SimpleNamespace(
         configuration=SimpleNamespace(step=step, box=sides),

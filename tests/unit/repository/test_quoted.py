@@ -9,11 +9,18 @@ quoted = pytest.importorskip("benchmarks.quoted", reason="benchmarks are not bes
 from benchmarks import page_code, pictures, quick_figures  # noqa: E402
 
 TOP = Path(__file__).parents[3]
+BUILT = {"_build", "gallery"}
+"""Folders of docs that a build makes."""
 DOCS = sorted(
-    path for path in (TOP / "docs").rglob("*.*") if path.suffix in (".md", ".rst") and "_build" not in path.parts
+    path for path in (TOP / "docs").rglob("*.*") if path.suffix in (".md", ".rst") and not BUILT & set(path.parts)
 )
 PAGES = [*quoted.COPIES, *DOCS]
-EXAMPLES = sorted(path for path in (TOP / "examples").iterdir() if path.suffix in (".toml", ".py"))
+EXAMPLES = sorted(
+    path
+    for folder in (TOP / "examples", *(TOP / "examples" / "gallery").iterdir())
+    for path in folder.glob("*.*")
+    if path.suffix in (".toml", ".py")
+)
 NUMBER = r"(?:\d[\d.,]*|half an?|an?|one|two|three|four|five|six|seven|eight|nine|ten|twenty|thirty|several|some|few)"
 COSTS = re.compile(
     rf"(?<![\w.^/$-]){NUMBER}(?: (?:to|or|and|of) {NUMBER})?[ -](?:more |core-|CPU[ -])?"
