@@ -27,6 +27,7 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "sand_docs",
+    "validation",
     "offline",
 ]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
