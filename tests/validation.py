@@ -80,12 +80,19 @@ def exists(test: str) -> bool:
 class Recorder:
     """Collects the numbers of all tests and writes the table at the end.
 
-    Rows of tests that ran are replaced, those of tests that failed or no longer exist are removed, and others keep the
-    date and commit of their own run.
+    Rows of tests that ran are replaced, those of tests that failed are removed, as those of tests and cases that no
+    longer exist, and others keep the date and commit of their own run.  `cases` has the names of all cases of the tests
+    in the files that were collected, also of those that did not run.
     """
 
     def __init__(self, path: Path):
         self.path, self.ran, self.rows = path, set[str](), list[dict[str, str]]()
+        self.cases = set[str]()
+
+    def is_gone(self, test: str) -> bool:
+        """Whether there is no such test, or no such case of it among those that were collected."""
+        known = test.partition("[")[0] in {case.partition("[")[0] for case in self.cases}
+        return not exists(test) or (known and test not in self.cases)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         """Take the numbers of a test that ran."""
@@ -101,7 +108,7 @@ class Recorder:
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Write the table."""
-        kept = [row for row in rows_of(self.path) if row["test"] not in self.ran and exists(row["test"])]
+        kept = [row for row in rows_of(self.path) if row["test"] not in self.ran and not self.is_gone(row["test"])]
         with self.path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +12,9 @@ from sphinx.util.docutils import SphinxDirective
 from tests import claims
 
 KINDS = {"agrees": "agree", "differs": "differ", "undecided": "not decided"}
+
+SHARE = re.compile(r"\((.\d+)%\)")
+"""The relative difference in a verdict."""
 
 
 def table(heads: Sequence[str], groups: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]]) -> nodes.table:
@@ -23,7 +27,7 @@ def table(heads: Sequence[str], groups: Sequence[tuple[Sequence[str], Sequence[S
             own = [] if k else [nodes.entry("", *map(paragraph, first), morerows=len(rows) - 1)]
             body += nodes.row("", *own, *[nodes.entry("", paragraph(cell)) for cell in row])
     group += body
-    return nodes.table("", group, classes=["colwidths-auto"])
+    return nodes.table("", group, classes=["colwidths-auto", "claims"])
 
 
 def limits(number: claims.Number) -> str:
@@ -71,8 +75,8 @@ class Claims(FromSources):
         numbers, groups = claims.numbers(), []
         for claim in of_tier(self.arguments[0])[0]:
             file, _, name = claim.test.partition("::")
-            first = [claim.text + (f". Differs: {claim.differs}." if claim.differs else "."), f"`{name}` in `{file}`"]
-            rows = [(n.quantity, shown(n), limits(n), f"{n.date}, `{n.commit}`") for n in numbers.get(claim.test, [])]
+            first = [claim.text + (f". Differs: {claim.differs}." if claim.differs else "."), f"`{name}`", f"`{file}`"]
+            rows = [(n.quantity, shown(n), limits(n), f"{n.date} `{n.commit}`") for n in numbers.get(claim.test, [])]
             groups.append((first, rows))
         return [table(("claim, and its test", "quantity", "value", "limits", "last run"), groups)]
 
@@ -96,9 +100,14 @@ class Campaigns(FromSources):
 
 
 def counts(campaign: claims.Campaign) -> str:
-    """How many numbers of a campaign agree, differ, are not decided."""
+    """How many numbers of a campaign agree, differ, are not decided; by how much they differ."""
     kinds = [line.kind for line in campaign.lines]
-    return ", ".join(f"{kinds.count(kind)} {word}" for kind, word in KINDS.items() if kind in kinds)
+    apart = [int(share) for line in campaign.lines if line.kind == "differs" for share in SHARE.findall(line.verdict)]
+    words = [f"{kinds.count(kind)} {word}" for kind, word in KINDS.items() if kind in kinds]
+    if not apart:
+        return ", ".join(words)
+    low, high = min(apart), max(apart)
+    return ", ".join(words) + (f", by {low:+d} to {high:+d} %" if low < high else f", by {low:+d} %")
 
 
 class Misses(FromSources):

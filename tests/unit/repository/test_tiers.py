@@ -42,12 +42,14 @@ def test_the_record_has_the_numbers_of_passed_tests(tmp_path):
         "tests/unit/repository/test_tiers.py::test_parts_that",
     )
     old = [
-        (name, "x", "1", "", "2", "2020-01-01", "abc") for name in ("tests/gone.py::test_it", other, f"{same}_do[a]")
+        (name, "x", "1", "", "2", "2020-01-01", "abc")
+        for name in ("tests/gone.py::test_it", other, f"{same}_do[a]", f"{same}_do_not_exist[of another version]")
     ]
     path = tmp_path / "record.csv"
     lines = ["test,quantity,value,least,most,date,commit", *(",".join(row) for row in old)]
     path.write_text("\n".join(lines) + "\n", "utf-8")
     recorder, properties = Recorder(path), []
+    recorder.cases.add(f"{same}_do_not_exist[a/b]")
     check = BoundRecorder(properties)
     check("energy error", 2e-7, most=1e-6)
     for quantity, value, bounds in (("a", 2.0, {"most": 1.0}), ("b", float("nan"), {"least": 0.0}), ("c", 0.0, {})):
