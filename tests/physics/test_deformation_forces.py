@@ -82,7 +82,10 @@ def _follows_the_box(name, rates, record_bound):
     assert 0.0 < abs(last["lost_cutoff_changed"]) < 1e-4 * work
 
 
-@pytest.mark.validates("self-consistency", "The same with dipoles, charges and meshes at other rates")
+@pytest.mark.validates(
+    "self-consistency",
+    "The energy balance closes with Ewald sums of dipoles and charges, direct and by meshes, in a box that is deformed",
+)
 @pytest.mark.validate
 @pytest.mark.parametrize("rates", [SHRINKING, GROWING], ids=["shrinking", "growing"])
 @pytest.mark.parametrize("name", ["dipoles in vacuum", "dipoles mesh", "charges direct", "charges mesh"])

@@ -196,7 +196,11 @@ def _attribute_docstrings(kind: type) -> dict[str, str]:
     for owner in reversed(kind.__mro__):
         if not owner.__module__.startswith("sand."):
             continue
-        body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+        try:
+            source = inspect.getsource(owner)
+        except OSError:  # of a class that is made while the program runs; its bases have theirs
+            continue
+        body = ast.parse(textwrap.dedent(source)).body[0]
         lines = getattr(body, "body", [])
         for entry, text in itertools.pairwise(lines):
             named = isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name)
