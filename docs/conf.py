@@ -29,6 +29,7 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "sand_docs",
+    "validation",
     "offline",
     "searched",
 ]

@@ -33,7 +33,7 @@ compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 from sand.compiler.ahead import share_compilation  # noqa: E402
 
 from .specs import FIXTURES, SPECS, STARTS, WORKERS  # noqa: E402
-from .validation import BoundRecorder, Recorder, parse_part, part_of  # noqa: E402
+from .validation import BoundRecorder, Recorder, parse_part, part_of, recorded  # noqa: E402
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -45,6 +45,7 @@ FOLDERS = ("browser", "peers")
 """Folders under tests/ that run only when their path is given."""
 HOW_TO_RUN = {"browser": "the page in a browser: pytest tests/browser", "peers": "other programs: pytest tests/peers"}
 left_out: Counter[str] = Counter()
+recording = pytest.StashKey[Recorder]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -67,7 +68,8 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile("fixed", max_examples=100 if config.getoption("--validate") else 30, derandomize=True)
     settings.load_profile("fixed")
     if config.getoption("--record") and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Recorder(config.getoption("--record")))
+        config.stash[recording] = Recorder(config.getoption("--record"))
+        config.pluginmanager.register(config.stash[recording])
 
 
 def _tier(item: pytest.Item) -> str | None:
@@ -96,6 +98,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 @pytest.hookimpl(tryfirst=True)  # before `-m` and pytest-xdist look at the marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     chosen, part = _chosen(config), config.getoption("--validate-part")
+    if config.getoption("--record") and not any("[" in str(word) for word in config.args):
+        _note_cases(config, [item.nodeid for item in items if "record_bound" in getattr(item, "fixturenames", ())])
     kept, dropped = [], []
     for item in items:
         tier = _tier(item)
@@ -113,6 +117,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = kept
     if hasattr(config, "workerinput"):
         items.sort(key=_start)
+
+
+def _note_cases(config: pytest.Config, names: list[str]) -> None:
+    """Tell the recorder, in a worker of pytest-xdist that of the reporting process, which cases there are."""
+    if hasattr(config, "workerinput"):
+        config.workeroutput["cases"] = names
+    else:
+        config.stash[recording].cases.update(names)
 
 
 def _start(item: pytest.Item) -> int:
@@ -187,8 +199,11 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
+    output = getattr(node, "workeroutput", {})
     left_out.clear()  # every worker collects the same tests
-    left_out.update(getattr(node, "workeroutput", {}).get("left_out", {}))
+    left_out.update(output.get("left_out", {}))
+    if recording in node.config.stash:
+        node.config.stash[recording].cases.update(output.get("cases", ()))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -202,7 +217,9 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture
 def record_bound(request: pytest.FixtureRequest) -> BoundRecorder:
     """Checks a number against its bounds, and records it: `record_bound("energy error", error, most=1e-6)`."""
-    return BoundRecorder(request.node.user_properties)
+    test = request.node.nodeid.partition("[")[0]
+    writes = request.config.getoption("--record") is not None
+    return BoundRecorder(request.node.user_properties, None if writes else recorded().get(test, set()))
 
 
 @pytest.fixture(autouse=True)

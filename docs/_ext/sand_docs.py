@@ -24,11 +24,15 @@ def attribute(path: str) -> Any:
         return getattr(attribute(module), name)
 
 
+def paragraph(text: str) -> nodes.paragraph:
+    """A paragraph; text in `backticks` is code."""
+    parts = [(nodes.literal if k % 2 else nodes.Text)(*[part] * (1 + k % 2)) for k, part in enumerate(text.split("`"))]
+    return nodes.paragraph("", "", *parts)
+
+
 def _entry(value: Any) -> nodes.entry:
     """A cell; text in `backticks` is code."""
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    parts = [(nodes.literal if k % 2 else nodes.Text)(*[part] * (1 + k % 2)) for k, part in enumerate(text.split("`"))]
-    return nodes.entry("", nodes.paragraph("", "", *parts))
+    return nodes.entry("", paragraph(f"{value:g}" if isinstance(value, float) else str(value)))
 
 
 def keys_of(model: Any) -> list[tuple[str, str, str]]:

@@ -73,6 +73,10 @@ def bits(sim):
     return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "An integrator of your own: the energy error of a fly-by of two dipoles is at most the accuracy asked for",
+)
 @pytest.mark.compiled("flights")
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-8])
 def test_the_accuracy_bounds_the_energy_error(record_bound, accuracy):
@@ -104,6 +108,10 @@ def bound_pair():
     return grains, coulomb / apart, 2 * math.pi * math.sqrt(major**3 * mass / (2 * coulomb))
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "A symplectic integrator of your own: the energy error of a bound orbit does not grow",
+)
 @pytest.mark.compiled("flights")
 def test_the_energy_error_of_a_bound_orbit_does_not_grow(record_bound):
     """40 periods with equal steps: error of the last ten periods at most 1.5 times that of the first ten."""

@@ -76,6 +76,7 @@ def flyby(stepping, **end):
     return sim
 
 
+@pytest.mark.validates("self-consistency", "Each integrator conserves the energy of a fly-by of two magnetic grains")
 @pytest.mark.filterwarnings("ignore:without settling_time in")
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("name", STEPPINGS)
@@ -137,6 +138,7 @@ FIXED_STEPS = {"verlet": (2, 800, 1, 1e-3), "forest-ruth": (4, 400, 4, 1e-5)}
 """Order, fewest steps, force sums per step and largest error with these steps, of the integrators with a fixed step."""
 
 
+@pytest.mark.validates("other program", "Integrators converge to the trajectory of SciPy's DOP853 with their order")
 @pytest.mark.compiled("dipoles", "flights")
 @pytest.mark.parametrize("name", FIXED_STEPS)
 def test_order_of_convergence(record_bound, name):

@@ -14,6 +14,10 @@ from sand.contact import jkr
 from .setups import PrescribedMotion, random_aggregate, rest_distance, struck_chain
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "Momentum and angular momentum of an aggregate with dipoles are conserved to rounding, 10⁵ steps",
+)
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(
     ("far", "bound"), [pytest.param("every step", 1e-12, marks=pytest.mark.validate), ("impulse", 1e-11)]
@@ -47,6 +51,7 @@ def test_momentum_and_angular_momentum_are_conserved(record_bound, seed, radii, 
     assert sim.ledger.rows[-1]["moved"] > 100  # contacts did slide and roll
 
 
+@pytest.mark.validates("self-consistency", "A magnetic gas without contacts conserves its energy")
 @pytest.mark.compiled("dipoles")
 def test_energy_of_a_magnetic_gas_before_its_first_contact(record_bound):
     """Total energy of a periodic gas until the first contact: error ≤ 1e-6 of |U_min| = 2kμ²/d³.
@@ -85,6 +90,10 @@ def chain_error(steps_per_period, hits):
     return np.sqrt(np.mean(np.square(errors)))
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "The energy balance of a struck chain closes with contacts that form, break, slide and roll",
+)
 @pytest.mark.filterwarnings("ignore:grains overlap too deeply")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("hits", "halvings"), [(5, 3), pytest.param(9, 4, marks=pytest.mark.validate)])
@@ -101,6 +110,7 @@ def test_energy_balance_of_a_struck_chain(record_bound, hits, halvings):
     assert errors[-1] < 1.5e-5 * 4.0 ** (4 - halvings)
 
 
+@pytest.mark.validates("self-consistency", "The energy balance closes for two materials and unequal radii")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("slip", ["clamp", "reset"])
 def test_energy_balance_of_two_materials_and_unequal_radii(record_bound, slip):
@@ -220,6 +230,7 @@ def modified_energy_term(sim):
     return stiffness * w * w / 12.0 - force(overlap) ** 2 / (12.0 * sim.grains.mass[0])
 
 
+@pytest.mark.validates("closed form", "The energy offset of a ringing contact is that of velocity Verlet")
 @pytest.mark.compiled("contacts")
 def test_mean_energy_of_the_ringing_after_a_contact_forms(record_bound):
     """The mean total energy over twelve periods is below the energy before contact by at most (ω_n dt)²/12 E.
@@ -248,6 +259,7 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms(record_bound):
     record_bound("energy offset of the ringing over (ω_n dt)²/12", max(shares), most=1.0)
 
 
+@pytest.mark.validates("closed form", "Two grains rebound with √(v² − v_s²), and lose the energy of a JKR cycle")
 @pytest.mark.compiled("contacts")
 def test_rebound_of_two_grains(record_bound):
     """Head-on above the sticking speed: rebound √(v² − v_s²), and the recorded loss is E_cycle = 0.935503 F_c δ_c.
@@ -300,6 +312,7 @@ def test_twist_is_integrated_to_second_order():
     assert 3.5 < errors[0] / errors[1] < 4.5
 
 
+@pytest.mark.validates("self-consistency", "The energy balance of collisions of aggregates closes")
 @pytest.mark.compiled("contacts", "small")
 @pytest.mark.parametrize(
     ("kind", "speed"),

@@ -68,6 +68,7 @@ def test_sticking_speed_of_equal_grains(name, r):
     assert head_on(m, r, r, 1.005 * speed) > 0.0
 
 
+@pytest.mark.validates("closed form", "Grains of unequal radii and several materials rebound with √(v² − v_s²)")
 @pytest.mark.filterwarnings("ignore:grains overlap too deeply", "ignore:impacts are too fast for elastic grains")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(
@@ -126,6 +127,10 @@ MODES = {
 }
 
 
+@pytest.mark.validates(
+    "closed form",
+    "Frequencies of normal, sliding, rolling and twisting motion are those of their springs",
+)
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("mode", list(MODES))
 def test_periods_of_the_four_contact_modes(record_bound, mode):
@@ -154,6 +159,7 @@ def test_critical_force_and_torques():
     )
 
 
+@pytest.mark.validates("closed form", "Rolling by 90° dissipates k_r ξ_c (πr/2 − ξ_c)")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("slip", "share", "steps"), [("clamp", 1.0, 10_000), ("reset", 0.5, 20_000)])
 def test_dissipation_of_rolling_by_90_degrees(record_bound, slip, share, steps):
@@ -177,6 +183,7 @@ def test_dissipation_of_rolling_by_90_degrees(record_bound, slip, share, steps):
     assert expected == pytest.approx(rough, rel=0.01, abs=0.0)
 
 
+@pytest.mark.validates("closed form", "Twisting by a full turn dissipates k_t φ_c (2π − φ_c)")
 @pytest.mark.compiled("contacts")
 def test_dissipation_of_twisting_by_a_full_turn(record_bound):
     """Twisting dissipates k_t φ_c (2π − φ_c) with slip="clamp", 2π k_t φ_c for small φ_c; in both directions."""

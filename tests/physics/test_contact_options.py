@@ -27,6 +27,7 @@ def pair_constants(contact, material=sand.SILICA, r=R):
     return contact_constants(LAWS[contact.law])(contact.pairing(material, material), r, r, mass, mass), mass
 
 
+@pytest.mark.validates("closed form", "The energy of a damped contact falls as exp(−c t/m̄)")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
 def test_damped_ringing_decays_exponentially(record_bound, kind):

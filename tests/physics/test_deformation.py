@@ -41,6 +41,7 @@ def in_flow(grains, box, rates, shift):
     return sand.Grains(box.wrap(position), grains.radius, ICE, **quantities), box.image(position)
 
 
+@pytest.mark.validates("self-consistency", "Bodies that collide in a box that is deformed move as in an open box")
 @pytest.mark.parametrize("shift", [0.0, 0.49])
 def test_free_bodies_move_as_in_an_open_box(shift, record_bound):
     """Two bodies collide while their box changes linearly by (−30, +20, −10) %: the motion is that of an open box.
@@ -86,6 +87,7 @@ def packing(rate, number=60, side=None, **options):
     return sand.Simulation(sand.Grains(x, RADIUS, ICE), [DAMPED], box=box, deformation=given, **options)
 
 
+@pytest.mark.validates("self-consistency", "The work of a box that is compressed closes the energy balance")
 def test_the_work_of_the_boundaries_closes_the_ledger(record_bound):
     """A compression to φ = 0.5: the total of the ledger changes by less than 1e-4 of the work, |lost_box|.
 
@@ -364,6 +366,7 @@ def test_threads_change_no_bit():
     assert ends[3].ledger["lost_box"][-1] == pytest.approx(ends[0].ledger["lost_box"][-1], rel=1e-4, abs=0.0)
 
 
+@pytest.mark.validates("self-consistency", "The energy balance of a compression from φ = 0.01 to 0.5 closes")
 @pytest.mark.validate
 def test_a_long_compression_closes_the_ledger(record_bound):
     """256 grains from φ = 0.01 to 0.5, with sliding and breaking: the error of the ledger is below 1e-4 of the work."""

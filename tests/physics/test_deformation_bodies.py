@@ -25,6 +25,10 @@ def colliding_bodies():
     return sand.setup.encounter(first, second, speed="1 m/s", impact_parameter="0.3 b").grains
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "Rigid clusters that collide in a box that is deformed move as in an open box",
+)
 @pytest.mark.parametrize("shift", [0.0, 0.49])
 def test_rigid_clusters_collide_as_in_an_open_box(shift, record_bound):
     """Two clusters come to rest as bodies, touch off-centre and stick, while sides change by −30, +20 and −10 %.
@@ -144,6 +148,10 @@ def test_clusters_that_are_joined_to_their_own_image_stay_awake():
     assert pressure == pytest.approx(abs(force[0]) / (1.5e-6) ** 2, rel=0.1, abs=0.0)
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "The energy balance of magnetic rigid clusters in a box that is deformed closes",
+)
 @pytest.mark.validate
 @pytest.mark.compiled("deformation", "dipoles")
 def test_magnetic_clusters_close_the_ledger(record_bound):

@@ -48,6 +48,7 @@ def at_rest(sim, force, box=None):
     return sand.Simulation(now, [force], box=box or sim.box)
 
 
+@pytest.mark.validates("self-consistency", "The energy balance closes with Ewald sums in a box that is deformed")
 @pytest.mark.parametrize("rates", [SHRINKING, GROWING], ids=["shrinking", "growing"])
 @pytest.mark.parametrize("name", ["dipoles direct"])
 def test_ewald_sums_follow_the_box(name, rates, record_bound):
@@ -81,6 +82,10 @@ def _follows_the_box(name, rates, record_bound):
     assert 0.0 < abs(last["lost_cutoff_changed"]) < 1e-4 * work
 
 
+@pytest.mark.validates(
+    "self-consistency",
+    "The energy balance closes with Ewald sums of dipoles and charges, direct and by meshes, in a box that is deformed",
+)
 @pytest.mark.validate
 @pytest.mark.parametrize("rates", [SHRINKING, GROWING], ids=["shrinking", "growing"])
 @pytest.mark.parametrize("name", ["dipoles in vacuum", "dipoles mesh", "charges direct", "charges mesh"])
@@ -113,6 +118,7 @@ def test_the_virial_of_the_loops_is_the_derivative_of_the_energy(name):
         assert summed[a] == pytest.approx(found, abs=1e-4 * np.abs(summed).max())
 
 
+@pytest.mark.validates("self-consistency", "The energy balance of screened charges in a box that grows closes")
 def test_a_cutoff_of_charges_in_a_plasma_stays_as_it_is(record_bound):
     """Screened charges with a cut-off of 0.15 µm: the ledger closes, and the run ends at twice the cut-off.
 

@@ -253,6 +253,10 @@ attract each other: seeds 101 and 102, and 30,000, 20,000, 74,000, 74,000, 24,00
 """
 
 
+@pytest.mark.validates(
+    "other program",
+    "Rate coefficients of magnetic pairs, some with moments that cancel, are those of an independent program",
+)
 @pytest.mark.validate
 @pytest.mark.parametrize("name", AWKWARD)
 def test_rate_coefficients_of_awkward_pairs(name, record_bound):
@@ -271,6 +275,7 @@ def test_rate_coefficients_of_awkward_pairs(name, record_bound):
         record_bound("grains: K(1,1) over 3.03e-14 m³/s", rate / 3.03e-14, least=0.97, most=1.03)
 
 
+@pytest.mark.validates("self-consistency", "Flights of dilute growth have the cross-section of sand scatter")
 @pytest.mark.validate
 def test_the_cross_section_of_two_grains_at_thermal_speed(record_bound):
     """σ = 134.2 π(2R)² at v_th with spins of ½ kT, the value of the cross-section page, to 1 %.
@@ -287,6 +292,7 @@ def test_the_cross_section_of_two_grains_at_thermal_speed(record_bound):
     record_bound("cross-section of two grains at thermal speed over 134.2 π(2R)²", ratio / 134.2, least=0.99, most=1.01)
 
 
+@pytest.mark.validates("self-consistency", "The rate coefficient does not depend on the bound of the impact parameter")
 @pytest.mark.validate
 def test_results_do_not_depend_on_bound_and_start(record_bound):
     """K(1,1) with b̂ 1.5 times as wide is the same, within 3 standard errors: thinning is exact."""
@@ -334,6 +340,7 @@ def merged(a, b, state):
     return Hit([(grains._replace(inertia=inertia), NO_CONTACTS)], 1, 0, 0, 0.0, 0, {}, [(np.zeros(3), np.zeros(3))])
 
 
+@pytest.mark.validates("closed form", "Spheres that merge grow as Smoluchowski's equation with the ballistic kernel")
 @pytest.mark.validate
 def test_merging_spheres_follow_the_coagulation_equation(record_bound):
     """Times at n/n₀ = 0.5, 0.2, 0.1 of spheres that merge are those of Smoluchowski's equation, to 3 %.

@@ -17,6 +17,7 @@ def row_of_grains(count, gap=-REST, **options):
     return sand.Grains(np.stack([x, 0.0 * x, 0.0 * x], axis=1), RADIUS, sand.SILICA, **options)
 
 
+@pytest.mark.validates("closed form", "A grain on a fixed grain oscillates with √(k/m)")
 @pytest.mark.compiled("contacts")
 def test_a_grain_on_a_fixed_grain_oscillates_with_its_own_mass(record_bound):
     """ω² = k/m, k = d²U/dδ² at rest, for m₂ → ∞; two free grains have ω² = 2k/m.
@@ -125,6 +126,7 @@ def test_a_gas_with_driven_grains_closes_its_ledger_and_is_resumed_bit_for_bit(t
     assert [name for name in arrays[0] if arrays[0][name].tobytes() != arrays[1][name].tobytes()] == []
 
 
+@pytest.mark.validates("closed form", "A grain that settles on a driven grain loses its energy as exp(−t/τ)")
 @pytest.mark.compiled("contacts")
 def test_settling_leads_to_the_motion_of_a_driven_grain(record_bound):
     """A grain on a driven one: x¨ + x˙/τ + ω²x = 0 relative to it, whatever its velocity; the ledger closes.

@@ -101,6 +101,7 @@ def test_energy_of_grains_falling_through_periodic_walls():
     assert sim.grains.velocity[3, 2] == pytest.approx(-1e9 * sim.time, rel=1e-10, abs=0.0)
 
 
+@pytest.mark.validates("closed form", "Two opposite charges keep a circular orbit for ten turns")
 @pytest.mark.validate
 def test_kepler_orbit_of_two_charges(record_bound):
     """Two opposite charges on a circular orbit, m v²/(r/2) = k q²/r²: ten turns, radius to 1e-4, E to 1e-6.
@@ -208,6 +209,7 @@ def test_gas_noise_is_reproducible():
     assert not (ends[0] == ends[2]).any()
 
 
+@pytest.mark.validates("self-consistency", "The energy balance of clusters with charges and dipoles closes")
 @pytest.mark.validate
 def test_momentum_and_energy_of_charged_clusters(record_bound):
     """16 sticking grains with dipoles and charges: P to rounding × steps, total to 1e-3 of the dissipated energy."""

@@ -43,6 +43,7 @@ def measured_period(grains, forces, what, period, periods=6.2, **options):
     return period_of(np.array(recorder.value), np.array(recorder.time)), sim
 
 
+@pytest.mark.validates("closed form", "A grain in a magnetic field oscillates with √(μB/I)")
 @pytest.mark.validate
 def test_oscillation_of_one_grain_in_a_field(record_bound):
     """ω = √(μB/I) for small angles; pendulum correction θ²/16 (1e-5) and Verlet's (ω dt)²/24 stay below 1e-4."""
@@ -56,6 +57,7 @@ def test_oscillation_of_one_grain_in_a_field(record_bound):
     assert sim.ledger.drift < 1e-4
 
 
+@pytest.mark.validates("closed form", "Two distant dipoles oscillate with the two frequencies of their couplings")
 @pytest.mark.compiled("dipoles")
 def test_oscillation_of_two_distant_dipoles(record_bound):
     """Head to tail, same tilt: I θ¨ = −3 (kμ²/D³) θ; opposite tilt: −1; at D = 1e4 r the forces are negligible."""
@@ -78,6 +80,7 @@ def test_oscillation_of_two_distant_dipoles(record_bound):
         )
 
 
+@pytest.mark.validates("closed form", "A bound pair in a magnetic field oscillates as a rigid body, √(2μB/I)")
 @pytest.mark.compiled("fields")
 def test_oscillation_of_a_bound_pair_in_a_field(record_bound):
     """Two grains in contact, moments along the axis, as a rigid body: ω = √(2μB/I), I = 2 (2/5 m r² + m (D/2)²).

@@ -42,6 +42,7 @@ def test_a_slow_bending_mode_decays_with_the_settling_time():
     assert abs(sim.ledger["total"][-1] - sim.ledger["total"][0]) < 0.01 * start
 
 
+@pytest.mark.validates("self-consistency", "The energy balance with settling closes")
 @pytest.mark.filterwarnings("ignore:contact. settling_time = .* is below the period")
 @pytest.mark.compiled("contacts")
 def test_momenta_are_kept_and_the_balance_closes(record_bound):

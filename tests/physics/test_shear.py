@@ -22,6 +22,7 @@ pytestmark = pytest.mark.compiled("shear", "contacts")
 RATE = sand.Deformation(shear="5e6 1/s")
 
 
+@pytest.mark.validates("self-consistency", "Bodies that collide in a box that is sheared move as in an open box")
 @pytest.mark.parametrize(("rates", "shear"), [([0, 0, 0], -5e7), ([-7e6, 5e6, -2.5e6], 5e7)])
 def test_free_bodies_move_as_in_an_open_box(rates, shear, record_bound):
     """Two bodies collide across edges of a box that is sheared by 2, and stretched: the motion is that of an open box.
@@ -155,6 +156,7 @@ def packing(deformation, filling=0.25, number=60, **options):
     return sand.Simulation(grains, [DAMPED], box=first.box, deformation=deformation, **options)
 
 
+@pytest.mark.validates("self-consistency", "The work of shear closes the energy balance of a packing")
 @pytest.mark.filterwarnings("ignore:.*contacts")
 def test_the_work_of_shear_closes_the_ledger(record_bound):
     """A packing that percolates, sheared by 2.2: contacts form, break, slide, roll and twist; three wraps of the tilt.

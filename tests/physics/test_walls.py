@@ -85,6 +85,7 @@ def test_a_bounce_as_from_a_huge_sphere(damping):
         assert np.abs(np.subtract(at_wall, at_sphere)).max() <= 1e-4 * np.abs(at_wall).max()
 
 
+@pytest.mark.validates("self-consistency", "The energy balance of impacts on walls, fixed and moving, closes")
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(
     ("law", "damping"),
@@ -146,6 +147,7 @@ def test_a_moving_frame():
     np.testing.assert_allclose(moving.grains.spin, rest.grains.spin, atol=1e-5 * 3e5, rtol=0.0)
 
 
+@pytest.mark.validates("closed form", "A grain comes off a wall at 3πγR")
 @pytest.mark.compiled("contacts")
 def test_pull_off_force_of_a_wall(record_bound):
     """A grain between two walls breaks from that of the smaller γ, at F = 3π √(γ1 γ2) r1 (JKR, R = r1).

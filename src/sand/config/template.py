@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import dataclasses
 import inspect
 import itertools
@@ -196,10 +197,11 @@ def _attribute_docstrings(kind: type) -> dict[str, str]:
     for owner in reversed(kind.__mro__):
         if not owner.__module__.startswith("sand."):
             continue
-        body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
-        lines = getattr(body, "body", [])
-        for entry, text in itertools.pairwise(lines):
-            named = isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name)
-            if named and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
-                found[entry.target.id] = " ".join(str(text.value.value).split())
+        with contextlib.suppress(OSError):  # a class made while the program runs has no source; its bases have theirs
+            body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+            lines = getattr(body, "body", [])
+            for entry, text in itertools.pairwise(lines):
+                named = isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name)
+                if named and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                    found[entry.target.id] = " ".join(str(text.value.value).split())
     return found

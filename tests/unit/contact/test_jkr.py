@@ -45,6 +45,10 @@ def test_energies_of_breaking_and_of_a_cycle():
     assert broken - formation == pytest.approx(E_CYCLE, abs=6e-7)
 
 
+@pytest.mark.validates(
+    "closed form",
+    "The contact radius of JKR at a given overlap, against bisection in extended precision",
+)
 @pytest.mark.parametrize("function", [jkr.root, jkr.polynomial_root])
 def test_the_inverse_is_accurate_to_1e_12(record_bound, function):
     """a(δ) against bisection in extended precision, −0.99 … 100 δc (polynomial_root: up to 11.25 δc)."""

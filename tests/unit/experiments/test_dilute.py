@@ -277,6 +277,7 @@ def test_a_constant_kernel_gives_the_exact_mean_size():
     check_constant_kernel(40, 20, 4.0)
 
 
+@pytest.mark.validates("closed form", "Populations with a constant kernel have the exact mean size")
 @pytest.mark.validate
 def test_a_constant_kernel_gives_the_exact_mean_size_of_many(record_bound):
     """As above with 200 populations of 200 bodies; 3 standard errors at each time."""

@@ -222,6 +222,7 @@ def test_drag_alone_is_an_exponential(accommodation):
         assert (grains.spin == before.spin).all()
 
 
+@pytest.mark.validates("closed form", "Grains in a gas have the temperature of the gas in all six degrees of freedom")
 @pytest.mark.compiled("small")
 @compiled
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import pytest
 
 from sand.compiler.jit import COMPILED, kernel
 
-from ...validation import RECORD, BoundRecorder, Recorder, exists, parse_part, part_of, read_record
+from ...claims import rows_of
+from ...validation import BoundRecorder, Recorder, parse_part, part_of
 
 
 def test_an_unmarked_test_compiles_nothing():
@@ -41,12 +42,14 @@ def test_the_record_has_the_numbers_of_passed_tests(tmp_path):
         "tests/unit/repository/test_tiers.py::test_parts_that",
     )
     old = [
-        (name, "x", "1", "", "2", "2020-01-01", "abc") for name in ("tests/gone.py::test_it", other, f"{same}_do[a]")
+        (name, "x", "1", "", "2", "2020-01-01", "abc")
+        for name in ("tests/gone.py::test_it", other, f"{same}_do[a]", f"{same}_do_not_exist[of another version]")
     ]
     path = tmp_path / "record.csv"
     lines = ["test,quantity,value,least,most,date,commit", *(",".join(row) for row in old)]
     path.write_text("\n".join(lines) + "\n", "utf-8")
     recorder, properties = Recorder(path), []
+    recorder.cases.add(f"{same}_do_not_exist[a/b]")
     check = BoundRecorder(properties)
     check("energy error", 2e-7, most=1e-6)
     for quantity, value, bounds in (("a", 2.0, {"most": 1.0}), ("b", float("nan"), {"least": 0.0}), ("c", 0.0, {})):
@@ -57,16 +60,8 @@ def test_the_record_has_the_numbers_of_passed_tests(tmp_path):
         nodeid = f"tests/unit/repository/test_tiers.py::test_{name}" if passed else f"{same}_do[a]"
         recorder.pytest_runtest_logreport(SimpleNamespace(nodeid=nodeid, **report))
     recorder.pytest_sessionfinish(None)
-    new, kept = read_record(path)
+    new, kept = rows_of(path)
     assert (new["test"], new["value"], new["least"], new["most"]) == (
         "tests/unit/repository/test_tiers.py::test_new", "2e-07", "", "1e-06",
     )  # fmt: skip
     assert tuple(kept.values()) == old[1]
-
-
-def test_every_row_of_the_record_has_a_test_and_is_within_its_bounds():
-    """The table in the repository names tests that exist; `pytest --record` removes rows of others."""
-    rows = read_record(RECORD)
-    assert rows and [row["test"] for row in rows if not exists(row["test"])] == []
-    for row in rows:
-        assert float(row["least"] or "-inf") <= float(row["value"]) <= float(row["most"] or "inf"), row

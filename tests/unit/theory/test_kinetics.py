@@ -32,6 +32,7 @@ def measured_z(kernel, per_decade=6, largest=1e11):
     return grown.exponent(2.0)
 
 
+@pytest.mark.validates("closed form", "Smoluchowski's equation with a constant kernel has the exact size distribution")
 def test_constant_kernel_against_the_exact_solution(record_bound):
     """n_k = n0 T^(k−1)/(1+T)^(k+1), T = t/τ, τ = 2/(K n0); dM2/dt = K M1² gives S = 1 + 2T, dS/dt = 2/τ.
 
@@ -50,6 +51,10 @@ def test_constant_kernel_against_the_exact_solution(record_bound):
     assert np.abs(implicit.numbers / DENSITY - exact[:3, :100]).max() < 1e-7
 
 
+@pytest.mark.validates(
+    "closed form",
+    "Smoluchowski's equation with the additive kernel has the solution of Golovin (1963)",
+)
 def test_additive_kernel_against_golovin(record_bound):
     """n_k = n0 (1−φ) (kφ)^(k−1) e^(−kφ)/k!, φ = 1 − e^(−T), T = b n0 t, and S = e^(2T), for K = b(N1 + N2).
 
