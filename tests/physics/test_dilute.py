@@ -255,7 +255,7 @@ attract each other: seeds 101 and 102, and 30,000, 20,000, 74,000, 74,000, 24,00
 
 @pytest.mark.validates(
     "other program",
-    "Rate coefficients of magnetic pairs, some with moments that cancel, are those of an independent program",
+    "Rate coefficients of magnetic pairs, some with moments that cancel, are those of a sum over all pairs",
 )
 @pytest.mark.validate
 @pytest.mark.parametrize("name", AWKWARD)
@@ -317,6 +317,7 @@ WIDE = {name: (*pair[:2], {}) for name, pair in AWKWARD.items()} | {
 """Pairs, and options of their flights, with which b̂ is tried as a bound."""
 
 
+@pytest.mark.validates("self-consistency", "No flight from beyond the bound of the impact parameter leads to a hit")
 @pytest.mark.validate
 @pytest.mark.parametrize("name", WIDE)
 def test_no_path_beyond_the_bound_leads_to_a_hit(name, record_bound):
