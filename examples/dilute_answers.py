@@ -2,7 +2,8 @@
 
 Run it with:  python examples/dilute_answers.py --cases magnetic plain --seeds 1 16 --workers 2 --out dilute-answers
 It writes a table for each case with a row for each population and end, answers.csv with means and 95 % intervals over
-populations (Student's t), and three figures.  The same command continues, and rows that are there are not computed
+populations (Student's t), times.csv and exponents.csv with the most asked for, and three figures.  The same command
+continues, and rows that are there are not computed
 again; tables of other machines may be joined, a line for each row.  `--cases` without a name reads the tables alone.
 Grains of 20 nm are larger than one magnetic domain of iron: that case shows how growth depends on the radius.
 """
@@ -209,6 +210,35 @@ SHOWN = ("t_2", "t_8", "t_20", "t_96", "t_ratio_0.5", "t_ratio_0.2", "lambda_20"
 SHOWN += ("dimension", "gamma_large", "dimension_large", "share_magnetic", "purity", "c", "cpu_seconds")
 
 
+SUMMARY = {
+    "times": {
+        "t_ratio_0.5": "n₀t at n/n₀ = 0.5 [s/m³]",
+        "t_ratio_0.2": "at 0.2",
+        "t_2": "at S = 2",
+        "t_8": "at 8",
+        "t_20": "at 20",
+        "t_96": "at 96",
+        "lambda_20": "λ, S = 2–20",
+        "lambda_96": "λ, S = 2–96",
+        "z_96": "z, S = 2–96",
+    },
+    "exponents": {
+        "gamma": "γ, N = 3–100",
+        "gamma_large": "γ, N = 30–150",
+        "dimension": "D_f, N = 3–100",
+        "dimension_large": "D_f, N = 30–150",
+        "c": "c",
+        "cpu_seconds": "CPU time of a population [s]",
+    },
+}
+"""Quantities of the summaries times.csv and exponents.csv, and titles of their columns."""
+
+
+def _text(found: tuple[Interval, int] | None, populations: int) -> str:
+    """A mean with its interval; nothing if not all populations have it."""
+    return found[0].text() if found is not None and found[1] == populations else ""
+
+
 def figures(groups: dict[tuple[str, str, float], list[dict[str, Any]]], out: Path) -> None:
     """Figures of each case, at its largest S: S(t) and λ(S); r_g and μ over N; c by classes."""
     last = {}
@@ -271,9 +301,12 @@ def summarise(out: Path) -> None:
     for name in CASES:
         for row in table_of(out / f"{name}.csv"):
             groups.setdefault((name, row["hits"], row["end"]), []).append(row)
-    lines = []
+    lines, summary = [], {table: list[dict[str, Any]]() for table in SUMMARY}
     for (name, hits, end), rows in groups.items():
         found = intervals(rows)
+        for table, columns in SUMMARY.items():
+            head = {"case": f"{name}, {hits}", "until S": f"{end:g}", "populations": len(rows)}
+            summary[table].append(head | {title: _text(found.get(each), len(rows)) for each, title in columns.items()})
         print(f"{name}, {hits}, S = {end:g}: {len(rows)} populations")
         for quantity, (value, number) in found.items():
             one = {"case": name, "hits": hits, "end": end, "quantity": quantity, **value._asdict()}
@@ -282,6 +315,8 @@ def summarise(out: Path) -> None:
                 print(f"  {quantity:16} {value.text()}")
     if lines:
         write_table(out / "answers.csv", lines)
+        for table, summed in summary.items():
+            write_table(out / f"{table}.csv", summed)
         figures(groups, out)
 
 
