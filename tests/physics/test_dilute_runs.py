@@ -110,8 +110,8 @@ def test_the_kernel_follows_from_hits_and_bounds(population):
     assert kernel.edges[0] == 1 and kernel.value[0, 1] == kernel.value[1, 0]
     assert abs(kernel.value[0, 0] - 3.03e-14) < 4.0 * kernel.error[0, 0]
     # the table of classes is a kernel of any two masses in its range, which the coagulation equation takes
-    mass = 3.298e-20
-    table = measured(kernel.rows(mass), extrapolate=True)
+    mass = float(population.encounters["mass1"].min())
+    table = measured(kernel.rows(), extrapolate=True)
     assert table(mass, mass) == pytest.approx(kernel.value[0, 0], rel=1e-6, abs=0.0)
     assert table(2.0 * mass, mass) == pytest.approx(kernel.value[0, 1], rel=1e-6, abs=0.0)
     both = kernel_of([population.encounters] * 2)

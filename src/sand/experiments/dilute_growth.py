@@ -211,7 +211,8 @@ def _draw(found: Grown, settings: Settings) -> None:
     announce("drawing the figure")
     grains = settings.grains
     moments = np.linalg.norm(grains.moment, axis=1)
-    unit = float(grains.mass.mean()), float(grains.radius.mean()), float(moments.mean()), settings.temperature
+    moment = float(moments[moments > 0.0].mean()) if moments.any() else 0.0
+    unit = float(grains.radius.mean()), moment, settings.temperature
     save(dilute_figure(found.ledger, found.aggregates, found.encounters, unit), found.folder / files.FIGURE)
 
 
