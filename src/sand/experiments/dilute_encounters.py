@@ -64,7 +64,7 @@ class Encounter(NamedTuple):
     pieces: int
     rest_time: float  # time of the contact phase [s]
     contact_steps: int
-    others: float  # expected encounters of the two with others during the flight
+    others: float  # expected encounters of the two with others during the flight, without the contact phase
     energies: dict[str, float]  # of a hit, by channel [J]; empty if not computed
 
     def row(self) -> dict[str, Any]:

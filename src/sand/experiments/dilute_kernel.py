@@ -42,9 +42,9 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
     """K = Σ hits/Σ (1/K̂) over draws of pairs of two classes, which converges to K: a pair is drawn at the rate K̂/V.
 
     In a time t each pair adds Kt/V to the mean of the first sum, and t/V to that of the second one, so that the ratio
-    is K, averaged over the pairs that were there; for a finite number of draws it has a bias of the order 1/draws. Draws
-    with a body and its own copy are left out. Of one population the error is that of the number of hits, K/√hits; of
-    several it is at least this, and otherwise that from the scatter of the populations.
+    is K, averaged over the pairs that were there; a finite number of draws gives a bias of the order 1/draws. Draws of
+    a body and its own copy are left out. Of one population the error is that of the number of hits, K/√hits; of several
+    it is at least this, and otherwise that from the scatter of the populations.
 
     Parameters
     ----------

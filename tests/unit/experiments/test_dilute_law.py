@@ -88,7 +88,11 @@ def test_the_kernel_of_classes_has_the_masses_of_their_bodies():
     columns = {name: column[:3] for name, column in drawn(1).items()}
     columns |= {"grains1": np.ones(3), "grains2": np.ones(3), "kernel": np.array([1.0, 2.0, 4.0]) * 1e-14}
     columns |= {"mass1": MASS * np.array([1.0, 2.0, 50.0]), "mass2": MASS * np.array([3.0, 4.0, 50.0])}
-    columns |= {"end": np.array([0.0, 1.0, 0.0]), "body1": np.array([0.0, 1.0, 7.0]), "body2": np.array([2.0, 3.0, 7.0])}
+    columns |= {
+        "end": np.array([0.0, 1.0, 0.0]),
+        "body1": np.array([0.0, 1.0, 7.0]),
+        "body2": np.array([2.0, 3.0, 7.0]),
+    }
     (row,) = kernel_of([columns]).rows()
     assert row == pytest.approx((2.5 * MASS, 2.5 * MASS, 1e-14 / 1.5, 1.0), rel=1e-12, abs=0.0)
 
