@@ -434,7 +434,7 @@ def test_the_gas_must_leave_flights_of_every_body_alone():
 
 
 def test_flips_of_moments_count_in_every_magnetic_body():
-    """Plain grains and one magnetic one at the end: at 1000 K its moment flips within a flight; without it none does."""
+    """One magnetic grain after plain ones: at 1000 K its moment flips within a flight; without it none does."""
     moments = np.zeros((20, 3))
     moments[-1, 2] = MOMENT
     for moment, fails in ((moments, True), (np.zeros((20, 3)), False)):
