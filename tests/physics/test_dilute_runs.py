@@ -10,7 +10,8 @@ import sand
 from sand.analysis.clusters import cluster_labels
 from sand.basics.errors import BadInput
 from sand.cli.main import main
-from sand.experiments import dilute_files, dilute_growth
+from sand.experiments import dilute_files, dilute_flight, dilute_growth, dilute_state
+from sand.experiments.dilute_encounters import RECENT
 from sand.experiments.dilute_kernel import kernel_of
 from sand.experiments.growth import growth_of, read_box
 from sand.experiments.kernel_table import measured
@@ -86,6 +87,10 @@ def test_the_ledger_and_the_table_of_encounters_agree(population):
     assert released > 0.0 and abs(books) < 1e-3 * released
     kinetic = found["touch_kinetic"] + found["touch_rotation"] + found["kinetic"]
     assert ledger["to_gas"][-1] == pytest.approx(kinetic[found["end"] == 0].sum(), rel=1e-9, abs=0.0)
+    hits = found["end"] == 0
+    touch = (found["energy_start"] + found["flight_error"])[hits].sum()
+    assert ledger["touch_energy"][-1] == pytest.approx(touch, rel=1e-9, abs=0.0)
+    assert ledger["flight_error"][-1] == pytest.approx(found["flight_error"][hits].sum(), rel=1e-9, abs=0.0)
     ratio = found["impact_parameter"] / found["bound"]
     assert ratio.max() < 1.0
 
@@ -100,8 +105,30 @@ def test_results_are_read_as_those_of_boxes(population):
     sizes = np.bincount(cluster_labels(len(run.frames[-1]), run.frames[-1].pair))
     assert (sizes**2).sum() / sizes.sum() == pytest.approx(run.ledger["mean_cluster_size"][-1], rel=1e-12, abs=0.0)
     assert sizes[sizes > 1].tolist() == population.aggregates["grains"].tolist()
-    found = growth_of([read_box(population.folder)], (1.5, 3.0))
+    box = read_box(population.folder)
+    found = growth_of([box], (1.5, 3.0))
     assert found.temperatures == {} and found.moment is not None
+
+
+def test_the_analysis_counts_a_body_and_its_copies_once(tmp_path):
+    """Aggregates of the last frame in `sand analyse` are those of aggregates.csv with different `body`.
+
+    The population has been doubled, so that there are copies; statistics of a body and its copy are equal to the single
+    precision of frames, and the order of both tables is the same. Sizes of all clusters have the copies: their S is
+    that of the ledger.
+    """
+    how = {**NUMBERS, "stop": "mean_cluster_size >= 8", "seed": 1, "hits": "stick"}
+    grown = dilute_growth.grow(grains(), FORCES, **how, out=tmp_path / "one")
+    table, box = grown.aggregates, read_box(grown.folder)
+    found, sizes = box.aggregates, box.last_sizes
+    assert (sizes**2).sum() / sizes.sum() == pytest.approx(grown.ledger["mean_cluster_size"][-1], rel=1e-12, abs=0.0)
+    assert len(sizes) == grown.ledger["clusters"][-1] and sizes.sum() == grown.ledger["grains"][-1] > 100
+    first = np.sort(np.unique(table["body"], return_index=True)[1])
+    assert 0 < len(first) < len(table["body"]) and table["copy"].any()
+    last = found["time"] == found["time"][-1]
+    assert last.sum() == len(first)
+    for name in ("grains", "mass", "moment", "gyration_radius"):
+        assert found[name][last] == pytest.approx(table[name][first], rel=1e-5, abs=0.0)
 
 
 def test_the_kernel_follows_from_hits_and_bounds(population):
@@ -110,12 +137,62 @@ def test_the_kernel_follows_from_hits_and_bounds(population):
     assert kernel.edges[0] == 1 and kernel.value[0, 1] == kernel.value[1, 0]
     assert abs(kernel.value[0, 0] - 3.03e-14) < 4.0 * kernel.error[0, 0]
     # the table of classes is a kernel of any two masses in its range, which the coagulation equation takes
-    mass = 3.298e-20
-    table = measured(kernel.rows(mass), extrapolate=True)
+    mass = float(population.encounters["mass1"].min())
+    table = measured(kernel.rows(), extrapolate=True)
     assert table(mass, mass) == pytest.approx(kernel.value[0, 0], rel=1e-6, abs=0.0)
     assert table(2.0 * mass, mass) == pytest.approx(kernel.value[0, 1], rel=1e-6, abs=0.0)
     both = kernel_of([population.encounters] * 2)
     assert both.value[0, 0] == pytest.approx(kernel.value[0, 0], rel=1e-12, abs=0.0)
+
+
+STICK = {**NUMBERS, "hits": "stick", "seed": 1}
+
+
+def test_encounters_with_others_count_after_a_hundred_hits(tmp_path, monkeypatch):
+    """A population that would stop at once (any number of others is too many) has its first hundred hits."""
+    monkeypatch.setattr(dilute_growth, "MOST_OTHERS", 1e-30)
+    found = dilute_growth.grow(grains(), FORCES, **STICK, stop="mean_cluster_size >= 1e9", out=tmp_path / "one")
+    assert found.outcome == "not binary" and found.ledger["hits"][-1] == RECENT
+
+
+def test_flights_without_hit_or_escape_are_counted(tmp_path, monkeypatch):
+    """With at most 300 steps about half of the flights end on their way: a warning, `end` 2, and their number in the ledger.
+
+    All other draws are hits, as many as the ledger has, or misses.
+    """
+    monkeypatch.setattr(dilute_flight, "MOST_FLIGHT_STEPS", 300)
+    with pytest.warns(UserWarning, match="still together"):
+        found = dilute_growth.grow(grains(), FORCES, **STICK, stop="mean_cluster_size >= 1.5", out=tmp_path / "one")
+    ends = found.encounters["end"]
+    assert (ends == 2).sum() == found.ledger["bound"][-1] > 0
+    assert (found.encounters["flight_steps"][ends == 2] == 300).all() and (ends == 0).sum() == found.ledger["hits"][-1]
+    assert set(ends) == {0.0, 1.0, 2.0}
+
+
+def test_charges_that_turn_around_before_their_flight_are_no_misses(tmp_path):
+    """Equal charges at 100 K: an end of its own, without a flight; the ledger counts flights alone.
+
+    Q/e = 835 K k_B of two elementary charges at 20 nm, 8 k_BT, keeps thermal bodies apart; opposite ones all hit.
+    """
+    charge = np.resize([1.0, -1.0], 100) * 1.602176634e-19
+    own = grains(moment=None, charge=charge)
+    forces = [FORCES[0], sand.Charges()]
+    found = dilute_growth.grow(own, forces, **STICK, stop="mean_cluster_size >= 1.5", out=tmp_path / "one")
+    ends = found.encounters["end"]
+    repelled = ends == 3
+    assert repelled.any() and (found.encounters["flight_steps"][repelled] == 0).all()
+    assert (found.encounters["flight_steps"][~repelled] > 0).all()
+    assert found.ledger["flights"][-1] == (~repelled).sum()
+
+
+def test_a_checkpoint_of_an_earlier_version_is_refused(tmp_path, monkeypatch):
+    """One line, where the checkpoint lacks a number; nothing changes in the folder."""
+    numbers = tuple(name for name in dilute_state.SINGLE_NUMBERS if name != "bound")
+    with monkeypatch.context() as patched:
+        patched.setattr(dilute_state, "SINGLE_NUMBERS", numbers)
+        dilute_growth.grow(grains(), FORCES, **STICK, stop="mean_cluster_size >= 1.2", out=tmp_path / "one")
+    with pytest.raises(BadInput, match="earlier version"):
+        dilute_growth.grow(grains(), FORCES, **STICK, stop="mean_cluster_size >= 1.5", out=tmp_path / "one")
 
 
 def small_case(tmp_path, **changes):

@@ -42,7 +42,7 @@ CAPABILITIES = {
     "figure of a cake between walls": 298,
     "elastic moduli and sound of packings at rest (sand elastic): strains, waves, case, job, figure": 732,
     "growth in dilute dust: flights in few steps, bound and draws of encounters, contact phases in engines that are "
-    "filled again, populations as runs, charges, a field, kernel": 1970,
+    "filled again, populations as runs, charges, a field, kernel": 2006,
     "figures in the width and style of a journal, several runs in one figure, s² n_s, stills as outlines, percolating "
     "packings inside the box, shares of each value of a sweep, materials of files in methods": 759,
     "bodies of dilute dust that keep momentum and spin between encounters": 242,

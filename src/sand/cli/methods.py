@@ -205,11 +205,16 @@ def _of_growth(folder: Path, path: Path) -> Sentences:
     content, seeds = read_growth(path)
     if is_dilute(content):
         checked = check_dilute(content, str(path))
+        motion = "with thermal speeds, spins and orientations"
+        if checked.method.between == "own":
+            motion = "that keep momentum and spin from one to the next"
+        touch = "joined at the touch"
+        if checked.method.hits == "resolve":
+            touch = "were followed with contact steps of all grains until at rest"
         yield (
-            "Growth was followed by a Monte Carlo of encounters of two bodies with thermal speeds, spins "
-            f"and orientations, at {checked.density:.3g} bodies per m³, in populations that differ by the seed "
-            f"alone: seeds {_seeds(seeds or DEFAULT_SEEDS)}. Each encounter was flown with all dipoles"
-            + (", and each contact computed grain by grain." if checked.method.hits == "resolve" else ".")
+            f"Growth was followed by a Monte Carlo of encounters of two bodies {motion}, at {checked.density:.3g} "
+            f"bodies per m³, in populations that differ by the seed alone: seeds {_seeds(seeds or DEFAULT_SEEDS)}. "
+            f"Bodies flew as rigid ones with the forces of their grains, and those that touched {touch}."
         )
         checked.case.grains.extent = None  # positions do not matter
         yield from _of_case(checked.case, {})

@@ -42,8 +42,10 @@ class Body:
         Their contacts, with displacements in the principal frame.
     flying : FlyingBody
         What flights need: groups of grains, moments of inertia, extent.
-    mass, strength, charge : float
+    mass, moment_sum, charge : float
         M [kg], Σ|μ| [A m²] and Σ|q| [C].
+    radii : tuple of float
+        Smallest and largest radius of its grains [m].
     number : int
         Number of the body, in the order in which bodies formed; equal for copies.
     born : int
@@ -58,8 +60,9 @@ class Body:
     contacts: StrainedContacts
     flying: FlyingBody
     mass: float
-    strength: float
+    moment_sum: float
     charge: float
+    radii: tuple[float, float]
     number: int = 0
     born: int = 0
     copy: int = 0
@@ -98,7 +101,7 @@ def body_at_rest(
     own = grains._replace(
         velocity=zeros, spin=zeros, body_moment=grains.moment, orientation=pose, force=zeros, torque=zeros, field=zeros
     )
-    x, moment, strength = own.position, own.moment, np.linalg.norm(own.moment, axis=0)
+    x, moment, magnitude = own.position, own.moment, np.linalg.norm(own.moment, axis=0)
     flying = FlyingBody(
         groups_of(x.T, moment.T),
         own.radius,
@@ -107,8 +110,9 @@ def body_at_rest(
         (0.0, 0.0, 0.0, 1.0),
         float((np.linalg.norm(x, axis=0) + own.radius).max()),
     )
-    total = float(own.mass.sum()), float(strength.sum()), float(np.abs(own.charge).sum())
-    return Body(own, contacts, flying, *total, *identity)
+    total = float(own.mass.sum()), float(magnitude.sum()), float(np.abs(own.charge).sum())
+    radii = float(own.radius.min()), float(own.radius.max())
+    return Body(own, contacts, flying, *total, radii, *identity)
 
 
 def in_space(a: Body, b: Body, y: np.ndarray) -> tuple[GrainArrays, StrainedContacts]:

@@ -152,7 +152,7 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
     population = Population(bodies, len(bodies) / density, majorant)
     check_gas(gas, start.grains, population, method.between)
     check_moments(start.grains, temperature, population)
-    strongest = float(population.sizes.strength.max())
+    strongest = float(population.sizes.moment_sum.max())
     capture = math.sqrt(3.0) * (contact_energy(strongest, strongest, 1.0, MAGNETIC) / majorant.heat) ** (1.0 / 3.0)
     between = len(bodies) / (2.0 * population.rate)
     numbers = {"bodies": len(bodies), "number_density": density, "capture_length": capture, "between": between}
@@ -166,7 +166,7 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
     if capture > 0.0:
         text = f"{format_quantity(capture, 'm')} at {temperature:g} K; n b^3 = {density * capture**3:.2g}"
         rows.append(("thermal capture", text))
-    hits = "computed grain by grain until at rest" if method.hits == "resolve" else "joined at the touch"
+    hits = "contact steps of all grains until at rest" if method.hits == "resolve" else "joined at the touch"
     cost = expected_cost(checked, len(start.grains))
     if cost > 0.0:
         rows.append(("wall time", f"about {format_quantity(float(f'{cost:.2g}'), 's')} a population, a rough estimate"))

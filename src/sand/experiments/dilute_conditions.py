@@ -223,7 +223,7 @@ def _flight_time(population: Population) -> float:
     """Longest time [s] of typical flights of two equal magnetic bodies."""
     found, majorant = [0.0], population.majorant
     for body in population.bodies:
-        if body.strength > 0.0:
+        if body.moment_sum > 0.0:
             size, speed = sizes_of(body), math.sqrt(2.0 * majorant.heat / body.mass)
             found.append(2.0 * start_distance(body, body, float(majorant.bound(size, size, speed))) / speed)
     return max(found)

@@ -43,6 +43,8 @@ class Encounter(NamedTuple):
     body2: int
     copy1: int  # 0, or the doubling in which the body was copied
     copy2: int
+    mass1: float  # [kg]
+    mass2: float
     moment1: float  # net moments [A m²]
     moment2: float
     speed: float  # relative speed at a large distance [m/s]
@@ -62,7 +64,7 @@ class Encounter(NamedTuple):
     pieces: int
     rest_time: float  # time of the contact phase [s]
     contact_steps: int
-    others: float  # expected encounters of the two with others during the flight
+    others: float  # expected encounters of the two with others during the flight, without the contact phase
     energies: dict[str, float]  # of a hit, by channel [J]; empty if not computed
 
     def row(self) -> dict[str, Any]:
@@ -225,7 +227,7 @@ def _drawn(event: int, time: float, a: Body, b: Body) -> dict[str, Any]:
     found: dict[str, Any] = {"event": event, "time": time}
     for k, body in ((1, a), (2, b)):
         found |= {f"grains{k}": len(body), f"body{k}": body.number, f"copy{k}": body.copy}
-        found |= {f"moment{k}": net_moment(body)}
+        found |= {f"mass{k}": body.mass, f"moment{k}": net_moment(body)}
     return found
 
 

@@ -31,9 +31,9 @@ def dilute_figure(
     ledger, aggregates, encounters : mapping
         Columns of the files of the population.
     unit : tuple
-        Mass [kg], radius [m] and moment [A m²] of a grain, and the temperature [K].
+        Mean radius of the grains [m], mean moment of the magnetic ones [A m²], and the temperature [K].
     """
-    mass, radius, moment, temperature = unit
+    radius, moment, temperature = unit
     # points at equal distances of ln S
     steps = np.linspace(0.0, math.log(ledger["mean_cluster_size"][-1]), POINTS)
     later = np.unique(np.searchsorted(np.log(ledger["mean_cluster_size"]), steps))
@@ -52,7 +52,7 @@ def dilute_figure(
     if moment > 0.0:
         of_moments = [_means(grains, aggregates["moment"] / moment, "μ/μ₁")]
         law = [Guide("N^0.63, the paper", np.array([2.0, grains.max()]), np.array([2.0, grains.max()]) ** 0.63)]
-        number, hits, expected = capture_sums(encounters, temperature, mass)
+        number, hits, expected = capture_sums(encounters, temperature)
         enough = hits >= LEAST_HITS
         value = hits[enough] / expected[enough]
         error = value / np.sqrt(hits[enough])

@@ -104,7 +104,6 @@ class RigidFlights:
         needed = max(body.flying.groups.point.shape[1] for body in (a, b))
         if self._now.position1.shape[1] < needed:
             self._now = Now(*(np.zeros((3, 2 * needed)) for _ in Now._fields))
-        radii = [f(body.grains.radius) for body in (a, b) for f in (np.min, np.max)]
         charged = a.charge * b.charge > 0.0
         pair = FlyingPair(
             a.flying,
@@ -112,9 +111,9 @@ class RigidFlights:
             MAGNETIC,
             COULOMB,
             a.mass * b.mass / (a.mass + b.mass),
-            float(min(radii)),
-            float(max(radii)),
-            float(contact_energy(a.strength, b.strength, 1.0, MAGNETIC)),
+            min(a.radii[0], b.radii[0]),
+            max(a.radii[1], b.radii[1]),
+            float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC)),
             COULOMB * a.charge * b.charge,
             self.field,
             escape,
@@ -155,5 +154,4 @@ def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: floa
 
 def start_distance(a: Body, b: Body, bound: float, start: float = START) -> float:
     """Distance [m] of the plane on which a flight starts: 2 b̂, but at least that at which the bodies are clear."""
-    widest = max(float(a.grains.radius.max()), float(b.grains.radius.max()))
-    return max(start * bound, a.extent + b.extent + 4.0 * widest)
+    return max(start * bound, a.extent + b.extent + 4.0 * max(a.radii[1], b.radii[1]))

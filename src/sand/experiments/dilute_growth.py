@@ -47,7 +47,7 @@ from .dilute_kernel import Kernel, kernel_of
 from .dilute_majorant import Majorant
 from .dilute_own import OwnMajorant, thermal_body
 from .dilute_population import Population
-from .dilute_state import SINGLE_NUMBERS, population_from
+from .dilute_state import SINGLE_NUMBERS, holds_all, population_from
 
 BETWEEN = ("thermal", "own")
 """What happens between encounters: the gas thermalises all bodies, or they keep momentum and spin."""
@@ -135,7 +135,7 @@ def grow(
     Bodies, the clusters of the grains, are in a volume at a number density; between two encounters speeds, spins and
     orientations are those of thermal equilibrium, or momenta and spins those after the last encounter.  Pairs of bodies
     are drawn in proportion to an upper bound of their collision rate, and fly from far away as rigid bodies; if they
-    touch, their collision is computed grain by grain until the grains are at rest.  When half of the bodies are left,
+    touch, contact steps of their grains follow until these are at rest.  When half of the bodies are left,
     all are copied, and the volume is doubled.
 
     Parameters
@@ -182,6 +182,11 @@ def grow(
     kept = kept_population(folder) if folder.is_dir() and not overwrite else None
     if kept is not None and _without_end(kept[1].get("case", {})) != _without_end(files.plain(described)):
         raise BadInput(f"{folder} holds a population with other settings; give another folder, or overwrite=True")
+    if kept is not None and not holds_all(*kept):
+        raise BadInput(
+            f"{folder} holds a population of an earlier version of SAND, which cannot go on; give another folder, or "
+            "overwrite=True"
+        )
     if kept is None:
         begun = _begin(settings, None)  # which refuses what does not fit, before anything is written
         files.make_folder(folder, overwrite=overwrite)
@@ -211,7 +216,8 @@ def _draw(found: Grown, settings: Settings) -> None:
     announce("drawing the figure")
     grains = settings.grains
     moments = np.linalg.norm(grains.moment, axis=1)
-    unit = float(grains.mass.mean()), float(grains.radius.mean()), float(moments.mean()), settings.temperature
+    moment = float(moments[moments > 0.0].mean()) if moments.any() else 0.0
+    unit = float(grains.radius.mean()), moment, settings.temperature
     save(dilute_figure(found.ledger, found.aggregates, found.encounters, unit), found.folder / files.FIGURE)
 
 

@@ -1,4 +1,4 @@
-"""Bodies after a hit: joined at the touch, or computed grain by grain until they are at rest."""
+"""Bodies after a hit: joined at the touch, or with contact steps of their grains until these are at rest."""
 
 from __future__ import annotations
 

@@ -12,6 +12,8 @@ from ..basics.constants import BOLTZMANN, MAGNETIC
 from .dilute_majorant import mean_power
 from .scattering.rigid_flight import contact_energy
 
+CANCELLED = 1e-9
+"""Net moment of a body, in units of the largest of its population, below which its moments cancel to rounding."""
 CLASSES = (1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513, 1025)
 """Smallest numbers of grains of the classes: 1, 2, 3–4, 5–8, …"""
 
@@ -25,21 +27,24 @@ class Kernel(NamedTuple):
     hits: np.ndarray  # (C, C) hits from which it follows
     draws: np.ndarray  # (C, C)
     sizes: np.ndarray  # (C,) mean number of grains in the draws of a class
+    masses: np.ndarray  # (C,) their mean mass [kg]
 
-    def rows(self, mass: float, draws: int = 1) -> list[tuple[float, float, float, float]]:
+    def rows(self, draws: int = 1) -> list[tuple[float, float, float, float]]:
         """Rows (m1, m2, K over 1 m/s, 1 m/s) of all pairs of classes with hits, as `kernel_table.measured` takes them.
 
-        `mass` is that of a grain [kg]; pairs with fewer than `draws` draws, whose K is uncertain, are left out.
+        Pairs with fewer than `draws` draws, whose K is uncertain, are left out.
         """
         pairs = zip(*np.nonzero(np.triu(self.hits) * (self.draws >= draws)), strict=True)
-        return [(mass * self.sizes[i], mass * self.sizes[j], self.value[i, j], 1.0) for i, j in pairs]
+        return [(self.masses[i], self.masses[j], self.value[i, j], 1.0) for i, j in pairs]
 
 
 def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[int] | None = None) -> Kernel:
-    """K = Σ hits/Σ (1/K̂) over draws of pairs of two classes: unbiased, as a pair is drawn at the rate K̂/V.
+    """K = Σ hits/Σ (1/K̂) over draws of pairs of two classes, which converges to K: a pair is drawn at the rate K̂/V.
 
-    Draws with a body and its own copy are left out. Of one population the error is that of the number of hits, K/√hits;
-    of several it is that of their mean, from the scatter of the populations.
+    In a time t each pair adds Kt/V to the mean of the first sum, and t/V to that of the second one, so that the ratio
+    is K, averaged over the pairs that were there; a finite number of draws gives a bias of the order 1/draws. Draws of
+    a body and its own copy are left out. Of one population the error is that of the number of hits, K/√hits; of several
+    it is at least this, and otherwise that from the scatter of the populations.
 
     Parameters
     ----------
@@ -50,7 +55,7 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
     """
     bounds = np.array(CLASSES if edges is None else edges, float)
     hits, weight, draws = (np.zeros((len(encounters), len(bounds) - 1, len(bounds) - 1)) for _ in range(3))
-    grains, bodies = np.zeros(len(bounds) - 1), np.zeros(len(bounds) - 1)
+    grains, mass, bodies = np.zeros((3, len(bounds) - 1))
     for k, each in enumerate(encounters):
         first, second = (np.searchsorted(bounds, each[f"grains{n}"], "right") - 1 for n in (1, 2))
         inside = (np.minimum(first, second) >= 0) & (np.maximum(first, second) < len(bounds) - 1)
@@ -59,9 +64,10 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
         np.add.at(hits[k], (low, high), each["end"][inside] == 0)
         np.add.at(weight[k], (low, high), 1.0 / each["kernel"][inside])
         np.add.at(draws[k], (low, high), 1.0)
-        for number, column in ((first, "grains1"), (second, "grains2")):
-            np.add.at(grains, number[inside], each[column][inside])
-            np.add.at(bodies, number[inside], 1.0)
+        for n, number in ((1, first[inside]), (2, second[inside])):
+            np.add.at(grains, number, each[f"grains{n}"][inside])
+            np.add.at(mass, number, each[f"mass{n}"][inside])
+            np.add.at(bodies, number, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         value = hits.sum(axis=0) / weight.sum(axis=0)
         error = value / np.sqrt(hits.sum(axis=0))
@@ -70,7 +76,8 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
             error = np.maximum(apart / weight.sum(axis=0), error)
     total = value, error, hits.sum(axis=0), draws.sum(axis=0)
     both = [np.triu(each) + np.triu(each, 1).T for each in total]
-    return Kernel(bounds.astype(int), both[0], both[1], both[2], both[3], grains / np.maximum(bodies, 1.0))
+    means = [column / np.maximum(bodies, 1.0) for column in (grains, mass)]
+    return Kernel(bounds.astype(int), both[0], both[1], both[2], both[3], *means)
 
 
 class CaptureSums(NamedTuple):
@@ -81,22 +88,25 @@ class CaptureSums(NamedTuple):
     expected: np.ndarray  # (C,)
 
 
-def capture_sums(encounters: Mapping[str, np.ndarray], temperature: float, mass: float) -> CaptureSums:
+def capture_sums(encounters: Mapping[str, np.ndarray], temperature: float) -> CaptureSums:
     """Hits, and Σ ⟨π b_max² v⟩/K̂ over draws: the ratio is c = K/⟨π b_max² v⟩ with the actual net moments (Eq. 14).
 
-    Both sums are unbiased, as a pair is drawn at the rate K̂/V. Draws of bodies without a moment are left out.
+    It converges to c, as a pair is drawn at the rate K̂/V. Draws of a body and its own copy are left out, and those of
+    bodies without a net moment, which Eq. 14 does not describe.
 
     Parameters
     ----------
     encounters : mapping
         Columns of encounters.csv.
-    temperature, mass : float
-        T [K], and the mass of a grain [kg].
+    temperature : float
+        T [K].
     """
-    columns = ("grains1", "grains2", "moment1", "moment2", "kernel", "end")
-    magnetic = (encounters["moment1"] > 0.0) & (encounters["moment2"] > 0.0)
-    grains1, grains2, moment1, moment2, kernel, end = (encounters[name][magnetic] for name in columns)
-    reduced = mass * grains1 * grains2 / (grains1 + grains2)
+    columns = ("grains1", "grains2", "mass1", "mass2", "moment1", "moment2", "kernel", "end")
+    net = np.minimum(encounters["moment1"], encounters["moment2"])
+    largest = max(encounters["moment1"].max(initial=0.0), encounters["moment2"].max(initial=0.0))
+    chosen = (net > CANCELLED * largest) & (encounters["body1"] != encounters["body2"])
+    grains1, grains2, mass1, mass2, moment1, moment2, kernel, end = (encounters[name][chosen] for name in columns)
+    reduced = mass1 * mass2 / (mass1 + mass2)
     alpha = contact_energy(moment1, moment2, 1.0, MAGNETIC)
     spread = np.sqrt(BOLTZMANN * temperature / reduced)
     law = math.pi * 3.0 * np.cbrt(alpha / reduced) ** 2 * mean_power(-1.0 / 3.0, spread)

@@ -73,7 +73,7 @@ def capture_law(
         first, second = each["grains1"][own], each["grains2"][own]
         weight = flat(mass * first, mass * second) / each["kernel"][own]
         parts.append((np.log(first * second), each["end"][own] == 0, weight))
-        net = capture_sums({name: column[own] for name, column in each.items()}, temperature, mass)
+        net = capture_sums(each, temperature)
         sums.append((net.hits.sum(), net.expected.sum()))
     if not any(np.ptp(size[is_hit]) > 0.0 for size, is_hit, _ in parts if is_hit.any()):
         raise BadInput("the law of capture needs hits of bodies of different sizes; grow the dust further")
@@ -117,7 +117,7 @@ class PopulationKernel(NamedTuple):
 
     def table(self) -> CollisionKernel:
         """K(m1, m2) from the classes, for the coagulation equation and `kernel_table`."""
-        return measured(self.kernel.rows(self.mass, LEAST_DRAWS), extrapolate=True)
+        return measured(self.kernel.rows(LEAST_DRAWS), extrapolate=True)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of analysis.json; K in m³/s by pairs of classes, None where unknown."""

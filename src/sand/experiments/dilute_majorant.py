@@ -43,7 +43,7 @@ class Sizes(NamedTuple):
     """What the bound of a body needs, a number or (N,): m [kg], Σ|μ| [A m²], extent [m], Σ|q| [C], V [m/s]."""
 
     mass: Any
-    strength: Any
+    moment_sum: Any
     extent: Any
     charge: Any
     vx: Any = 0.0  # of bodies that keep their motion
@@ -81,7 +81,7 @@ class Majorant:
     def squares(self, a: Sizes, b: Sizes) -> tuple[Any, ...]:
         """m̄ [kg], and the factors of v^(p − 1) in b̂² for the powers `POWERS`."""
         reduced, extent, wide = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent, self.widening**2
-        root = np.cbrt(contact_energy(a.strength, b.strength, 1.0, MAGNETIC) / reduced)
+        root = np.cbrt(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC) / reduced)
         focusing = 2.0 * wide * COULOMB * a.charge * b.charge / reduced
         return reduced, 3.0 * wide * root**2, wide * extent**2, focusing * extent, focusing * root
 

@@ -92,7 +92,8 @@ class Population:
     def draw(self, first: float, second: float) -> tuple[int, int, float]:
         """A pair in proportion to K̂, from two uniform deviates; and its K̂ [m³/s]."""
         count = len(self.bodies)
-        i = min(int(np.searchsorted(np.cumsum(self.sums), first * self.sums.sum())), count - 1)
+        along = np.cumsum(self.sums)
+        i = min(int(np.searchsorted(along, first * along[-1])), count - 1)
         row = self.row(i)
         along = np.cumsum(row)
         j = min(int(np.searchsorted(along, second * along[-1])), count - 1)
@@ -147,4 +148,4 @@ class Population:
 def sizes_of(body: Body) -> Sizes:
     """Sizes of one body."""
     velocity = () if body.motion is None else body.motion.velocity
-    return Sizes(body.mass, body.strength, body.extent, body.charge, *velocity)
+    return Sizes(body.mass, body.moment_sum, body.extent, body.charge, *velocity)

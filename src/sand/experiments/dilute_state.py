@@ -17,6 +17,8 @@ from .dilute_population import Population
 
 STORED = ("radius", "mass", "inertia", "charge", "position", "moment", "own", "material", "id", "image")
 """Quantities of grains that a body has; all others are those of a body at rest."""
+BODY = "body_number"
+"""Own quantity of the grains of frames: the number of their body, equal for copies."""
 SPACING = 1.5
 """Distance of aggregates in a frame, in diameters of the largest one."""
 SINGLE_NUMBERS = (
@@ -55,6 +57,12 @@ def arrays_of(now: Encounters) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     return arrays, numbers | more
 
 
+def holds_all(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> bool:
+    """Whether a checkpoint has all that a population continues from; those of earlier versions lack some of it."""
+    names = [*(f"grains/{name}" for name in STORED), *(f"motion/{name}" for name in Motion._fields), "bodies/sums"]
+    return all(name in arrays for name in names) and all(name in meta for name in SINGLE_NUMBERS)
+
+
 def population_from(arrays: dict[str, np.ndarray], meta: dict[str, Any], majorant: Majorant) -> Population:
     """The population of `arrays_of`, with the same bits."""
     rest = {
@@ -81,12 +89,17 @@ def population_from(arrays: dict[str, np.ndarray], meta: dict[str, Any], majoran
 
 
 def set_apart(bodies: Sequence[Body], kind: Grains) -> tuple[Grains, StrainedContacts]:
-    """All bodies on a cubic lattice, apart from each other, the largest first; grains like those of `kind`."""
+    """All bodies on a cubic lattice, apart from each other, the largest first; grains like those of `kind`.
+
+    They have the number of their body as an own quantity, `BODY`.
+    """
     order = sorted(range(len(bodies)), key=lambda k: (-len(bodies[k]), bodies[k].number, bodies[k].copy))
     ordered = [bodies[k] for k in order]
     grains, contacts = joined(ordered)
     side, spacing = int(np.ceil(len(bodies) ** (1.0 / 3.0))), 2.0 * SPACING * max(body.extent for body in bodies)
     place = np.array(np.unravel_index(np.arange(len(bodies)), (side,) * 3)) - 0.5 * (side - 1)
-    at = np.repeat(spacing * place, [len(body) for body in ordered], axis=1)
+    counts = [len(body) for body in ordered]
+    at = np.repeat(spacing * place, counts, axis=1)
     number = np.arange(grains.mass.size, dtype=np.uint32)
-    return kind.with_arrays(grains._replace(position=grains.position + at, id=number)), contacts
+    whole = kind.with_arrays(grains._replace(position=grains.position + at, id=number))
+    return whole.with_own({BODY: np.repeat([float(body.number) for body in ordered], counts)}), contacts

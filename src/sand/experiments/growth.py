@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.body_motion import BodyMotion, BodyTemperatures, body_motion, body_temperatures
+from ..analysis.clusters import cluster_labels
 from ..analysis.fits import PowerLawFit, mean_interval, power_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
@@ -18,6 +19,7 @@ from ..basics.paths import user_path
 from ..io import run_folder as files
 from ..results import Run
 from .dilute_case import is_dilute
+from .dilute_results import without_copies
 from .growth_boxes import grow, run_box, shared_settings
 
 __all__ = [
@@ -60,10 +62,11 @@ class BoxResult(NamedTuple):
     aggregates: dict[str, np.ndarray]  # columns of `aggregate_statistics` of all frames read, and `time` [s]
     case: dict[str, Any]  # settings that boxes of an ensemble share
     bodies: tuple[tuple[float, BodyMotion], ...] = ()  # time [s] and motion of all bodies of all frames read
+    last_sizes: np.ndarray = np.zeros(0, np.int64)  # grains of each cluster of the last frame, copies too
 
 
 def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResult:
-    """Read S(t) and the aggregates of one run.
+    """Read S(t) and the aggregates of one run; of dilute dust a body and its copies are one aggregate.
 
     Parameters
     ----------
@@ -89,9 +92,11 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
     for number in numbers:
         frame = frames[int(number)]
         rows = aggregate_statistics(frame, least)
-        found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
-        if not is_dilute(run.case):  # whose frames show bodies at rest
+        if is_dilute(run.case):  # whose frames show bodies at rest
+            rows = without_copies(rows, frame, least)
+        else:
             bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
+        found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
     first = frames[0]
     frames.close()
     with naming(folder):
@@ -107,6 +112,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
         shared,
         tuple(bodies),
+        np.bincount(cluster_labels(len(frame.position), frame.pair)),
     )
 
 

@@ -136,12 +136,7 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
 
 def last_sizes(boxes: Sequence[BoxResult]) -> np.ndarray:
     """Grains of each cluster, single grains included, in the last frame of every box."""
-    found = []
-    for box in boxes:
-        time, grains = box.aggregates["time"], box.aggregates["grains"]
-        last = grains[time == box.bodies[-1][0]] if box.bodies else grains[time == time.max(initial=0.0)]
-        found += [last, np.ones(max(box.grains - int(last.sum()), 0))]
-    return np.concatenate(found)
+    return np.concatenate([box.last_sizes for box in boxes])
 
 
 def temperatures_over_time(boxes: Sequence[BoxResult]) -> np.ndarray:

@@ -11,6 +11,8 @@ import sand
 from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.basics.initial_pairs import StrainedContacts
 from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
+from sand.experiments.dilute_conditions import check_gas, check_moments
+from sand.experiments.dilute_growth import bodies_of
 from sand.experiments.dilute_hits import Stick, moving_pair
 from sand.experiments.dilute_majorant import Majorant, Sizes
 from sand.experiments.dilute_population import Population, sizes_of
@@ -18,6 +20,7 @@ from sand.experiments.dilute_start import orientation_in_field, start_in_field
 from sand.experiments.scattering.event_draws import event_uniforms
 from sand.experiments.scattering.groups import GROUP
 from sand.experiments.scattering.rigid_flight import GROUP_SIZE
+from sand.forces.gas_drag import rotation_friction, translation_friction
 
 RADIUS, MOMENT, T = 1e-8, 6.6e-18, 100.0
 
@@ -64,8 +67,8 @@ def test_groups_of_each_level_share_the_grains_and_their_moments(count):
     for level in range(levels):
         part = slice(groups.first[level], groups.first[level + 1])
         total = groups.moment[:, part].sum(axis=1)
-        assert total == pytest.approx(grains.moment.sum(axis=1), abs=1e-14 * body.strength)
-        assert groups.strength[part].sum() == pytest.approx(body.strength, rel=1e-13, abs=0.0)
+        assert total == pytest.approx(grains.moment.sum(axis=1), abs=1e-14 * body.moment_sum)
+        assert groups.moment_sum[part].sum() == pytest.approx(body.moment_sum, rel=1e-13, abs=0.0)
         apart = np.linalg.norm(grains.position[:, :, None] - groups.point[:, None, part], axis=0).min(axis=1)
         assert apart.max() <= groups.reach[level] + 1e-12 * RADIUS
     assert groups.first[-1] - groups.first[-2] == 1
@@ -122,7 +125,7 @@ def test_the_bound_of_the_rate_is_the_mean_of_its_cross_section(pair):
     a, b = (each if isinstance(each, Sizes) else sizes_of(each) for each in pair)
     majorant = Majorant(T)
     reduced, extent = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent
-    alpha, product = 2.0 * MAGNETIC * a.strength * b.strength, COULOMB * a.charge * b.charge
+    alpha, product = 2.0 * MAGNETIC * a.moment_sum * b.moment_sum, COULOMB * a.charge * b.charge
     spread = math.sqrt(BOLTZMANN * T / reduced)
 
     def square(v):
@@ -149,7 +152,7 @@ def test_the_bound_is_above_all_paths_that_touch(charges, moments):
     """
     size = Sizes(3.3e-20, moments * MOMENT, 1e-8, charges * 1.6e-19)
     reduced, extent = 0.5 * size.mass, 2.0 * size.extent
-    alpha, product = 2.0 * MAGNETIC * size.strength**2, COULOMB * size.charge**2
+    alpha, product = 2.0 * MAGNETIC * size.moment_sum**2, COULOMB * size.charge**2
     r = extent * np.geomspace(1.0, 1e4, 20_000)
     for v in np.geomspace(0.01, 100.0, 30):
         exact = (r**2 * (1.0 + (product / r + alpha / r**3) / (0.5 * reduced * v * v))).min()
@@ -370,3 +373,75 @@ def test_flights_in_a_field_come_from_all_sides_with_thermal_spins():
     assert np.abs(flight.mean(axis=0)).max() < 4.0 / math.sqrt(3.0 * 100)
     energy = (y[:, 17:20] ** 2).sum(axis=1) / (2.0 * GRAIN.flying.inertia[0]) / heat
     assert abs(energy.mean() - 1.5) < 4.0 * math.sqrt(1.5 / 100)
+
+
+def gas_of(density):
+    """Hydrogen and helium at 100 K."""
+    return sand.Gas(temperature="100 K", density=density, molecule_mass="2.34 u")
+
+
+def mixture(*radii):
+    """Ten plain grains of each radius [m], as grains and as a population at 3e8 /m³."""
+    every = np.repeat(radii, 10)
+    grains = sand.Grains(np.zeros((len(every), 3)), every, "iron")
+    return grains, Population(bodies_of(grains, NO_CONTACTS), len(every) / 3e8, Majorant(T))
+
+
+def free_time(population):
+    """Mean time between two encounters of a body [s]."""
+    return len(population.bodies) / (2.0 * population.rate)
+
+
+def stopping_times(grains, gas):
+    """Epstein's law of free molecules: stopping times ∝ ρ_solid r/(ρ_gas v̄) of velocity and spin, at 1e-9 kg/m³."""
+    law = gas.numbers()
+    velocity = grains.mass / translation_friction(grains.radius, law.density, law.mean_speed, law.accommodation)
+    spin = grains.inertia / rotation_friction(grains.radius, law.density, law.mean_speed, law.accommodation)
+    return np.sort([velocity.min(), velocity.max(), spin.min(), spin.max()])[[0, -1]]
+
+
+@pytest.mark.parametrize(("between", "factor", "own"), [("thermal", 3.0, -1), ("own", 1.0 / 3.0, 0)])
+def test_the_gas_acts_as_on_the_slowest_or_the_fastest_grain(between, factor, own):
+    """Stopping times ∝ r/ρ: of 5 and 20 nm, all grains must be thermalised between encounters, or none.
+
+    The longest time counts for "thermal", the shortest for "own": densities 1 % on both sides of the limit.
+    """
+    grains, population = mixture(5e-9, 20e-9)
+    unit = stopping_times(grains, gas_of(1e-9))[own] * 1e-9
+    limit = factor * unit / free_time(population)  # of the density, where the time between encounters is factor × t
+    good, bad = (limit * 1.01, limit * 0.99) if between == "thermal" else (limit * 0.99, limit * 1.01)
+    check_gas(gas_of(good), grains, population, between)
+    with pytest.raises(sand.BadInput, match="bodies meet after"):
+        check_gas(gas_of(bad), grains, population, between)
+
+
+def test_the_gas_must_leave_flights_of_every_body_alone():
+    """Stopping lengths √(3k_BT/m) t ∝ r^(−1/2), over 10 (b̂ + 2r) ∝ r: a gas may be too dense for large bodies alone."""
+    small, large = mixture(5e-9), mixture(20e-9)
+    both = mixture(5e-9, 20e-9)
+    limits = []
+    for grains, _ in (small, large):
+        radius, mass = float(grains.radius[0]), float(grains.mass[0])
+        length = math.sqrt(3.0 * BOLTZMANN * T / mass) * stopping_times(grains, gas_of(1e-9))[0]
+        limits.append(1e-9 * length / (10.0 * 4.0 * radius))  # b̂ = 2r of grains that do not attract each other
+    assert limits[1] < 0.3 * limits[0]
+    between = math.sqrt(limits[0] * limits[1])
+    check_gas(gas_of(between), *small, "thermal")
+    for grains, population in (large, both):
+        with pytest.raises(sand.BadInput, match="stopping length"):
+            check_gas(gas_of(between), grains, population, "thermal")
+        check_gas(gas_of(0.99 * limits[1]), grains, population, "thermal")
+
+
+def test_flips_of_moments_count_in_every_magnetic_body():
+    """One magnetic grain after plain ones: at 1000 K its moment flips within a flight; without it none does."""
+    moments = np.zeros((20, 3))
+    moments[-1, 2] = MOMENT
+    for moment, fails in ((moments, True), (np.zeros((20, 3)), False)):
+        grains = sand.Grains(np.zeros((20, 3)), RADIUS, "iron", moment=moment)
+        population = Population(bodies_of(grains, NO_CONTACTS), 20 / 1e8, Majorant(1000.0))
+        if fails:
+            with pytest.raises(sand.BadInput, match="superparamagnetic"):
+                check_moments(grains, 1000.0, population)
+        else:
+            check_moments(grains, 1000.0, population)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sand.basics.errors import BadInput
-from sand.experiments.dilute_kernel import CLASSES, capture_sums
+from sand.experiments.dilute_kernel import CLASSES, capture_sums, kernel_of
 from sand.experiments.dilute_law import capture_law
 from sand.experiments.dilute_results import degree, exponents, scaled_time
 
@@ -33,8 +33,9 @@ def drawn(seed, count=4000):
     hits = rng.random(count) < C * capture_rate(first, second, GAMMA) / bound
     bodies = np.arange(count, dtype=float)
     columns = {"grains1": first, "grains2": second, "body1": bodies, "body2": bodies + count, "kernel": bound}
-    moments = {f"moment{n + 1}": MOMENT * size**GAMMA for n, size in enumerate((first, second))}
-    return {**columns, **moments, "end": np.where(hits, 0.0, 1.0)}
+    for n, size in ((1, first), (2, second)):
+        columns |= {f"mass{n}": MASS * size, f"moment{n}": MOMENT * size**GAMMA}
+    return {**columns, "end": np.where(hits, 0.0, 1.0)}
 
 
 def test_the_law_of_capture_is_found():
@@ -61,17 +62,39 @@ def test_the_law_of_capture_needs_moments_and_sizes():
     assert math.isnan(capture_law([drawn(1)], RADIUS, MASS, MOMENT, T).factor.low)
 
 
-def test_sums_of_classes_leave_out_bodies_without_moments():
-    """Hits and Σ K_14/K̂ of the class of the larger body, from single draws; a pair without a moment does not count."""
-    columns = {name: column[:3] for name, column in drawn(1).items()}
-    columns |= {"grains1": np.array([1.0, 4.0, 1.0]), "grains2": np.array([1.0, 1.0, 1.0])}
-    columns |= {"end": np.zeros(3), "moment1": np.array([1.0, 3.0, 0.0]) * MOMENT, "moment2": np.full(3, MOMENT)}
-    sums = capture_sums(columns, T, MASS)
+def test_sums_of_classes_have_the_masses_of_bodies():
+    """Hits and Σ K_14/K̂ of the class of the larger body, from single draws with the masses of both.
+
+    Pairs whose moments cancel to rounding, and pairs of a body and its copy, do not count.
+    """
+    columns = {name: column[:4] for name, column in drawn(1).items()}
+    columns |= {"grains1": np.array([1.0, 4.0, 1.0, 1.0]), "grains2": np.array([1.0, 1.0, 1.0, 1.0])}
+    columns |= {"mass1": MASS * np.array([1.0, 4.0, 1.0, 1.0]), "mass2": np.full(4, MASS)}
+    columns |= {"moment1": np.array([1.0, 3.0, 1e-15, 1.0]) * MOMENT, "moment2": np.full(4, MOMENT)}
+    columns |= {"end": np.zeros(4), "body2": np.where(np.arange(4) == 3, columns["body1"], columns["body2"])}
+    sums = capture_sums(columns, T)
     assert sums.hits.sum() == 2.0 and sums.hits[CLASSES.index(1)] == sums.hits[CLASSES.index(3)] == 1.0
     own = capture_rate(1.0, 1.0, 0.0) / columns["kernel"][0]
     assert sums.expected[0] == pytest.approx(own, rel=1e-4, abs=0.0) and sums.sizes[CLASSES.index(3)] == 4.0
     unequal = capture_rate(4.0, 1.0, 0.0) * 3.0 ** (2.0 / 3.0) / columns["kernel"][1]
     assert sums.expected[CLASSES.index(3)] == pytest.approx(unequal, rel=1e-4, abs=0.0)
+    # α stays and m̄ becomes 8 times as large: K_14 ∝ m̄^(−2/3) m̄^(1/6) = m̄^(−1/2)
+    heavy = capture_sums(columns | {f"mass{n}": 8.0 * columns[f"mass{n}"] for n in (1, 2)}, T)
+    assert heavy.expected == pytest.approx(8.0**-0.5 * sums.expected, rel=1e-12, abs=0.0)
+
+
+def test_the_kernel_of_classes_has_the_masses_of_their_bodies():
+    """K = Σ hits/Σ(1/K̂) and mean masses of a class by hand; a pair of a body and its copy does not count."""
+    columns = {name: column[:3] for name, column in drawn(1).items()}
+    columns |= {"grains1": np.ones(3), "grains2": np.ones(3), "kernel": np.array([1.0, 2.0, 4.0]) * 1e-14}
+    columns |= {"mass1": MASS * np.array([1.0, 2.0, 50.0]), "mass2": MASS * np.array([3.0, 4.0, 50.0])}
+    columns |= {
+        "end": np.array([0.0, 1.0, 0.0]),
+        "body1": np.array([0.0, 1.0, 7.0]),
+        "body2": np.array([2.0, 3.0, 7.0]),
+    }
+    (row,) = kernel_of([columns]).rows()
+    assert row == pytest.approx((2.5 * MASS, 2.5 * MASS, 1e-14 / 1.5, 1.0), rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("value", [-0.5, 0.0, 0.6])

@@ -6,7 +6,7 @@ sum over pairs of grains in about two radians.  At a distance a body is a few di
 grains, unless these cancel.  Flights of `flight_driver`, of high order, are more accurate and ten times as expensive.
 
 With the smallest gap g of two grains, D = g + 2 r_min, e = max(|x| + r) of both bodies, ω̂ = √(2 E_rot/I_min) ≥ |ω|,
-and W = Σ 2k|μ||μ′|/d³ + Σ|μ| B, a step is
+and W = Σ 2k|μ||μ′|/d³ + max(|Σμ|, |Σμ′|) B, a step is
 
     h = min(η/max(√(4F/m̄D), √(max(T, W)/I_min), √(max(T′, W)/I′_min), u/D),  2 rad/(|ω| + |ω′|),  g/2c)
     c = u + ω̂ e + ω̂′ e′ + (F/m̄ + T e/I_min + T′ e′/I′_min) h
@@ -65,7 +65,7 @@ class Groups(NamedTuple):
 
     point: np.ndarray  # (3, m) centres [m]
     moment: np.ndarray  # (3, m) [A m²]
-    strength: np.ndarray  # (m,) Σ|μ| [A m²]
+    moment_sum: np.ndarray  # (m,) Σ|μ| [A m²]
     first: np.ndarray  # (levels + 1,) level l has the columns first[l] … first[l + 1] − 1
     reach: np.ndarray  # (levels,) largest radius of a group times its Σ|μ|/|Σμ| [m], ∞ if its moments cancel
 
@@ -86,7 +86,7 @@ class FlyingBody(NamedTuple):
     radius: np.ndarray  # (n,) of the grains [m]
     charge: np.ndarray  # (n,) of the grains [C]
     inertia: tuple  # principal moments of inertia [kg m²], ascending
-    pose: tuple  # not used: orientations are random
+    pose: tuple  # as of `two_aggregates.Body`; without effect on orientations at random
     extent: float  # outer radius about the centre of mass [m]
 
 
@@ -117,7 +117,7 @@ class Loads(NamedTuple):
     torque1: tuple  # about the centres of mass [N m]
     torque2: tuple
     energy: float  # [J]
-    bound: float  # W, of torques by fields [J]
+    field_energy: float  # W, largest energy of moments in the fields [J]
     gap: float  # smallest of two grains [m]; of the bounding spheres where groups act
 
 
@@ -147,13 +147,13 @@ def loads_of(charged: bool) -> Callable:
     def sum_loads(r, pair, now, level1, level2):
         one, two = pair.first.groups, pair.second.groups
         pull = torque1 = torque2 = (0.0, 0.0, 0.0)
-        energy = bound = 0.0
+        energy = field_energy = 0.0
         gap = math.inf
         for i in range(one.first[level1], one.first[level1 + 1]):
             x1, moment1 = load(now.position1, i), load(now.moment1, i)
             at = add(r, x1)
             force_i = field_i = turning = (0.0, 0.0, 0.0)
-            energy_i = bound_i = 0.0
+            energy_i = field_energy_i = 0.0
             nearest = np.int64(0x7FE0000000000000)
             for j in range(two.first[level2], two.first[level2 + 1]):
                 x2, moment2 = load(now.position2, j), load(now.moment2, j)
@@ -166,18 +166,18 @@ def loads_of(charged: bool) -> Callable:
                 force_i, field_i = add(force_i, force), add(field_i, field1)
                 turning = add(turning, sub(cross(moment2, field2), cross(x2, force)))
                 energy_i += own
-                bound_i += contact_energy(1.0, two.strength[j], distance, pair.k)
+                field_energy_i += contact_energy(1.0, two.moment_sum[j], distance, pair.k)
                 if level1 + level2 == 0:
                     nearest = min(nearest, float_bits(distance + (pair.largest - pair.second.radius[j])))
             pull, torque2 = add(pull, force_i), add(torque2, turning)
             torque1 = add(torque1, add(cross(x1, force_i), cross(moment1, field_i)))
             energy += energy_i
-            bound += one.strength[i] * bound_i
+            field_energy += one.moment_sum[i] * field_energy_i
             if level1 + level2 == 0:
                 gap = min(gap, float_from_bits(nearest) - pair.largest - pair.first.radius[i])
         if level1 + level2 > 0:
             gap = norm(r) - pair.first.extent - pair.second.extent
-        return Loads(pull, torque1, torque2, energy, bound, gap)
+        return Loads(pull, torque1, torque2, energy, field_energy, gap)
 
     return sum_loads
 
@@ -216,7 +216,9 @@ def longest_step(pair, loads, speed, angular1, angular2):
     pull, turn1, turn2 = norm(loads.force), norm(loads.torque1), norm(loads.torque2)
     width = loads.gap + 2.0 * pair.smallest
     square = max(4.0 * pull / (pair.reduced * width), speed * speed / (width * width))
-    square = max(square, max(max(turn1, loads.bound) / inertia1[0], max(turn2, loads.bound) / inertia2[0]))
+    square = max(
+        square, max(max(turn1, loads.field_energy) / inertia1[0], max(turn2, loads.field_energy) / inertia2[0])
+    )
     h = eta / math.sqrt(square)
     spins = spin_size(angular1, inertia1) + spin_size(angular2, inertia2)
     if spins > 0.0:
@@ -246,7 +248,7 @@ def flight_of(charged: bool = False) -> Callable:
             add(found.torque1, cross(moment1, pair.field)),
             add(found.torque2, cross(moment2, pair.field)),
             found.energy - dot(add(moment1, moment2), pair.field),
-            found.bound + max(norm(moment1), norm(moment2)) * norm(pair.field),
+            found.field_energy + max(norm(moment1), norm(moment2)) * norm(pair.field),
             found.gap,
         )
 
