@@ -120,7 +120,7 @@ def shapes_of(grown: Any) -> dict[str, float]:
     frame = frames[-1]
     frames.close()
     moments = np.linalg.norm(frame.moment, axis=1)
-    mass, radius, moment = (float(np.max(each)) for each in (frame.mass, frame.radius, moments))
+    radius, moment = float(frame.radius.max()), float(moments.max())
     found = grown.aggregates
     own = np.unique(found["body"], return_index=True)[1]
     grains, gyration = found["grains"][own], found["gyration_radius"][own] / radius
@@ -130,7 +130,7 @@ def shapes_of(grown: Any) -> dict[str, float]:
         row[f"gamma{name}"], row[f"dimension{name}"] = exponents(found, between)
     magnetic = moments > 0.0
     row |= shares(magnetic, cluster_labels(len(magnetic), frame.pair)) if (~magnetic).any() and magnetic.any() else {}
-    sums = capture_sums(grown.encounters, TEMPERATURE, mass)
+    sums = capture_sums(grown.encounters, TEMPERATURE)
     number = np.searchsorted(CLASSES, grains, "right") - 1
     for k, least in enumerate(CLASSES[:-1]):
         values = {"number": grains, "gyration": gyration, "moment": net}

@@ -156,7 +156,7 @@ def test_encounters_with_others_count_after_a_hundred_hits(tmp_path, monkeypatch
 
 
 def test_flights_without_hit_or_escape_are_counted(tmp_path, monkeypatch):
-    """With at most 300 steps about half of the flights end on their way: a warning, `end` 2, and their number in the ledger.
+    """With at most 300 steps half of the flights end on their way: a warning, `end` 2, and their number in the ledger.
 
     All other draws are hits, as many as the ledger has, or misses.
     """
