@@ -3,7 +3,7 @@ Growth in dilute dust
 =====================
 
 In a thin nebula two bodies meet at a time. A population of 200 magnetic grains grows by such encounters, one after the
-other; the cost does not depend on the density. The figure shows the mean cluster size and the shape of the aggregates.
+other; the cost does not depend on the density. The picture shows the largest aggregate.
 """
 
 import numpy as np

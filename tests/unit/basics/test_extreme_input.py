@@ -99,7 +99,7 @@ def test_extreme_entries_of_a_case(workdir, capsys, old, new, part):
         (["view", ""], "DIR = ''"),
         (["view", "small", "--html", ""], "--html = ''"),
         (["view", "small", "--frames", "9" * 5000], "--frames"),
-        (["plot", ""], "DIR = ''"),
+        (["plot", ""], "DIR… = ''"),
         (["plot", "small", "--out", ""], "--out = ''"),
         (["plot", "small", "--size", "999999999x999999999"], "width and height"),
         (["plot", "small", "--size", "9" * 5000 + "x1"], "--size"),

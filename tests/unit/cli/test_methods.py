@@ -280,7 +280,7 @@ def test_a_finished_run(finished_run, capsys):
 def test_the_material_of_a_file(section, body, tmp_path, capsys):
     """A body of a file that names its material is described with it, not with the default of the case."""
     path = tmp_path / "body.xyz"
-    write_body(str(path), sand.setup.bpca(4, radius="0.1 um", material="iron", seed=1))
+    write_body(str(path), sand.Grains([[0.0, 0.0, 0.0], [2e-7, 0.0, 0.0]], "0.1 um", "iron"))
     other = '[projectile]\nkind = "grain"\nradius = "0.1 um"\nmaterial = "iron"\n' if body == "target" else ""
     how = 'rate = "1e-3 /t_c"\nto = 0.2' if section == "compression" else 'speed = "1 m/s"\nseeds = [1]'
     case = f'[{body}]\nkind = "file"\nfile = "{path.as_posix()}"\n{other}[{section}]\n{how}\n{CONTACT}'

@@ -555,7 +555,7 @@ def outcome(seed, kind="compress", noise=0.0):
 def test_figure(kind):
     """Lines are where the outcomes are: P, the share 1 of rolling, Z; open below φ = 0.1, where loading is too fast."""
     figure = laboratory_figure([outcome(1, kind), outcome(2, kind, noise=0.1)])
-    stress, shares, z = figure.axes[:3]
+    stress, z, shares = figure.axes[:3]
     line, fast = stress.get_lines()[slice(2) if kind == "compress" else slice(1, 3)]
     x, y = (np.array(one) for one in line.get_data())
     phi = x if kind == "compress" else x / 3
@@ -573,7 +573,7 @@ def test_figure(kind):
 def test_figure_of_a_sweep():
     """Each combination of values has a curve, and a column may be drawn alone."""
     runs = [outcome(seed) | {"group": f"to = {end}"} for seed in (1, 2) for end in (0.2, 0.3)]
-    lines = laboratory_figure(runs).axes[2].get_lines()
+    lines = laboratory_figure(runs).axes[1].get_lines()
     assert [one.get_label() for one in lines if one.get_label().startswith("to")] == ["to = 0.2", "to = 0.3"]
     alone = laboratory_figure(runs, "coordination").axes
     assert len(alone) == 1 and alone[0].get_ylabel() == "coordination"

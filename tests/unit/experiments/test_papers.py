@@ -390,6 +390,7 @@ def test_the_list(capsys):
     assert capsys.readouterr().err == "sand: there is no figure 'wada2013'; did you mean 'wada2013-ice'?\n"
 
 
+@pytest.mark.compiled("contacts")
 def test_the_expected_time_is_the_measured_one(tmp_path):
     """Runs in the table that comes with SAND are expected to take the CPU time that they took there, on one core."""
     job = Reproduction("kataoka2013", tmp_path / "there")
