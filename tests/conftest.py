@@ -217,7 +217,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture
 def record_bound(request: pytest.FixtureRequest) -> BoundRecorder:
     """Checks a number against its bounds, and records it: `record_bound("energy error", error, most=1e-6)`."""
-    test = request.node.nodeid.partition("[")[0]
+    test = request.node.nodeid.partition("[")[0].partition("@")[0]  # xdist adds "@group"
     writes = request.config.getoption("--record") is not None
     return BoundRecorder(request.node.user_properties, None if writes else recorded().get(test, set()))
 
