@@ -24,7 +24,8 @@ from tests.unit.experiments.test_dilute import GRAIN, MOMENT, RADIUS, aggregate
 pytestmark = pytest.mark.compiled("scattering", "dipoles")
 WEAK = 0.2
 """Moments of the bodies of `BENT`, in units of those of iron: misses come near enough to exchange energy with spins."""
-BENT = aggregate([[0, 0, 0], [1, 0, 0], [1, 1, 0]], WEAK * np.array([[0, 0, 1], [1, 0, 0], [0.6, 0.8, 0]]))
+BENT_PLACES = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+BENT = aggregate(BENT_PLACES, WEAK * np.array([[0, 0, 1], [1, 0, 0], [0.6, 0.8, 0]]))
 """Three grains at a right angle: three different moments of inertia, and a net moment along no principal axis."""
 
 

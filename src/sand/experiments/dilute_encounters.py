@@ -181,7 +181,7 @@ class Encounters:
             raise BadInput(f"the flight of event {self.event - 1} failed: its state is not finite")
         if flight.end != HIT:
             if flight.end == MISS and a.motion is not None:
-                population.replace(i, j, parted(a, b, flight.state))
+                population.replace(i, j, parted(a, b, flight.state, population.majorant))
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[flight.end])
         hit = self.rule(a, b, flight.state)
         if hit.is_miss:

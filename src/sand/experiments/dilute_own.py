@@ -22,6 +22,7 @@ from ..basics.constants import COULOMB
 from .dilute_body import Body, Motion
 from .dilute_flight import charge_of
 from .dilute_majorant import Approach, Majorant, Sizes
+from .dilute_population import sizes_of
 from .dilute_start import direction, rotation_onto
 from .scattering.event_draws import event_uniforms
 from .scattering.initial_conditions import R, U
@@ -199,10 +200,18 @@ def repelled(a: Body, b: Body, approach: Approach, event: tuple[int, int]) -> li
     return with_velocities(a, b, velocity)
 
 
-def parted(a: Body, b: Body, state: np.ndarray) -> list[Body]:
-    """Both bodies after an encounter without a touch, from the state of the pair; unchanged if they come back."""
-    velocity = velocity_far_away(state[R : R + 3], state[U : U + 3], repulsion_of(a, b))
+def parted(a: Body, b: Body, state: np.ndarray, majorant: Majorant) -> list[Body]:
+    """Both bodies after an encounter without a touch, from the state of the pair.
+
+    They are unchanged if charges bring them back, and if b′ > b̂(v′) afterwards: encounters are drawn up to b̂, so that
+    the reverse of such a one never happens, and with it translation and rotation would not keep equal temperatures.
+    """
+    r, u = state[R : R + 3], state[U : U + 3]
+    velocity = velocity_far_away(r, u, repulsion_of(a, b))
     if velocity is None:
+        return [a, b]
+    speed = float(np.linalg.norm(velocity))
+    if np.linalg.norm(np.cross(r, u)) > speed * majorant.bound(sizes_of(a), sizes_of(b), speed):
         return [a, b]
     found = []
     for body, turn, angular in zip(with_velocities(a, b, velocity), (TURN1, TURN2), (ANGULAR1, ANGULAR2), strict=True):

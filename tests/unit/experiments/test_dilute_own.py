@@ -232,13 +232,29 @@ def test_bodies_part_with_their_total_momentum_and_energy():
     state = own_start(a, b, Approach(3.0, 5e-8, 1e-7), 4e-7, (1, 9))
     state[3:6] *= -0.7
     state[14:20] *= 1.3
-    one, two = parted(a, b, state)
+    one, two = parted(a, b, state, Majorant(T))
     before, after = (x.mass * x.motion.velocity + y.mass * y.motion.velocity for x, y in ((a, b), (one, two)))
     assert after == pytest.approx(before, rel=1e-12, abs=1e-15 * a.mass)
     assert one.motion.velocity - two.motion.velocity == pytest.approx(state[3:6], rel=1e-10, abs=1e-12)
     for old, new in ((a, one), (b, two)):
         assert new.motion.angular == pytest.approx(1.3 * old.motion.angular, rel=1e-12, abs=0.0)
         assert new.rotation == pytest.approx(1.69 * old.rotation, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize("charges", [(0, 0), (1, -1)])
+@pytest.mark.parametrize("widening", [1.0, 2.0])
+def test_an_encounter_without_a_reverse_is_refused(charges, widening):
+    """b′v′ = |r × u| at the end, v′ far away: bodies keep V and L if b′ > b̂(v′), and have new ones if not."""
+    a, b = (charged(number, k) for k, number in enumerate(charges))
+    majorant, k = Majorant(T, widening), repulsion_of(a, b)
+    speed = 2.0 * float(np.linalg.norm(a.motion.velocity - b.motion.velocity))
+    bound = float(majorant.bound(sizes_of(a), sizes_of(b), speed))
+    for factor, is_refused in ((0.999, False), (1.001, True)):
+        distance, across = 10.0 * bound, factor * bound * speed / (10.0 * bound)
+        radial = math.sqrt(speed**2 - 2.0 * k / distance - across**2)
+        state = np.concatenate([[0.0, distance, 0.0, across, radial, 0.0], [0.0, 0.0, 0.0, 1.0] * 2, [3e-33] * 6])
+        for old, new in zip((a, b), parted(a, b, state, majorant), strict=True):
+            assert (new is old) == is_refused and (new.motion.angular[0] == 3e-33) != is_refused
 
 
 def test_a_body_that_forms_has_the_momenta_of_both():
