@@ -26,7 +26,7 @@ from .dilute_population import sizes_of
 from .dilute_start import direction, rotation_onto
 from .scattering.event_draws import event_uniforms
 from .scattering.initial_conditions import R, U
-from .scattering.two_aggregates import ANGULAR1, ANGULAR2, TURN1, TURN2
+from .scattering.two_aggregates import ANGULAR1, TURN1, TURN2
 
 FLIGHT_BLOCK, START_BLOCK, COPY_BLOCK = 4, 5, 7
 """Blocks of the random numbers of flights, of bodies at the start (two), and of copies, one more for each doubling."""
@@ -124,8 +124,7 @@ def pose_of(body: Body, uniforms: tuple[float, ...]) -> np.ndarray:
     if not moving.angular.any():
         return random_rotation(uniforms)
     own = angular_at(moving.own, body.flying.inertia, uniforms[0])
-    size = np.linalg.norm(moving.angular)
-    return rotation_onto(own / np.linalg.norm(own), moving.angular / size, uniforms[1])
+    return rotation_onto(own / np.linalg.norm(own), moving.angular / np.linalg.norm(moving.angular), uniforms[1])
 
 
 def own_start(a: Body, b: Body, approach: Approach, distance: float, event: tuple[int, int]) -> np.ndarray | None:
@@ -206,16 +205,13 @@ def parted(a: Body, b: Body, state: np.ndarray, majorant: Majorant) -> list[Body
     They are unchanged if charges bring them back, and if b′ > b̂(v′) afterwards: encounters are drawn up to b̂, so that
     the reverse of such a one never happens, and with it translation and rotation would not keep equal temperatures.
     """
-    r, u = state[R : R + 3], state[U : U + 3]
+    r, u, momenta = state[R : R + 3], state[U : U + 3], state[ANGULAR1:].reshape(2, 3).copy()
     velocity = velocity_far_away(r, u, repulsion_of(a, b))
-    if velocity is None:
-        return [a, b]
-    speed = float(np.linalg.norm(velocity))
-    if np.linalg.norm(np.cross(r, u)) > speed * majorant.bound(sizes_of(a), sizes_of(b), speed):
+    speed = 0.0 if velocity is None else float(np.linalg.norm(velocity))
+    if velocity is None or np.linalg.norm(np.cross(r, u)) > speed * majorant.bound(sizes_of(a), sizes_of(b), speed):
         return [a, b]
     found = []
-    for body, turn, angular in zip(with_velocities(a, b, velocity), (TURN1, TURN2), (ANGULAR1, ANGULAR2), strict=True):
-        lab = state[angular : angular + 3].copy()
+    for body, turn, lab in zip(with_velocities(a, b, velocity), (TURN1, TURN2), momenta, strict=True):
         own = Rotation.from_quat(state[turn : turn + 4]).inv().apply(lab)
         found.append(dataclasses.replace(body, motion=Motion(motion_of(body).velocity, lab, own)))
     return found
@@ -232,5 +228,4 @@ def with_velocities(a: Body, b: Body, relative: np.ndarray) -> list[Body]:
 
 def centre_velocity(a: Body, b: Body) -> np.ndarray:
     """Velocity of the centre of mass of two bodies (3,) [m/s]."""
-    momentum = a.mass * motion_of(a).velocity + b.mass * motion_of(b).velocity
-    return np.asarray(momentum / (a.mass + b.mass))
+    return np.asarray((a.mass * motion_of(a).velocity + b.mass * motion_of(b).velocity) / (a.mass + b.mass))
