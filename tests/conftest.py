@@ -33,7 +33,7 @@ compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 from sand.compiler.ahead import share_compilation  # noqa: E402
 
 from .specs import FIXTURES, SPECS, STARTS, WORKERS  # noqa: E402
-from .validation import BoundRecorder, Recorder, parse_part, part_of, recorded  # noqa: E402
+from .validation import BoundRecorder, Recorder, parse_part, part_of, recorded, without_group  # noqa: E402
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -217,7 +217,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture
 def record_bound(request: pytest.FixtureRequest) -> BoundRecorder:
     """Checks a number against its bounds, and records it: `record_bound("energy error", error, most=1e-6)`."""
-    test = request.node.nodeid.partition("[")[0].partition("@")[0]  # xdist adds "@group"
+    test = without_group(request.node.nodeid).partition("[")[0]
     writes = request.config.getoption("--record") is not None
     return BoundRecorder(request.node.user_properties, None if writes else recorded().get(test, set()))
 

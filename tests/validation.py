@@ -37,6 +37,12 @@ def part_of(nodeid: str, part: tuple[int, int]) -> bool:
     return zlib.crc32(nodeid.encode()) % part[1] == part[0]
 
 
+def without_group(nodeid: str) -> str:
+    """The name of a test without "@group", which pytest-xdist adds."""
+    head, bracket, tail = nodeid.rpartition("]")
+    return head + bracket + tail.partition("@")[0]
+
+
 class BoundRecorder:
     """The fixture `record_bound` of one test: checks numbers, and keeps them for the table.
 
@@ -98,13 +104,13 @@ class Recorder:
         """Take the numbers of a test that ran."""
         if report.when != "call" or report.skipped:
             return
-        self.ran.add(report.nodeid)
+        self.ran.add(without_group(report.nodeid))
         now = {"date": str(datetime.date.today()), "commit": commit()}
         for name, content in report.user_properties if report.passed else ():
             if name == "bound":
                 quantity, *values = content
                 row = dict(zip(("value", "least", "most"), map(written, values), strict=True))
-                self.rows.append({"test": report.nodeid, "quantity": quantity} | row | now)
+                self.rows.append({"test": without_group(report.nodeid), "quantity": quantity} | row | now)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Write the table."""

@@ -47,7 +47,7 @@ CAPABILITIES = {
     "packings inside the box, shares of each value of a sweep, materials of files in methods": 759,
     "bodies of dilute dust that keep momentum and spin between encounters": 242,
     "populations of dilute dust in sweeps, their template, and the kernel of several with the fit of Eq. 14": 285,
-    "films of runs by the page in a browser without a window or by the renderer of figures (sand view --movie)": 353,
+    "films of runs by the page in a browser without a window or by the renderer of figures (sand view --movie)": 354,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

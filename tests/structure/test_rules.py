@@ -180,7 +180,7 @@ def test_no_pickle_no_network():
     network = {"socket", "socketserver", "urllib", "requests", "http", "asyncio", "aiohttp", "ssl"}
     loads = []
     for path in SOURCES:
-        names = {name.split(".")[0] for name in imports(path)}
+        names = {name.split(".")[0] for name in imports(path) if name != "urllib.parse"}  # it opens nothing
         assert not names & {"pickle", "dill", "cloudpickle"}, path
         assert not names & (network - {"http", "socketserver"} if path == server else network), path
         loads += [(path, call) for call in loads_of_numpy(nodes_of(path))]

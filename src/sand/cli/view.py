@@ -80,14 +80,14 @@ def command(
         _serve(dataset, folder, port, not no_browser, as_json=how["as_json"], silent=silent)
         return
     if is_film:
-        told = movie.write_movie(dataset, target, of_film, silent)
+        written = movie.write_movie(dataset, target, of_film, silent)
         rows = [
             ("file", str(target)),
-            ("frames", f"{told['frames']}, {told['fps']} per second"),
-            ("size", f"{told['bytes'] / 1e6:.3g} MB"),
+            ("frames", f"{written['frames']}, {written['fps']} per second"),
+            ("size", f"{written['bytes'] / 1e6:.3g} MB"),
         ]
-        rows += [("picture", "{} x {} pixels".format(*told["size"])), ("drawn by", told["renderer"])]
-        report.answer(told, f"view {folder}", rows, **how)
+        rows += [("picture", "{} x {} pixels".format(*written["size"])), ("drawn by", written["renderer"])]
+        report.answer(written, f"view {folder}", rows, **how)
         return
     with report.progress_bar(len(dataset), silent, desc=report.clean(target.name), unit="frame") as bar:
         size = write_page(dataset, target, progress=bar.update)

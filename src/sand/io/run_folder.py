@@ -185,6 +185,12 @@ def replace_file(path: str | Path, content: bytes) -> None:
         file.write(content)
 
 
+def replace_by_copy(path: str | Path, source: Path) -> None:
+    """Replace a file, named as by a user (`~`), atomically by a copy.  Raises FilesFailed, as `replacing`."""
+    with replacing(user_path(path)) as file, open(source, "rb") as content:
+        shutil.copyfileobj(content, file)
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Replace a file atomically by what the block writes: write a temporary file, sync, rename.

@@ -11,8 +11,7 @@ from pathlib import Path
 from PIL import Image
 
 from ..basics.errors import BadInput
-from ..basics.paths import user_path
-from ..io.run_folder import replacing
+from ..io.run_folder import replace_by_copy
 
 ENCODERS = {
     ".mp4": ("-c:v", "libx264", "-crf", "18", "-movflags", "+faststart"),
@@ -101,8 +100,7 @@ def write_film(path: Path, pictures: Iterable[Image.Image], size: tuple[int, int
             _write_gif(film, pictures, rate)
         else:
             _encode(film, pictures, size, rate)
-        with replacing(user_path(path)) as file, open(film, "rb") as made:
-            shutil.copyfileobj(made, file)
+        replace_by_copy(path, film)
         return film.stat().st_size
 
 
@@ -114,8 +112,8 @@ def _write_gif(film: Path, pictures: Iterable[Image.Image], rate: int) -> None:
 
 def _encode(film: Path, pictures: Iterable[Image.Image], size: tuple[int, int], rate: int) -> None:
     """Give the pictures to ffmpeg, one by one."""
-    told = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-")
-    command = [str(find_ffmpeg()), "-v", "error", *told, *ENCODERS[film.suffix], *COLOURS, "-y", str(film)]
+    raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-")
+    command = [str(find_ffmpeg()), "-v", "error", *raw, *ENCODERS[film.suffix], *COLOURS, "-y", str(film)]
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log)
         assert process.stdin is not None
