@@ -117,8 +117,8 @@ class Reproduction(SweepJob):
         super().__init__(path, folder, settings, content=content, retry=retry)
         self.names = [row.name for row in self.rows]
         self._offsets = len({row.values.get("impact.impact_parameter") for row in self.rows})
-        rows = [] if small else [cells for cells in self._cells(place / name) if cells["run"] in self.names]
-        self._measured = {cells["run"]: float(cells["cpu_seconds"]) for cells in rows}
+        rows = [cells for cells in self._cells(place / name) if cells["run"] in self.names]
+        self._measured = {} if small else {cells["run"]: float(cells["cpu_seconds"]) for cells in rows}
         self.known = rows if known else []
         have = {cells["run"] for cells in self.known}
         # cheap runs first, and all of one seed before those of the next
