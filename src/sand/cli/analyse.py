@@ -123,14 +123,14 @@ def _local_degrees(one: dict[str, Any]) -> str:
 
 
 def _capture(one: dict[str, Any]) -> str:
-    """c and γ of the kernel of populations of dilute dust; empty for others."""
-    law = one.get("kernel", {}).get("law")
-    if law is None:
+    """c and γ of the kernel of populations of dilute dust, or why they are unknown; empty for others."""
+    kernel = one.get("kernel")
+    if kernel is None:
         return ""
-    texts = {
-        name: f"{found['value']:.3g} (95 % from {found['low']:.3g} to {found['high']:.3g})"
-        for name, found in law.items()
-    }
+    law = kernel["law"]
+    if law is None:
+        return f"unknown: {kernel['missing']['law']}"
+    texts = {name: f"{found['value']:.3g}{_interval(found['low'], found['high'])}" for name, found in law.items()}
     power, net = f"{texts['factor']} with μ = μ₁ N^{texts['exponent']}", f"{texts['net_factor']} with net moments"
     return f"c ⟨π b_max² v⟩, c = {power}, {net}"
 
@@ -160,7 +160,11 @@ def _law(one: dict[str, Any], key: str, before: str, after: str = "") -> str:
     if law is None:
         return f"unknown: {one['missing'][key]}"
     value, low, high = law.get("exponent", law.get("value")), law.get("low", math.nan), law.get("high", math.nan)
-    ends = f"above {low:.3g}" if math.isinf(high) else f"from {low:.3g} to {high:.3g}"
-    interval = "" if math.isnan(low) else f" (95 % {ends})"
     error = "" if key == "z" else _error(law["error"])  # the interval of z is not symmetric
-    return f"{before}{value:.3g}{error}{interval}{after}"
+    return f"{before}{value:.3g}{error}{_interval(low, high)}{after}"
+
+
+def _interval(low: float, high: float) -> str:
+    """A 95 % interval as text, empty if there is none."""
+    ends = f"above {low:.3g}" if math.isinf(high) else f"from {low:.3g} to {high:.3g}"
+    return "" if math.isnan(low) else f" (95 % {ends})"

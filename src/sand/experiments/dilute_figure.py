@@ -52,10 +52,9 @@ def dilute_figure(
     if moment > 0.0:
         of_moments = [_means(grains, aggregates["moment"] / moment, "μ/μ₁")]
         law = [Guide("N^0.63, the paper", np.array([2.0, grains.max()]), np.array([2.0, grains.max()]) ** 0.63)]
-        number, hits, expected = capture_sums(encounters, temperature)
+        number, hits, expected, every = capture_sums(encounters, temperature)
         enough = hits >= LEAST_HITS
-        value = hits[enough] / expected[enough]
-        error = value / np.sqrt(hits[enough])
+        value, error = hits[enough] / expected[enough], every[enough]
         share = Curve("c", number[enough], value, value - error, value + error)
         panels += [
             Panel("grains N", "μ/μ₁", of_moments, law, log="xy"),

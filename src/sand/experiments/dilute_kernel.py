@@ -26,8 +26,8 @@ class Kernel(NamedTuple):
     error: np.ndarray  # (C, C) its standard error
     hits: np.ndarray  # (C, C) hits from which it follows
     draws: np.ndarray  # (C, C)
-    sizes: np.ndarray  # (C,) mean number of grains in the draws of a class
-    masses: np.ndarray  # (C,) their mean mass [kg]
+    sizes: np.ndarray  # (C,) mean number of grains of a class, over the pairs that K is the mean of; 0 if none was drawn
+    masses: np.ndarray  # (C,) mean mass of the same bodies [kg]
 
     def rows(self, draws: int = 1) -> list[tuple[float, float, float, float]]:
         """Rows (m1, m2, K over 1 m/s, 1 m/s) of all pairs of classes with hits, as `kernel_table.measured` takes them.
@@ -42,9 +42,11 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
     """K = Σ hits/Σ (1/K̂) over draws of pairs of two classes, which converges to K: a pair is drawn at the rate K̂/V.
 
     In a time t each pair adds Kt/V to the mean of the first sum, and t/V to that of the second one, so that the ratio
-    is K, averaged over the pairs that were there; a finite number of draws gives a bias of the order 1/draws. Draws of
-    a body and its own copy are left out. Of one population the error is that of the number of hits, K/√hits; of several
-    it is at least this, and otherwise that from the scatter of the populations.
+    is K, averaged over the pairs that were there; a finite number of draws gives a bias of the order 1/draws. Sizes and
+    masses of a class are means over the same pairs, Σ (N/K̂)/Σ (1/K̂). Draws of a body and its own copy are left out.
+
+    The error of one population is that of `ratio_variance`; of several it is at least this, and otherwise that from the
+    scatter of the populations. It is NaN without hits.
 
     Parameters
     ----------
@@ -54,44 +56,72 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
         Smallest numbers of grains of the classes, increasing, and the end of the last one.
     """
     bounds = np.array(CLASSES if edges is None else edges, float)
-    hits, weight, draws = (np.zeros((len(encounters), len(bounds) - 1, len(bounds) - 1)) for _ in range(3))
+    # Σ 1, h, 1/K̂, h/K̂, 1/K̂² of each population and pair of classes
+    sums = np.zeros((5, len(encounters), len(bounds) - 1, len(bounds) - 1))
     grains, mass, bodies = np.zeros((3, len(bounds) - 1))
     for k, each in enumerate(encounters):
         first, second = (np.searchsorted(bounds, each[f"grains{n}"], "right") - 1 for n in (1, 2))
         inside = (np.minimum(first, second) >= 0) & (np.maximum(first, second) < len(bounds) - 1)
         inside &= each["body1"] != each["body2"]
         low, high = np.minimum(first, second)[inside], np.maximum(first, second)[inside]
-        np.add.at(hits[k], (low, high), each["end"][inside] == 0)
-        np.add.at(weight[k], (low, high), 1.0 / each["kernel"][inside])
-        np.add.at(draws[k], (low, high), 1.0)
+        is_hit, weight = (each["end"][inside] == 0).astype(float), 1.0 / each["kernel"][inside]
+        for total, term in zip(sums, (1.0, is_hit, weight, is_hit * weight, weight**2), strict=True):
+            np.add.at(total[k], (low, high), term)
         for n, number in ((1, first[inside]), (2, second[inside])):
-            np.add.at(grains, number, each[f"grains{n}"][inside])
-            np.add.at(mass, number, each[f"mass{n}"][inside])
-            np.add.at(bodies, number, 1.0)
+            np.add.at(grains, number, each[f"grains{n}"][inside] * weight)
+            np.add.at(mass, number, each[f"mass{n}"][inside] * weight)
+            np.add.at(bodies, number, weight)
+    draws, hits, weights, hit_weights, squares = sums.sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = hits.sum(axis=0) / weight.sum(axis=0)
-        error = value / np.sqrt(hits.sum(axis=0))
+        value = hits / weights
+        variance = ratio_variance(draws, hits, weights, hit_weights, squares)
         if len(encounters) > 1:
-            apart = (hits - value * weight).std(axis=0, ddof=1) * math.sqrt(len(encounters))
-            error = np.maximum(apart / weight.sum(axis=0), error)
-    total = value, error, hits.sum(axis=0), draws.sum(axis=0)
-    both = [np.triu(each) + np.triu(each, 1).T for each in total]
-    means = [column / np.maximum(bodies, 1.0) for column in (grains, mass)]
+            variance = np.maximum(variance, (sums[1] - value * sums[2]).var(axis=0, ddof=1) * len(encounters))
+        error = np.sqrt(variance) / weights
+    both = [np.triu(each) + np.triu(each, 1).T for each in (value, error, hits, draws)]
+    means = [np.divide(column, bodies, out=np.zeros_like(column), where=bodies > 0.0) for column in (grains, mass)]
     return Kernel(bounds.astype(int), both[0], both[1], both[2], both[3], *means)
+
+
+def ratio_variance(
+    draws: np.ndarray, hits: np.ndarray, weights: np.ndarray, hit_weights: np.ndarray, squares: np.ndarray
+) -> np.ndarray:
+    """Variance of Σ (h − Kw) over draws, with which K = Σh/Σw has the error √variance/Σw; h is 1 for a hit, or 0.
+
+    Draws of a pair are a Poisson process, so that Σ (h − Kw) has the variance of the mean of Σ (h − Kw)². If the pairs
+    have the same K, a draw hits with the probability Kw, and this is Σh − K² Σw²: binomial, less than Poisson's Σh. If
+    their K differ the sum of squares, which is used, holds, too. It is small by chance if no draw misses: Σh then.
+
+    Parameters
+    ----------
+    draws, hits, weights, hit_weights, squares : ndarray
+        Σ 1, h, w, hw and w², of equal shape; w is 1/K̂, or that times a law of K.
+
+    Returns
+    -------
+    ndarray
+        NaN without hits.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = hits / weights
+        found = np.where(hits < draws, hits - 2.0 * ratio * hit_weights + ratio**2 * squares, hits)
+        return np.where(hits > 0.0, np.maximum(found, 0.0), math.nan)
 
 
 class CaptureSums(NamedTuple):
     """Hits, and those expected of Eq. 14, by classes of the larger body; c = hits/expected."""
 
-    sizes: np.ndarray  # (C,) mean number of grains of the larger body, 0 without draws
+    sizes: np.ndarray  # (C,) mean number of grains of the larger body of the expected hits, 0 without draws
     hits: np.ndarray  # (C,)
     expected: np.ndarray  # (C,)
+    error: np.ndarray  # (C,) standard error of c of this population, NaN without hits
 
 
 def capture_sums(encounters: Mapping[str, np.ndarray], temperature: float) -> CaptureSums:
     """Hits, and Σ ⟨π b_max² v⟩/K̂ over draws: the ratio is c = K/⟨π b_max² v⟩ with the actual net moments (Eq. 14).
 
-    It converges to c, as a pair is drawn at the rate K̂/V. Draws of a body and its own copy are left out, and those of
+    It converges to c, as a pair is drawn at the rate K̂/V: a mean of c over pairs with the weight ⟨π b_max² v⟩, and the
+    size of a class is the mean of N with this weight. Draws of a body and its own copy are left out, and those of
     bodies without a net moment, which Eq. 14 does not describe.
 
     Parameters
@@ -112,5 +142,11 @@ def capture_sums(encounters: Mapping[str, np.ndarray], temperature: float) -> Ca
     law = math.pi * 3.0 * np.cbrt(alpha / reduced) ** 2 * mean_power(-1.0 / 3.0, spread)
     larger = np.maximum(grains1, grains2)
     number, count = np.searchsorted(CLASSES, larger, "right") - 1, len(CLASSES)
-    sizes = np.bincount(number, larger, count) / np.maximum(np.bincount(number, minlength=count), 1)
-    return CaptureSums(sizes, np.bincount(number, end == 0, count), np.bincount(number, law / kernel, count))
+    weight, is_hit = law / kernel, (end == 0).astype(float)
+    draws, hits, expected, both, squares, total = (
+        np.bincount(number, each, count)
+        for each in (np.ones_like(weight), is_hit, weight, is_hit * weight, weight**2, larger * weight)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.sqrt(ratio_variance(draws, hits, expected, both, squares)) / expected
+    return CaptureSums(np.divide(total, expected, out=np.zeros(count), where=expected > 0.0), hits, expected, error)

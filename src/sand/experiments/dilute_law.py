@@ -49,8 +49,11 @@ def capture_law(
 ) -> CaptureLaw:
     """Fit c and γ of K = c ⟨π b_max² v⟩ with μ = μ₁ N^γ to the hits of populations of equal magnetic grains.
 
-    A draw of a pair hits with the probability K/K̂, so that the likelihood of all hits, a Poisson process, is largest
-    for the γ of the largest Σ_hits ln f − H ln Σ_draws f/K̂ with f(N, N'; γ) ∝ K, and c = H/Σ_draws f/K̂.
+    Hits are a Poisson process with the rate K/V of each pair. In its likelihood Σ_hits ln K − Σ_pairs ∫ K dt/V the
+    integral is estimated by the draws, Σ_draws K/K̂, as a pair is drawn at the rate K̂/V. With f(N, N'; γ) ∝ K the
+    maximum is at the γ of the largest Σ_hits ln f − H ln Σ_draws f/K̂, and c = H/Σ_draws f/K̂. There ⟨ln NN'⟩ of the
+    hits equals that of the draws with the weights f/K̂. Without one population γ may be at an end of `EXPONENTS`: then
+    there is no interval.
 
     Parameters
     ----------
@@ -62,7 +65,7 @@ def capture_law(
     Raises
     ------
     BadInput
-        If there are no moments, or no hits of bodies of different sizes.
+        If there are no moments, no hits of bodies of different sizes, or γ is at an end of `EXPONENTS`.
     """
     if not moment > 0.0:
         raise BadInput("the law of capture needs grains with a moment")
@@ -81,52 +84,69 @@ def capture_law(
     def fitted(chosen: Sequence[int]) -> tuple[float, float, float]:
         size, is_hit, weight = (np.concatenate([parts[k][n] for k in chosen]) for n in range(3))
         hits, expected = (math.fsum(sums[k][n] for k in chosen) for n in range(2))
-        return (*_likeliest(size, is_hit, weight), hits / expected)
+        return (*_likeliest(size, is_hit, weight), hits / expected if expected > 0.0 else math.nan)
 
     everything = range(len(parts))
     found = fitted(everything)
+    if math.isnan(found[1]):
+        raise BadInput(
+            f"the exponent of the law of capture is not between {EXPONENTS[0]:g} and {EXPONENTS[1]:g}: too few hits; "
+            "grow the dust further"
+        )
     without = [fitted([k for k in everything if k != left]) for left in everything] if len(parts) > 1 else []
     ends = [jackknife(value, np.array([one[n] for one in without]))[1:] for n, value in enumerate(found)]
     return CaptureLaw(*(Interval(value, *end) for value, end in zip(found, ends, strict=True)))
 
 
 def _likeliest(size: np.ndarray, is_hit: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
-    """c and γ; α ∝ (N N')^γ, and f ∝ α^(2/3)."""
-    from scipy.optimize import minimize_scalar
+    """c and γ; α ∝ (N N')^γ, and f ∝ α^(2/3).  NaN if the likelihood has no maximum within `EXPONENTS`."""
+    from scipy.optimize import brentq
 
-    hits, total = int(is_hit.sum()), float(size[is_hit].sum())
+    def terms(exponent: float) -> np.ndarray:
+        return weight * np.exp(2.0 / 3.0 * exponent * size)
 
-    def expected(exponent: float) -> float:
-        return float((weight * np.exp(2.0 / 3.0 * exponent * size)).sum())
+    def score(exponent: float) -> float:
+        """⟨ln NN'⟩ of the draws, which increases with γ, less that of the hits."""
+        return float(np.average(size, weights=terms(exponent)) - size[is_hit].mean())
 
-    def loss(exponent: float) -> float:
-        return hits * math.log(expected(exponent)) - 2.0 / 3.0 * exponent * total
-
-    exponent = float(minimize_scalar(loss, bounds=EXPONENTS, method="bounded").x)
-    return hits / expected(exponent), exponent
+    if not is_hit.any() or not score(EXPONENTS[0]) < 0.0 < score(EXPONENTS[1]):
+        return math.nan, math.nan
+    exponent = float(brentq(score, *EXPONENTS, xtol=1e-9))
+    return int(is_hit.sum()) / float(terms(exponent).sum()), exponent
 
 
 class PopulationKernel(NamedTuple):
-    """Kernel of the populations of a case."""
+    """Kernel of the populations of a case; what cannot be known is None or empty, with the reason in `missing`."""
 
-    kernel: Kernel  # by classes of sizes
-    law: CaptureLaw | None  # None without moments
-    mass: float  # of a grain [kg]
+    kernel: Kernel | None  # by classes of sizes
+    law: CaptureLaw | None
+    mass: float  # of a grain [kg]; the mean, if they differ
     time: np.ndarray  # (K,) [s]
     size: np.ndarray  # (K,) S of the coagulation equation with this kernel
+    missing: dict[str, str]  # of "kernel", "law" and "coagulation"
 
     def table(self) -> CollisionKernel:
-        """K(m1, m2) from the classes, for the coagulation equation and `kernel_table`."""
+        """K(m1, m2) from the classes, for the coagulation equation and `kernel_table`.
+
+        Raises
+        ------
+        BadInput
+            If there is no kernel, or fewer than two classes have enough draws.
+        """
+        if self.kernel is None:
+            raise BadInput(self.missing["kernel"])
         return measured(self.kernel.rows(LEAST_DRAWS), extrapolate=True)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of analysis.json; K in m³/s by pairs of classes, None where unknown."""
         law = self.law and {name: value._asdict() for name, value in self.law._asdict().items()}
-        return {"law": law, "grain_mass": self.mass, "classes": self.rows()}
+        return {"law": law, "grain_mass": self.mass, "classes": self.rows(), "missing": self.missing}
 
     def rows(self) -> list[dict[str, Any]]:
         """K of each pair of classes with hits, which have at least `grains1` and `grains2` grains."""
         found = self.kernel
+        if found is None:
+            return []
         return [
             {
                 "grains1": int(found.edges[i]),
@@ -141,31 +161,46 @@ class PopulationKernel(NamedTuple):
         ]
 
 
-def kernel_of_populations(folders: Sequence[Path]) -> PopulationKernel | None:
-    """Kernel of populations of a case, and S(t) of the coagulation equation with it.
+def _no_kernel_of_sizes(case: Mapping[str, Any], frame: Any) -> str:
+    """Why K is no function of two numbers of grains alone, of a case and its first frame; empty if it is one."""
+    if case["method"].get("between") == "own":
+        return "K depends on the motion of bodies, which they keep (between = 'own'), not on their sizes alone"
+    if np.asarray(getattr(frame, "charge", np.zeros(1))).any():
+        return "K depends on the charges of bodies, not on their sizes alone"
+    values = {"radius": frame.radius, "mass": frame.mass, "moment": np.linalg.norm(frame.moment, axis=1)}
+    for name, each in values.items():
+        if np.ptp(each) > 1e-6 * np.abs(each).max():
+            return f"the grains differ in {name}: K depends on the composition of bodies, not on their sizes alone"
+    return ""
 
-    None for boxes, and for grains that differ in radius, mass, moment or charge: K depends on more than sizes then.
+
+def kernel_of_populations(folders: Sequence[Path]) -> PopulationKernel | None:
+    """Kernel of populations of a case, its law, and S(t) of the coagulation equation with it; None for boxes.
+
+    There is none for bodies that keep their motion, for charges, and for grains that differ in radius, mass or moment.
     """
     runs = [Run(folder) for folder in folders]
     if not all(is_dilute(run.case) for run in runs):
         return None
     first = runs[0].frames[0]
-    moments = np.linalg.norm(first.moment, axis=1)
-    if any(np.ptp(each) > 1e-6 * np.abs(each).max() for each in (first.radius, first.mass, moments)):
-        return None
-    if np.ptp(np.asarray(getattr(first, "charge", np.zeros(1)))) > 0.0:
-        return None
-    mass, moment, radius = (float(each[0]) for each in (first.mass, moments, first.radius))
+    found = PopulationKernel(None, None, float(np.mean(first.mass)), np.zeros(0), np.zeros(0), {})
+    if reason := _no_kernel_of_sizes(runs[0].case, first):
+        return found._replace(missing=dict.fromkeys(("kernel", "law", "coagulation"), reason))
+    moment, radius = float(np.linalg.norm(first.moment[0])), float(first.radius[0])
     temperature = si(runs[0].case["grains"]["temperature"], "K", "temperature")
     encounters = [Grown(folder, "").encounters for folder in folders]
-    law = capture_law(encounters, radius, mass, moment, temperature) if moment > 0.0 else None
-    found = PopulationKernel(kernel_of(encounters), law, mass, np.zeros(0), np.zeros(0))
+    found = found._replace(kernel=kernel_of(encounters))
+    try:
+        found = found._replace(law=capture_law(encounters, radius, found.mass, moment, temperature))
+    except BadInput as error:
+        found.missing["law"] = str(error)
     ledgers = [run.ledger for run in runs]
     density = float(ledgers[0]["clusters"][0] / ledgers[0]["volume"][0])
     end, largest = (max(float(ledger[name][-1]) for ledger in ledgers) for name in ("time", "mean_cluster_size"))
     try:
         grid, times = log_sizes(BEYOND * largest), np.linspace(0.0, end, POINTS)
-        solved = coagulate(found.table(), grid, density, times, mass=mass, accuracy=1e-6)
-    except BadInput:  # fewer than two classes have enough draws
+        solved = coagulate(found.table(), grid, density, times, mass=found.mass, accuracy=1e-6)
+    except BadInput as error:  # fewer than two classes have enough draws
+        found.missing["coagulation"] = f"no table of K from classes with {LEAST_DRAWS} draws: {error}"
         return found
     return found._replace(time=solved.times, size=solved.mean_size)
