@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from sand.analysis.clusters import cluster_labels
+from sand.analysis.fits import jackknife
 from sand.analysis.growth_law import local_degrees
 from sand.basics.errors import BadInput
 from sand.basics.units import si
@@ -115,16 +116,15 @@ def growth_of(ledger: Any) -> dict[str, float]:
 
 
 def shapes_of(grown: Any) -> dict[str, float]:
-    """Exponents and means by classes of N of the aggregates, of which copies count once; shares; sums for c."""
+    """Exponents and means by classes of N of the aggregates, with copies; shares; sums for c."""
     frames = Frames(grown.folder / "trajectory.gsd")
     frame = frames[-1]
     frames.close()
     moments = np.linalg.norm(frame.moment, axis=1)
     radius, moment = float(frame.radius.max()), float(moments.max())
     found = grown.aggregates
-    own = np.unique(found["body"], return_index=True)[1]
-    grains, gyration = found["grains"][own], found["gyration_radius"][own] / radius
-    net = found["moment"][own] / moment if moment > 0.0 else np.zeros(len(own))
+    grains, gyration = found["grains"], found["gyration_radius"] / radius
+    net = found["moment"] / moment if moment > 0.0 else np.zeros(len(grains))
     row: dict[str, float] = {}
     for name, between in (("", RANGE), ("_large", LARGE)):
         row[f"gamma{name}"], row[f"dimension{name}"] = exponents(found, between)
@@ -185,14 +185,10 @@ def _cell(value: Any) -> Any:
 
 
 def intervals(rows: Sequence[dict[str, Any]]) -> dict[str, tuple[Interval, int]]:
-    """Mean and 95 % interval over populations of each quantity, with their number; z from λ, and c of all hits."""
+    """Estimate and 95 % interval over populations of each quantity, with their number: means; z from λ; c of ratios."""
     texts = (*KEY, "outcome", "sand")
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in texts]
     values = {name: np.array([row.get(name, math.nan) for row in rows], float) for name in names}
-    hits, expected = (sum(np.nan_to_num(values[f"{name}_{least}"]) for least in CLASSES[:-1]) for name in SUMS)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        values["c"] = hits / expected
-        values |= {f"c_{k}": values[f"hits_{k}"] / values[f"expected_{k}"] for k in CLASSES[:-1]}
     known = {name: each[np.isfinite(each)].tolist() for name, each in values.items()}
     found = {name: (mean_of(each), len(each)) for name, each in known.items() if each}
     for largest in (20, 96):
@@ -202,10 +198,28 @@ def intervals(rows: Sequence[dict[str, Any]]) -> dict[str, tuple[Interval, int]]
                 Interval(*(1.0 / (1.0 - each) if each < 1.0 else math.inf for each in degrees)),
                 number,
             )
+    # of a class with few hits ratios of single populations are skewed: sums of all are divided
+    sums = {name: np.array([np.nan_to_num(values[f"{name}_{k}"]) for k in CLASSES[:-1]]) for name in SUMS}
+    if sums["hits"].sum() >= LEAST_HITS:
+        found["c"] = (ratio_of(sums["hits"].sum(axis=0), sums["expected"].sum(axis=0)), len(rows))
+    for k, hits, expected, larger in zip(CLASSES[:-1], sums["hits"], sums["expected"], sums["larger"], strict=True):
+        found.pop(f"larger_{k}", None)
+        if hits.sum() >= LEAST_HITS:
+            found[f"c_{k}"] = (ratio_of(hits, expected), len(rows))
+            found[f"larger_{k}"] = (ratio_of(larger * expected, expected), len(rows))
     return found
 
 
-SUMS = ("hits", "expected")
+def ratio_of(above: np.ndarray, below: np.ndarray) -> Interval:
+    """Σ above/Σ below over populations (K,), with the 95 % interval of a jackknife over them; NaN if Σ below is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = float(above.sum() / below.sum())
+        return Interval(value, *jackknife(value, (above.sum() - above) / (below.sum() - below))[1:])
+
+
+SUMS = ("hits", "expected", "larger")
+LEAST_HITS = 30
+"""Fewest hits of all populations for c, of a class or of all."""
 SHOWN = ("t_2", "t_8", "t_20", "t_96", "t_ratio_0.5", "t_ratio_0.2", "lambda_20", "lambda_96", "z_20", "z_96", "gamma")
 SHOWN += ("dimension", "gamma_large", "dimension_large", "share_magnetic", "purity", "c", "cpu_seconds")
 

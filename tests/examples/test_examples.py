@@ -403,6 +403,29 @@ def test_thermal_capture():
     assert rate / c == pytest.approx(kernel(example["MASS"], example["MASS"]), rel=1e-9, abs=0.0)
 
 
+def test_c_of_a_class_is_that_of_all_its_hits():
+    """c = Σ hits/Σ expected over populations, also where one of them expected little, with a jackknife over them.
+
+    Ratios of all but one population each the ratios scatter with √(3/4 Σ(c_k − ⟨c_k⟩)²), times t = 3.182 of three degrees
+    of freedom; N of the class is Σ N expected/Σ expected. 30 hits at least; mean of ratios: 1.6.
+    """
+    example = loaded("dilute_answers")
+    hits, expected, larger = np.array([9.0, 1.0, 12.0, 9.0]), np.array([30.0, 0.2, 30.0, 31.0]), np.arange(3.0, 7.0)
+    rows = []
+    for k in range(4):
+        none = {f"{name}_{least}": 0.0 for name in example.SUMS for least in example.CLASSES[:-1]}
+        rows.append(none | {"hits_5": hits[k], "expected_5": expected[k], "larger_5": larger[k]})
+        rows[k] |= {"hits_9": 7.0, "expected_9": 20.0, "larger_9": 12.0}
+    found = example.intervals(rows)
+    without = np.array([np.delete(hits, k).sum() / np.delete(expected, k).sum() for k in range(4)])
+    half = 3.182446 * math.sqrt(0.75 * ((without - without.mean()) ** 2).sum())
+    c, number = found["c_5"]
+    assert c == pytest.approx((31.0 / 91.2, 31.0 / 91.2 - half, 31.0 / 91.2 + half), rel=1e-6, abs=0.0) and number == 4
+    assert found["larger_5"][0].value == pytest.approx((larger * expected).sum() / 91.2, rel=1e-12, abs=0.0)
+    assert "c_9" not in found and "c_1" not in found and "larger_9" not in found
+    assert found["c"][0].value == pytest.approx(59.0 / 171.2, rel=1e-12, abs=0.0)
+
+
 @pytest.mark.validate
 def test_dilute_answers(tmp_path, monkeypatch, capsys):
     """Tables of two populations of two cases; nothing is computed twice; shares of a known mixture.

@@ -26,7 +26,9 @@ class Kernel(NamedTuple):
     error: np.ndarray  # (C, C) its standard error
     hits: np.ndarray  # (C, C) hits from which it follows
     draws: np.ndarray  # (C, C)
-    sizes: np.ndarray  # (C,) mean number of grains of a class, over the pairs that K is the mean of; 0 if none was drawn
+    sizes: (
+        np.ndarray
+    )  # (C,) mean number of grains of a class, over the pairs that K is the mean of; 0 if none was drawn
     masses: np.ndarray  # (C,) mean mass of the same bodies [kg]
 
     def rows(self, draws: int = 1) -> list[tuple[float, float, float, float]]:

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.clusters import cluster_labels
 from ..analysis.fits import power_law
-from .dilute_state import BODY
 
 RANGE = (3, 100)
 """Range of N of the fits of γ and D_f."""
@@ -37,44 +35,26 @@ def degree(sizes: np.ndarray, times: np.ndarray) -> float:
 
 
 def exponents(aggregates: Mapping[str, np.ndarray], between: tuple[float, float] = RANGE) -> tuple[float, float]:
-    """γ and D_f of aggregates with N in a range, μ ∝ N^γ and N ∝ r_g^D_f, of which copies count once.
+    """γ and D_f of aggregates with N in a range, μ ∝ N^γ and N ∝ r_g^D_f, copies included.
 
-    Regressions of ln μ and ln r_g on ln N; NaN with fewer than ten aggregates, or without moments.
+    Regressions of ln μ and ln r_g on ln N; NaN with fewer than ten aggregates, or without moments. A copy stands for
+    another body of the doubled volume: without copies, bodies that joined after the last doubling, which have none,
+    would count twice as much as those from before it. The aggregates are not independent; errors are those between
+    populations.
 
     Parameters
     ----------
     aggregates : mapping
         Columns of aggregates.csv.
     """
-    own = np.unique(aggregates["body"], return_index=True)[1]
-    grains = aggregates["grains"][own]
+    grains = aggregates["grains"]
     slopes = []
     for name in ("moment", "gyration_radius"):
-        values = aggregates[name][own]
+        values = aggregates[name]
         used = (grains >= between[0]) & (grains <= between[1]) & (values > 0.0)
         known = used.sum() >= FEWEST and np.ptp(grains[used]) > 0.0
         slopes.append(power_law(grains[used], values[used]).exponent if known else math.nan)
     return slopes[0], 1.0 / slopes[1]
-
-
-def without_copies(rows: dict[str, np.ndarray], frame: Any, least: int) -> dict[str, np.ndarray]:
-    """Rows of `aggregate_statistics` of a frame of a population, with each body and its copies once.
-
-    Parameters
-    ----------
-    rows : dict
-        Its columns of the aggregates of at least `least` grains.
-    frame : Frame
-        The frame; its grains have the numbers of their bodies, `dilute_state.BODY`.
-    least : int
-        Smallest number of grains.
-    """
-    labels = cluster_labels(len(frame.position), frame.pair)
-    sizes, first = np.bincount(labels), np.unique(labels, return_index=True)[1]
-    order = np.argsort(-sizes, kind="stable")  # that of the rows
-    numbers = frame.own[BODY][first[order[sizes[order] >= least]]]
-    own = np.sort(np.unique(numbers, return_index=True)[1])
-    return {name: column[own] for name, column in rows.items()}
 
 
 def results_of(grown: Any) -> dict[str, Any]:

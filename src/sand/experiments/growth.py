@@ -19,7 +19,6 @@ from ..basics.paths import user_path
 from ..io import run_folder as files
 from ..results import Run
 from .dilute_case import is_dilute
-from .dilute_results import without_copies
 from .growth_boxes import grow, run_box, shared_settings
 
 __all__ = [
@@ -66,7 +65,7 @@ class BoxResult(NamedTuple):
 
 
 def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResult:
-    """Read S(t) and the aggregates of one run; of dilute dust a body and its copies are one aggregate.
+    """Read S(t) and the aggregates of one run.
 
     Parameters
     ----------
@@ -92,9 +91,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
     for number in numbers:
         frame = frames[int(number)]
         rows = aggregate_statistics(frame, least)
-        if is_dilute(run.case):  # whose frames show bodies at rest
-            rows = without_copies(rows, frame, least)
-        else:
+        if not is_dilute(run.case):  # whose frames show bodies at rest
             bodies.append((frame.time, body_motion(frame, frame.pair, frame.box)))
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
     first = frames[0]
