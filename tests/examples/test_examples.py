@@ -406,8 +406,8 @@ def test_thermal_capture():
 def test_c_of_a_class_is_that_of_all_its_hits():
     """c = Σ hits/Σ expected over populations, also where one of them expected little, with a jackknife over them.
 
-    Ratios of all but one population each the ratios scatter with √(3/4 Σ(c_k − ⟨c_k⟩)²), times t = 3.182 of three degrees
-    of freedom; N of the class is Σ N expected/Σ expected. 30 hits at least; mean of ratios: 1.6.
+    With c_k of all but one population each, the interval is t √(3/4 Σ(c_k − ⟨c_k⟩)²) wide on both sides, t = 3.182 of
+    three degrees of freedom; N of the class is Σ N expected/Σ expected. 30 hits at least. The mean of ratios is 1.5.
     """
     example = loaded("dilute_answers")
     hits, expected, larger = np.array([9.0, 1.0, 12.0, 9.0]), np.array([30.0, 0.2, 30.0, 31.0]), np.arange(3.0, 7.0)

@@ -65,8 +65,7 @@ def test_a_sweep_refuses_what_populations_do_not_have(tmp_path):
 def test_the_kernel_of_populations(tmp_path, capsys):
     """The coagulation equation with their K starts with S = 1, dS/dt = n₀K(1,1); `sand analyse` tells the law.
 
-    S − 1 = n₀Kt to first order: at the second of 60 times, where S − 1 is about 0.02, to 5 %.  Grains of two radii have
-    no kernel of sizes alone.
+    S − 1 = n₀Kt to first order: at the second of 60 times, where S − 1 is about 0.02, to 5 %.
     """
     folders = grow(CASE, [1, 2], tmp_path / "both")
     found = kernel_of_populations(folders)
@@ -79,5 +78,38 @@ def test_the_kernel_of_populations(tmp_path, capsys):
     with (tmp_path / "found" / "kernel.csv").open(encoding="utf-8") as file:
         first = next(iter(csv.DictReader(file)))
     assert float(first["kernel"]) == found.kernel.value[0, 0] and int(first["hits"]) == found.kernel.hits[0, 0]
-    mixed = CASE | {"grains": CASE["grains"] | {"classes": [{"share": 0.5, "radius": f"{r} nm"} for r in (9, 10)]}}
-    assert kernel_of_populations(grow(mixed, [1], tmp_path / "mixed")) is None
+
+
+OF_PAIRS = {
+    "radii": ({"grains": {"classes": [{"share": 0.5, "radius": f"{r} nm"} for r in (9, 10)]}}, "differ in radius"),
+    "own": ({"method": {"between": "own"}}, "motion of bodies"),
+    "charges": ({"grains": {"charge": "1 e"}, "forces": {"charges": {}}}, "charges of bodies"),
+}
+
+
+@pytest.mark.parametrize("name", OF_PAIRS)
+def test_a_kernel_that_is_no_function_of_sizes_has_its_reason(tmp_path, capsys, name):
+    """Grains that differ, bodies that keep their motion, and equal charges: no K, law or S(t), and one line why."""
+    changes, words = OF_PAIRS[name]
+    case = {key: table | changes.get(key, {}) for key, table in CASE.items()} | {
+        "run": {"stop": "mean_cluster_size >= 1"}
+    }
+    found = kernel_of_populations(grow(case, [1], tmp_path / "one"))
+    assert found.kernel is None and found.law is None and len(found.time) == len(found.rows()) == 0
+    assert set(found.missing) == {"kernel", "law", "coagulation"} and words in found.missing["law"]
+    with pytest.raises(sand.BadInput, match=words):
+        found.table()
+    assert main(["analyse", str(tmp_path / "one"), "--out", str(tmp_path / "found")]) == 0
+    assert f"unknown: {found.missing['law']}" in capsys.readouterr().out
+    assert not (tmp_path / "found" / "kernel.csv").exists()
+
+
+@pytest.mark.parametrize("size", [1.0, 1.02])
+def test_the_analysis_of_a_young_population(tmp_path, capsys, size):
+    """Without a hit, and with one of two grains: no law yet, with its reason; all else is there, also with --json."""
+    grow(CASE | {"run": {"stop": f"mean_cluster_size >= {size}"}}, [1], tmp_path / "one")
+    assert main(["analyse", str(tmp_path / "one"), "--out", str(tmp_path / "found"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["ensembles"][0]
+    assert told["kernel"]["law"] is None and "different sizes" in told["kernel"]["missing"]["law"]
+    assert "30 draws" in told["kernel"]["missing"]["coagulation"] and told["mean_size"] >= size
+    assert len(told["kernel"]["classes"]) == (size > 1.0)

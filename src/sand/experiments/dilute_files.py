@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.frame_statistics import aggregate_statistics
+from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.schema import MODES
@@ -83,6 +83,10 @@ def encounter_row(encounter: Encounter) -> list[float]:
 
 ENCOUNTER_COLUMNS = (*(name for name in Encounter._fields if name != "energies"), *HIT_CHANGES)
 """Columns of encounters.csv, see `dilute_encounters.Encounter`."""
+
+
+AGGREGATE_COLUMNS = ("body", "born", "copy", *COLUMNS)
+"""Columns of aggregates.csv, which has no row without a hit."""
 
 
 class PopulationFiles:
@@ -176,7 +180,8 @@ class PopulationFiles:
         self.frame(now)
         self.trajectory.close()
         self.ledger.close()
-        write_table(self.folder / files.AGGREGATES, aggregate_rows(self.folder / files.TRAJECTORY, now))
+        rows = aggregate_rows(self.folder / files.TRAJECTORY, now)
+        write_table(self.folder / files.AGGREGATES, rows, AGGREGATE_COLUMNS)
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
         files.write_json(self.folder / files.SUMMARY, sealed(files.plain(summary)))
         return summary

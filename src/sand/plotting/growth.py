@@ -63,7 +63,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]], guides: 
         middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
         right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
         last.set(xlabel=f"time [{unit}]", ylabel="temperature of bodies [K]")
-        texts = {degrees: "$S$ grows too little", last: "all bodies are at rest"}
+        texts = {left: "no time has passed", degrees: "$S$ grows too little", last: "all bodies are at rest"}
         for axes in panels:
             text = texts.get(axes, "no aggregates")
             if axes.get_legend_handles_labels()[0]:
@@ -77,6 +77,8 @@ def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str, g
     """S(t) of each box, the mean with its error, the fit, and with `guides` the slopes of the paper."""
     time = growth.time / size
     positive = growth.time > 0.0
+    if not positive.any():  # a logarithmic axis without a value cannot be drawn
+        return
     for sizes in growth.sizes:
         axes.plot(time[positive], sizes[positive], color=colour, alpha=0.25, lw=0.6)
     label = name if growth.z is None else f"{name}: {_exponent(growth.z)}"
