@@ -28,7 +28,7 @@ HIT_CHANGES = tuple(name for name in CHANGES if name not in ("lost_gas", "lost_o
 
 
 RECENT = 100
-"""Hits over which `Encounters.recent_others` is the mean."""
+"""Memory, in hits, of the exponential mean `Encounters.recent_others`."""
 
 
 class Encounter(NamedTuple):
@@ -141,7 +141,7 @@ class Encounters:
     event, flights, hits_seen, bound : int
         Draws, flights, hits, and flights that ended without a hit or an escape so far.
     others, recent_others : float
-        Sum of `Encounter.others` over hits, and its mean over the last hundred or so.
+        Sum of `Encounter.others` over hits, and its exponential mean with the memory `RECENT`, that of all for fewer.
     longest_flight : float
         [s]
     numbers : int

@@ -38,10 +38,10 @@ LEDGER_COLUMNS = (
     *("step", "time", "mean_cluster_size", "clusters", "largest_cluster", "grains", "volume", "number_ratio"),
     *("flights", "hits", "bound", "others", "to_gas", "flight_error", "touch_energy", *HIT_CHANGES),
 )
-"""Columns of the ledger, a row after each hit: draws so far, time [s], S, bodies, grains of the largest and of all, V
-[m³], n/n₀, flights, hits, flights without hit or escape, mean number of encounters with others during flights that
-hit, without their contact phases; then sums over all hits [J]: kinetic energy that bodies leave to the gas (0 with
-hits = "stick"), error of flights, energy at the touch, and changes in contact phases by channel."""
+"""Columns of the ledger, a row after each hit with all counts until then: draws, time [s], S, bodies, grains of the
+largest and of all, V [m³], n/n₀, flights, hits, flights without hit or escape, mean number of encounters with others
+during flights that hit, without their contact phases; then sums over all hits [J]: kinetic energy that bodies leave to
+the gas (0 with hits = "stick"), error of flights, energy at the touch, and changes in contact phases by channel."""
 OWN_COLUMNS = ("translation", "rotation")
 """Columns of a population whose bodies keep their motion, instead of `to_gas`: mean energies of motion and of rotation
 of a body [k_BT], 3/2 each in equilibrium."""
