@@ -81,7 +81,10 @@ def test_the_kernel_of_populations(tmp_path, capsys):
 
 
 OF_PAIRS = {
-    "radii": ({"grains": {"classes": [{"share": 0.5, "radius": f"{r} nm"} for r in (9, 10)]}}, "differ in radius"),
+    "radii": (
+        {"grains": {"classes": [{"share": 0.5, "radius": f"{r} nm"} for r in (9, 10)]}},
+        "which differ in radius",
+    ),
     "own": ({"method": {"between": "own"}}, "motion of bodies"),
     "charges": ({"grains": {"charge": "1 e"}, "forces": {"charges": {}}}, "charges of bodies"),
 }

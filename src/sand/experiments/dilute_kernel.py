@@ -47,7 +47,7 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
     is K, averaged over the pairs that were there; a finite number of draws gives a bias of the order 1/draws. Sizes and
     masses of a class are means over the same pairs, Σ (N/K̂)/Σ (1/K̂). Draws of a body and its own copy are left out.
 
-    The error of one population is that of `ratio_variance`; of several it is at least this, and otherwise that from the
+    The error of one population is `ratio_error`; of several it is at least this, and otherwise that from the
     scatter of the populations. It is NaN without hits.
 
     Parameters
@@ -58,56 +58,48 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
         Smallest numbers of grains of the classes, increasing, and the end of the last one.
     """
     bounds = np.array(CLASSES if edges is None else edges, float)
-    # Σ 1, h, 1/K̂, h/K̂, 1/K̂² of each population and pair of classes
-    sums = np.zeros((5, len(encounters), len(bounds) - 1, len(bounds) - 1))
-    grains, mass, bodies = np.zeros((3, len(bounds) - 1))
-    for k, each in enumerate(encounters):
+    count, sums = len(bounds) - 1, []
+    bodies = np.zeros((3, count))  # Σ N/K̂, m/K̂, 1/K̂
+    for each in encounters:
         first, second = (np.searchsorted(bounds, each[f"grains{n}"], "right") - 1 for n in (1, 2))
-        inside = (np.minimum(first, second) >= 0) & (np.maximum(first, second) < len(bounds) - 1)
+        inside = (np.minimum(first, second) >= 0) & (np.maximum(first, second) < count)
         inside &= each["body1"] != each["body2"]
-        low, high = np.minimum(first, second)[inside], np.maximum(first, second)[inside]
-        is_hit, weight = (each["end"][inside] == 0).astype(float), 1.0 / each["kernel"][inside]
-        for total, term in zip(sums, (1.0, is_hit, weight, is_hit * weight, weight**2), strict=True):
-            np.add.at(total[k], (low, high), term)
+        weight, pair = 1.0 / each["kernel"][inside], np.minimum(first, second) * count + np.maximum(first, second)
+        sums.append(_hit_sums(pair[inside], each["end"][inside] == 0, weight, count**2))
         for n, number in ((1, first[inside]), (2, second[inside])):
-            np.add.at(grains, number, each[f"grains{n}"][inside] * weight)
-            np.add.at(mass, number, each[f"mass{n}"][inside] * weight)
-            np.add.at(bodies, number, weight)
-    draws, hits, weights, hit_weights, squares = sums.sum(axis=1)
+            columns = each[f"grains{n}"][inside], each[f"mass{n}"][inside], 1.0
+            bodies += [np.bincount(number, column * weight, count) for column in columns]
+    draws, hits, weights, _, _ = total = np.sum(sums, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = hits / weights
-        variance = ratio_variance(draws, hits, weights, hit_weights, squares)
+        value, error = hits / weights, ratio_error(total)
         if len(encounters) > 1:
-            variance = np.maximum(variance, (sums[1] - value * sums[2]).var(axis=0, ddof=1) * len(encounters))
-        error = np.sqrt(variance) / weights
-    both = [np.triu(each) + np.triu(each, 1).T for each in (value, error, hits, draws)]
-    means = [np.divide(column, bodies, out=np.zeros_like(column), where=bodies > 0.0) for column in (grains, mass)]
-    return Kernel(bounds.astype(int), both[0], both[1], both[2], both[3], *means)
+            apart = np.std([each[1] - value * each[2] for each in sums], axis=0, ddof=1)
+            error = np.maximum(error, apart * math.sqrt(len(encounters)) / weights)
+        means = np.where(bodies[2] > 0.0, bodies[:2] / bodies[2], 0.0)
+    squares = (each.reshape(count, count) for each in (value, error, hits, draws))
+    both = (np.triu(each) + np.triu(each, 1).T for each in squares)
+    return Kernel(bounds.astype(int), *both, *means)
 
 
-def ratio_variance(
-    draws: np.ndarray, hits: np.ndarray, weights: np.ndarray, hit_weights: np.ndarray, squares: np.ndarray
-) -> np.ndarray:
-    """Variance of Σ (h − Kw) over draws, with which K = Σh/Σw has the error √variance/Σw; h is 1 for a hit, or 0.
+def _hit_sums(number: np.ndarray, is_hit: np.ndarray, weight: np.ndarray, count: int) -> np.ndarray:
+    """Σ 1, h, w, hw and w² of draws by their class, (5, count); h is 1 for a hit, or 0."""
+    terms = np.ones_like(weight), is_hit, weight, is_hit * weight, weight**2
+    return np.array([np.bincount(number, each, count) for each in terms])
+
+
+def ratio_error(sums: np.ndarray) -> np.ndarray:
+    """Standard error of K = Σh/Σw, from the sums (5, …) of 1, h, w, hw and w² over draws; h is 1 for a hit, or 0.
 
     Draws of a pair are a Poisson process, so that Σ (h − Kw) has the variance of the mean of Σ (h − Kw)². If the pairs
     have the same K, a draw hits with the probability Kw, and this is Σh − K² Σw²: binomial, less than Poisson's Σh. If
     their K differ the sum of squares, which is used, holds, too. It is small by chance if no draw misses: Σh then.
-
-    Parameters
-    ----------
-    draws, hits, weights, hit_weights, squares : ndarray
-        Σ 1, h, w, hw and w², of equal shape; w is 1/K̂, or that times a law of K.
-
-    Returns
-    -------
-    ndarray
-        NaN without hits.
+    The weight w is 1/K̂, or that times a law of K. NaN without hits.
     """
+    draws, hits, weights, both, squares = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = hits / weights
-        found = np.where(hits < draws, hits - 2.0 * ratio * hit_weights + ratio**2 * squares, hits)
-        return np.where(hits > 0.0, np.maximum(found, 0.0), math.nan)
+        variance = np.where(hits < draws, hits - 2.0 * ratio * both + ratio**2 * squares, hits)
+        return np.where(hits > 0.0, np.sqrt(np.maximum(variance, 0.0)) / weights, math.nan)
 
 
 class CaptureSums(NamedTuple):
@@ -144,11 +136,7 @@ def capture_sums(encounters: Mapping[str, np.ndarray], temperature: float) -> Ca
     law = math.pi * 3.0 * np.cbrt(alpha / reduced) ** 2 * mean_power(-1.0 / 3.0, spread)
     larger = np.maximum(grains1, grains2)
     number, count = np.searchsorted(CLASSES, larger, "right") - 1, len(CLASSES)
-    weight, is_hit = law / kernel, (end == 0).astype(float)
-    draws, hits, expected, both, squares, total = (
-        np.bincount(number, each, count)
-        for each in (np.ones_like(weight), is_hit, weight, is_hit * weight, weight**2, larger * weight)
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        error = np.sqrt(ratio_variance(draws, hits, expected, both, squares)) / expected
-    return CaptureSums(np.divide(total, expected, out=np.zeros(count), where=expected > 0.0), hits, expected, error)
+    weight = law / kernel
+    sums = _hit_sums(number, end == 0, weight, count)
+    sizes = np.bincount(number, larger * weight, count) / np.where(sums[2] > 0.0, sums[2], 1.0)
+    return CaptureSums(sizes, sums[1], sums[2], ratio_error(sums))

@@ -90,8 +90,7 @@ def capture_law(
     found = fitted(everything)
     if math.isnan(found[1]):
         raise BadInput(
-            f"the exponent of the law of capture is not between {EXPONENTS[0]:g} and {EXPONENTS[1]:g}: too few hits; "
-            "grow the dust further"
+            "the exponent of the law of capture is not between -0.5 and 2: too few hits; grow the dust further"
         )
     without = [fitted([k for k in everything if k != left]) for left in everything] if len(parts) > 1 else []
     ends = [jackknife(value, np.array([one[n] for one in without]))[1:] for n, value in enumerate(found)]
@@ -167,10 +166,9 @@ def _no_kernel_of_sizes(case: Mapping[str, Any], frame: Any) -> str:
         return "K depends on the motion of bodies, which they keep (between = 'own'), not on their sizes alone"
     if np.asarray(getattr(frame, "charge", np.zeros(1))).any():
         return "K depends on the charges of bodies, not on their sizes alone"
-    values = {"radius": frame.radius, "mass": frame.mass, "moment": np.linalg.norm(frame.moment, axis=1)}
-    for name, each in values.items():
-        if np.ptp(each) > 1e-6 * np.abs(each).max():
-            return f"the grains differ in {name}: K depends on the composition of bodies, not on their sizes alone"
+    values = frame.radius, frame.mass, np.linalg.norm(frame.moment, axis=1)
+    if any(np.ptp(each) > 1e-6 * np.abs(each).max() for each in values):
+        return "K depends on the grains of bodies, which differ in radius, mass or moment, not on their sizes alone"
     return ""
 
 
