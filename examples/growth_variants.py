@@ -11,7 +11,7 @@ import copy
 from pathlib import Path
 
 from sand.experiments.executors import executor_for
-from sand.experiments.growth import grow
+from sand.experiments.growth_boxes import grow
 from sand.experiments.growth_report import read_ensemble
 from sand.io.run_folder import read_toml
 

@@ -90,13 +90,13 @@ def command(
 
 def _population(place: Path, case: Path, wall_time: float | None, *, quiet: bool, as_json: bool) -> int | None:
     """Continue one population of dilute dust; returns the exit code."""
-    from ..experiments.dilute_case import run_population
+    from ..experiments.dilute_case import population_of
     from ..io.run_folder import read_toml
     from .job import running_job
 
     content = read_toml(case)
     with running_job(place, 1, wall_time=wall_time, quiet=quiet) as (_, interrupts):
-        outcome = run_population(content, content["run"]["seed"], place, [interrupts])
+        outcome = population_of(content, content["run"]["seed"], place, [interrupts]).outcome
     report.answer({"folder": str(place), "outcome": outcome}, f"{place}: {outcome}", [], as_json=as_json, quiet=quiet)
     return None if outcome == "finished" else PHYSICS
 

@@ -177,19 +177,14 @@ def describe_population(content: dict[str, Any], seed: int) -> tuple[list[tuple[
     return [*rows, ("between", f"bodies {kept}"), ("hits", hits)], numbers | {"cost": cost}
 
 
-def run_population(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> str:
-    """Grow the population of a seed to its end, from its checkpoint if there is one; returns its outcome.
+def population_of(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> Grown:
+    """Grow the population of a seed to its end, from its checkpoint if there is one.
 
     Raises
     ------
     BadInput
         If the case has errors, the dust is too dense, or the folder holds something else.
     """
-    return population_of(content, seed, folder, observers).outcome
-
-
-def population_of(content: dict[str, Any], seed: int, folder: str | Path, observers: Sequence[Any] = ()) -> Grown:
-    """As `run_population`, but returns the population."""
     if content.get("grains", {}).get("kind") == "given":
         raise BadInput("these grains came from a script: call dilute_growth.grow again with the same arguments")
     checked = check_dilute(content, "case")

@@ -142,8 +142,6 @@ class Encounters:
         Draws, flights, hits, and flights that ended without a hit or an escape so far.
     others, recent_others : float
         Sum of `Encounter.others` over hits, and its exponential mean with the memory `RECENT`, that of all for fewer.
-    longest_flight : float
-        [s]
     numbers : int
         Number of the next body that forms.
     """
@@ -151,7 +149,7 @@ class Encounters:
     def __init__(self, population: Population, rigid_flights: RigidFlights, hits: HitRule, seed: int):
         self.population, self.rigid_flights, self.rule, self.seed = population, rigid_flights, hits, seed
         self.time, self.event, self.flights, self.hits_seen, self.others = 0.0, 0, 0, 0, 0.0
-        self.longest_flight, self.recent_others, self.bound = 0.0, 0.0, 0
+        self.recent_others, self.bound = 0.0, 0
         self.numbers = 1 + max(body.number for body in population.bodies)
 
     def step(self) -> Encounter:
@@ -174,7 +172,7 @@ class Encounters:
             if a.motion is not None:
                 population.replace(i, j, repelled(a, b, approach, (self.seed, self.event - 1)))
             return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=REPELLED)
-        self.flights, self.longest_flight = self.flights + 1, max(self.longest_flight, flight.time)
+        self.flights += 1
         self.bound += flight.end == BOUND
         own = _of_flight(flight) | {"others": met}
         if flight.end == FLIGHT_FAILED:

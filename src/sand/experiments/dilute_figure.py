@@ -34,17 +34,12 @@ def dilute_figure(
         Mean radius of the grains [m], mean moment of the magnetic ones [A m²], and the temperature [K].
     """
     radius, moment, temperature = unit
+    times, size = ledger["time"], ledger["mean_cluster_size"]
     # points at equal distances of ln S
-    steps = np.linspace(0.0, math.log(ledger["mean_cluster_size"][-1]), POINTS)
-    later = np.unique(np.searchsorted(np.log(ledger["mean_cluster_size"]), steps))
-    later = later[(later < len(ledger["time"])) & (ledger["time"][np.minimum(later, len(ledger["time"]) - 1)] > 0.0)]
-    time = ledger["time"][later]
-    sizes = Panel(
-        "time (s)",
-        "S,  n/n₀",
-        [Curve("S", time, ledger["mean_cluster_size"][later]), Curve("n/n₀", time, ledger["number_ratio"][later])],
-        log="xy",
-    )
+    later = np.unique(np.searchsorted(np.log(size), np.linspace(0.0, math.log(size[-1]), POINTS)))
+    later = later[(later < len(times)) & (times[np.minimum(later, len(times) - 1)] > 0.0)]
+    curves = [Curve("S", times[later], size[later]), Curve("n/n₀", times[later], ledger["number_ratio"][later])]
+    sizes = Panel("time (s)", "S,  n/n₀", curves, log="xy")
     grains = aggregates["grains"]
     of_radii = [_means(grains, aggregates["gyration_radius"] / radius, "r_g/r")]
     guides = [Guide("N^(1/1.2)", np.array([2.0, grains.max()]), np.array([2.0, grains.max()]) ** (1.0 / 1.2))]
@@ -60,7 +55,7 @@ def dilute_figure(
             Panel("grains N", "μ/μ₁", of_moments, law, log="xy"),
             Panel("grains of the larger body", "c = K/⟨π b_max² v⟩", [share]),
         ]
-    last = f"S = {ledger['mean_cluster_size'][-1]:.3g} after {time[-1]:.3g} s, {int(ledger['hits'][-1])} hits"
+    last = f"S = {size[-1]:.3g} after {times[-1]:.3g} s, {int(ledger['hits'][-1])} hits"
     return panels_figure(panels, f"dilute dust: {last}")
 
 

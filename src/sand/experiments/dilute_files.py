@@ -85,10 +85,6 @@ ENCOUNTER_COLUMNS = (*(name for name in Encounter._fields if name != "energies")
 """Columns of encounters.csv, see `dilute_encounters.Encounter`."""
 
 
-AGGREGATE_COLUMNS = ("body", "born", "copy", *COLUMNS)
-"""Columns of aggregates.csv, which has no row without a hit."""
-
-
 class PopulationFiles:
     """Writes the files of a population; a run that is killed anywhere continues from its checkpoint with equal bits.
 
@@ -181,7 +177,7 @@ class PopulationFiles:
         self.trajectory.close()
         self.ledger.close()
         rows = aggregate_rows(self.folder / files.TRAJECTORY, now)
-        write_table(self.folder / files.AGGREGATES, rows, AGGREGATE_COLUMNS)
+        write_table(self.folder / files.AGGREGATES, rows, ("body", "born", "copy", *COLUMNS))
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
         files.write_json(self.folder / files.SUMMARY, sealed(files.plain(summary)))
         return summary

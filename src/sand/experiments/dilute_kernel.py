@@ -76,8 +76,7 @@ def kernel_of(encounters: Sequence[Mapping[str, np.ndarray]], edges: Sequence[in
             apart = np.std([each[1] - value * each[2] for each in sums], axis=0, ddof=1)
             error = np.maximum(error, apart * math.sqrt(len(encounters)) / weights)
         means = np.where(bodies[2] > 0.0, bodies[:2] / bodies[2], 0.0)
-    squares = (each.reshape(count, count) for each in (value, error, hits, draws))
-    both = (np.triu(each) + np.triu(each, 1).T for each in squares)
+    both = (np.triu(one) + np.triu(one, 1).T for one in np.reshape((value, error, hits, draws), (4, count, count)))
     return Kernel(bounds.astype(int), *both, *means)
 
 

@@ -76,14 +76,13 @@ def capture_law(
         first, second = each["grains1"][own], each["grains2"][own]
         weight = flat(mass * first, mass * second) / each["kernel"][own]
         parts.append((np.log(first * second), each["end"][own] == 0, weight))
-        net = capture_sums(each, temperature)
-        sums.append((net.hits.sum(), net.expected.sum()))
+        sums.append(np.sum(capture_sums(each, temperature)[1:3], axis=1))  # hits and expected ones
     if not any(np.ptp(size[is_hit]) > 0.0 for size, is_hit, _ in parts if is_hit.any()):
         raise BadInput("the law of capture needs hits of bodies of different sizes; grow the dust further")
 
     def fitted(chosen: Sequence[int]) -> tuple[float, float, float]:
         size, is_hit, weight = (np.concatenate([parts[k][n] for k in chosen]) for n in range(3))
-        hits, expected = (math.fsum(sums[k][n] for k in chosen) for n in range(2))
+        hits, expected = np.sum([sums[k] for k in chosen], axis=0).tolist()
         return (*_likeliest(size, is_hit, weight), hits / expected if expected > 0.0 else math.nan)
 
     everything = range(len(parts))
@@ -146,17 +145,15 @@ class PopulationKernel(NamedTuple):
         found = self.kernel
         if found is None:
             return []
+        i, j = np.nonzero(np.triu(found.hits))
+        sizes = {"grains1": found.edges[i], "grains2": found.edges[j], "mean1": found.sizes[i], "mean2": found.sizes[j]}
+        columns = sizes | {
+            "kernel": found.value[i, j],
+            "error": found.error[i, j],
+            "hits": found.hits[i, j].astype(int),
+        }
         return [
-            {
-                "grains1": int(found.edges[i]),
-                "grains2": int(found.edges[j]),
-                "mean1": float(found.sizes[i]),
-                "mean2": float(found.sizes[j]),
-                "kernel": float(found.value[i, j]),
-                "error": float(found.error[i, j]),
-                "hits": int(found.hits[i, j]),
-            }
-            for i, j in zip(*np.nonzero(np.triu(found.hits)), strict=True)
+            dict(zip(columns, row, strict=True)) for row in zip(*map(np.ndarray.tolist, columns.values()), strict=True)
         ]
 
 

@@ -21,9 +21,7 @@ BODY = "body_number"
 """Own quantity of the grains of frames: the number of their body, equal for copies."""
 SPACING = 1.5
 """Distance of aggregates in a frame, in diameters of the largest one."""
-SINGLE_NUMBERS = (
-    *("time", "event", "flights", "hits_seen", "bound", "others", "recent_others", "longest_flight", "numbers"),
-)
+SINGLE_NUMBERS = ("time", "event", "flights", "hits_seen", "bound", "others", "recent_others", "numbers")
 """What `Encounters` counts."""
 
 

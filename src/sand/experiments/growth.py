@@ -19,19 +19,9 @@ from ..basics.paths import user_path
 from ..io import run_folder as files
 from ..results import Run
 from .dilute_case import is_dilute
-from .growth_boxes import grow, run_box, shared_settings
+from .growth_boxes import shared_settings
 
-__all__ = [
-    "BoxResult",
-    "GrowthResult",
-    "Temperatures",
-    "boxes_in",
-    "grow",
-    "growth_of",
-    "read_box",
-    "run_box",
-    "shared_settings",
-]
+__all__ = ["BoxResult", "GrowthResult", "Temperatures", "boxes_in", "growth_of", "read_box"]
 
 LOOKS = 10
 """Number of frames of each box in which aggregates are measured, evenly over the run, including the last."""

@@ -17,7 +17,7 @@ from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.lock import writing
 from ..simulation.serialise import case_of, changed_tables
-from .dilute_case import check_dilute, is_dilute, run_population
+from .dilute_case import check_dilute, is_dilute, population_of
 from .dilute_files import HitsSeen
 from .executors import results_of
 from .growth_case import DEFAULT_SEEDS, read_growth
@@ -227,7 +227,7 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
         with writing(place, patience=PATIENCE):  # a worker whose parent was killed may be writing its checkpoint
             pass
     if is_dilute(content):
-        return run_population(content, seed, place, own)
+        return population_of(content, seed, place, own).outcome
     case = check_case(content, "case")
     case.run.seed = seed
     until = case.run.until

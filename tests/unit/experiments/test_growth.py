@@ -11,8 +11,8 @@ import sand
 from sand.analysis.body_motion import BodyMotion
 from sand.basics.constants import BOLTZMANN
 from sand.cli.main import main
-from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
-from sand.experiments.growth_boxes import shared_settings
+from sand.experiments.growth import BoxResult, boxes_in, growth_of, read_box
+from sand.experiments.growth_boxes import grow, run_box, shared_settings
 from sand.experiments.growth_report import temperatures_over_time
 
 pytestmark = pytest.mark.filterwarnings(
