@@ -71,7 +71,7 @@ def test_an_encounter_keeps_momentum_energy_and_angular_momentum(hits):
     """
     rule = Stick(CONTACT, IRON.materials)
     if hits == "resolve":
-        rule = Resolve(ContactPhase(IRON, [CONTACT, sand.Dipoles(cutoff=None)]), RigidFlights(HEAT))
+        rule = Resolve(ContactPhase(IRON, [CONTACT, sand.Dipoles(cutoff=None)]), RigidFlights(HEAT), Majorant(T))
     bodies, watched = population(40), Watched(rule)
     now, seen = Encounters(bodies, RigidFlights(HEAT), watched, 2), {"hit": 0, "miss": 0}
     size = np.sqrt(40.0 * GRAIN.mass * 3.0 * HEAT)

@@ -29,20 +29,26 @@ MOST_RETURNS = 100
 class Hit(NamedTuple):
     """What became of two bodies that touched."""
 
-    pieces: list[tuple[GrainArrays, StrainedContacts]]  # in any frame
+    pieces: list[tuple[GrainArrays, StrainedContacts]]  # in the frame of the pair
     made: int  # contacts that formed, slipped and broke
     slipped: int
     broken: int
     time: float  # of contact phases, and of flights between them [s]
     steps: int  # contact steps
     energies: dict[str, float]  # changes [J] by channel: `simulation.contact_phase.CHANGES`
-    # of the pieces: velocity in the frame of the pair, after they have parted at an infinite distance, and L
+    # of the pieces: velocity in the frame of the pair, of parted charges at an infinite distance, and L
     motions: list[tuple[np.ndarray, np.ndarray]]
 
     @property
     def is_miss(self) -> bool:
         """Whether the grains have not touched after all."""
         return not self.made
+
+    @property
+    def relative(self) -> tuple[np.ndarray, np.ndarray]:
+        """r × u (3,) [m²/s] of two pieces, and their relative velocity u (3,)."""
+        (one, own, _), (two, other, _) = (momenta_of(grains) for grains, _ in self.pieces)
+        return np.cross(one - two, own - other), own - other
 
 
 class Stick:
@@ -146,7 +152,10 @@ class Resolve:
         velocity = velocity_far_away(r, u, repulsion)
         if flight.end != MISS or repulsion == 0.0 or velocity is None:
             return whole
-        gained = 0.5 * a.mass * b.mass / (a.mass + b.mass) * float(velocity @ velocity - u @ u)
+        square, orbit = float(velocity @ velocity), np.cross(r, u)
+        gained = 0.5 * a.mass * b.mass / (a.mass + b.mass) * (square - float(u @ u))
+        # on the line that their orbit comes to, with the same r × u
+        flight.state[R : R + 3] = np.linalg.norm(r) / np.sqrt(square) * velocity + np.cross(velocity, orbit) / square
         flight.state[U : U + 3] = velocity
         return whole._replace(kinetic=whole.kinetic + gained, potential=whole.potential - gained)
 
