@@ -14,6 +14,7 @@ from sand.experiments.dilute_body import body_of, in_space, momenta_of
 from sand.experiments.dilute_encounters import Encounters
 from sand.experiments.dilute_flight import RigidFlights
 from sand.experiments.dilute_hits import Hit, Resolve, Stick
+from sand.experiments.dilute_majorant import Majorant
 from sand.experiments.dilute_own import OWN_START, OwnMajorant, thermal_body
 from sand.experiments.dilute_population import Population
 from sand.simulation.contact_phase import ContactPhase

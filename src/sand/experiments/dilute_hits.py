@@ -160,7 +160,7 @@ class Resolve:
         return whole._replace(kinetic=whole.kinetic + gained, potential=whole.potential - gained)
 
     def _distance_apart(self, a: Body, b: Body, state: np.ndarray, start: float) -> float:
-        """Distance [m] at which a flight of the present speed would begin; infinite if charges bring the bodies back."""
+        """Distance [m] at which a flight of the present speed begins; infinite if charges bring the bodies back."""
         r, u = state[R : R + 3], state[U : U + 3]
         if velocity_far_away(r, u, repulsion_of(a, b)) is None:
             return math.inf

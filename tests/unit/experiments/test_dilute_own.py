@@ -83,9 +83,9 @@ def free_rotation(own, inertia):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_phase_of_free_rotation_is_a_point_of_the_motion_of_its_body(name):
-    """|L|² and Σ L_k²/I_k at all phases are those of the start, to 1e-10, and L stays on its side of the axis it circles.
+    """|L|² and Σ L_k²/I_k at all phases are those of the start, to 1e-10; L has the same sign along the axis it circles.
 
-    That is the third axis if Σ L_k²/I_k < |L|²/I₂, and the first one otherwise.
+    This is the third axis if Σ L_k²/I_k < |L|²/I₂, and the first one otherwise.
     """
     inertia = np.array(SHAPES[name])
     for own in np.random.default_rng(1).normal(size=(20, 3)):
@@ -159,7 +159,7 @@ def test_before_a_flight_a_body_has_its_angular_momentum_and_random_phases():
 
 
 def test_flights_begin_at_random_azimuths_and_independent_orientations():
-    """Of 2000 events: the azimuth of b about v, and the angles of both bodies about their L, are uniform, independent."""
+    """The azimuth of b about v and the angles of both bodies about their L are uniform and independent; 2000 events."""
     a, b = moving(tree(7, 1), 1), moving(tree(5, 2), 2)
     relative = a.motion.velocity - b.motion.velocity
     speed = float(np.linalg.norm(relative))
