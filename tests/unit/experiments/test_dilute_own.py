@@ -83,7 +83,7 @@ def free_rotation(own, inertia):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_phase_of_free_rotation_is_a_point_of_the_motion_of_its_body(name):
-    """|L|² and Σ L_k²/I_k at all phases are those of the start, to 1e-10; L has the same sign along the axis it circles.
+    """|L|² and Σ L_k²/I_k at all phases are those of the start, to 1e-10; L keeps its sign along the axis it circles.
 
     This is the third axis if Σ L_k²/I_k < |L|²/I₂, and the first one otherwise.
     """
