@@ -141,7 +141,7 @@ class Rebounds:
             position=distance * np.outer(along, sides), velocity=speed * np.outer(heading, sides),
             spin=np.zeros((3, 2)), moment=np.outer(along, size),
         )  # fmt: skip
-        self.orbit = distance * speed * math.sin(0.1)
+        self.orbit, self.pair = distance * speed * math.sin(0.1), pair
         return Settled(after, NO_CONTACTS, np.arange(2), 1, 0, 1, 0.0, 0, dict.fromkeys(CHANGES, 0.0))
 
 
@@ -158,8 +158,8 @@ def single(charge):
 def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, moves):
     """They recede at r ≥ 2b̂(u), or 4b̂(u) if bodies keep their motion, with ½m̄u² + U(r) = E; charges go to U = 0.
 
-    r is at most 1.5 times as large, as a step is a tenth of r/u, and the last distance is that of a speed which is still
-    a little larger.  r × u stays: of charges exactly, of dipoles it goes into spins.  Energies of the hit add up to 0.
+    r is at most 1.5 times as large, as a step is a tenth of r/u, and the last distance is that of a speed that is still a
+    little larger.  r × u stays: of charges exactly, of dipoles it goes into spins.  Energies of the hit add up to 0.
     U of two moments μ is between −2kμ²/r³ and half of it, aligned but for angles of their line.  Flights of steps five
     times shorter than usual have errors below 0.2 k_BT.
     """
@@ -178,6 +178,7 @@ def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, m
     assert total - 0.2 <= kinetic <= total - pair + 0.2
     if any(charges):
         assert kinetic == pytest.approx(total, rel=1e-3)
+        assert hit.energies["distant"] == pytest.approx(-phase.pair, rel=1e-3, abs=0.0)
         assert np.linalg.norm(orbit) == pytest.approx(phase.orbit, rel=1e-6, abs=0.0)
     there = kinetic - COULOMB * np.prod(charges) * 1.602176634e-19**2 / r / HEAT
     speed = math.sqrt(2.0 * there * HEAT / (0.5 * a.mass))
@@ -188,9 +189,11 @@ def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, m
 
 @pytest.mark.parametrize("charges", [(0, 0), (1, -1)], ids=["dipoles", "opposite charges"])
 def test_pieces_that_come_back_touch_again(charges):
-    """With E = −0.1 or −1 k_BT the distance ends at 41 r (2kμ²/r³ = 0.1 k_BT) or 17 r (Q/r = k_BT): both beyond 4b̂(u)
-    of the first moment.  After the second contact phase, with E > 0, they part."""
-    phase = Rebounds(-1.0 if charges[0] else -0.1, 5.0)
+    """With E = −0.1 k_BT the distance grows to 40 or 167 radii, where −2kμ²/d³ or −Q/d is E: beyond 2b̂(u) before.
+
+    After the second contact phase, with E > 0, they part.
+    """
+    phase = Rebounds(-0.1, 5.0)
     a, b = (single(charge) for charge in charges)
     state = np.array([2.001 * RADIUS, 0, 0, -1.0, 0, 0, *[0, 0, 0, 1.0] * 2, *[0.0] * 6])
     hit = Resolve(phase, RigidFlights(HEAT, step_fraction=0.02), Majorant(T))(a, b, state)
@@ -217,6 +220,37 @@ def test_a_population_of_bodies_that_keep_their_motion_is_resumed_with_the_same_
         dilute_growth.grow(grains(), FORCES, **NUMBERS, **OWN, out=place, observers=[Stopper(hits)])
     dilute_growth.grow(grains(), FORCES, **NUMBERS, **OWN, out=place)
     assert files_of(place) == files_of(kept.folder)
+
+
+@pytest.mark.parametrize("between", ["own", "thermal"])
+@pytest.mark.parametrize("draws", [1, 300])
+def test_a_population_in_which_nothing_hits_is_resumed_with_the_same_bits(tmp_path, monkeypatch, between, draws):
+    """Grains with 30 elementary charges at 100 K, 7500 k_BT at a touch, never hit; killed after a draw, they go on.
+
+    Only `until` ends it.  The checkpoint is that of the draw before.  Files are those of a run that was not killed.
+    """
+    own = grains(moment=None, charge=np.full(100, 30.0) * 1.602176634e-19)
+    how = {**NUMBERS, "between": between, "hits": "stick", "until": "0.1 s", "seed": 3}
+    forces = [CONTACT, sand.Charges()]
+    one = dilute_growth.grow(own, forces, **how, out=tmp_path / "one")
+    assert one.ledger["hits"][-1] == 0 and len(one.encounters["end"]) > 400
+    place, left, add = tmp_path / "killed", [draws], dilute_files.PopulationFiles.add
+
+    def killed(self, *arguments):
+        add(self, *arguments)
+        left[0] -= 1
+        if left[0] == 0:
+            raise Stopped
+
+    with monkeypatch.context() as patched:
+        patched.setattr(dilute_files, "CHECKPOINT_EVERY", 0.0)
+        patched.setattr(dilute_files.PopulationFiles, "add", killed)
+        with pytest.raises(Stopped):
+            dilute_growth.grow(own, forces, **how, out=place)
+    assert dilute_files.kept_population(place)[1]["event"] == draws
+    dilute_growth.grow(own, forces, **how, out=place)
+    assert files_of(place) == files_of(one.folder)
+    assert not len(one.aggregates["grains"])
 
 
 def test_the_ledger_has_the_energies_of_the_bodies(kept):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.frame_statistics import aggregate_statistics
+from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..basics.box import Box
 from ..basics.grains import Grains
 from ..basics.schema import MODES
@@ -175,7 +175,8 @@ class PopulationFiles:
         self.frame(now)
         self.trajectory.close()
         self.ledger.close()
-        write_table(self.folder / files.AGGREGATES, aggregate_rows(self.folder / files.TRAJECTORY, now))
+        rows = aggregate_rows(self.folder / files.TRAJECTORY, now)
+        write_table(self.folder / files.AGGREGATES, rows, (*IDENTITY, *COLUMNS))
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
         files.write_json(self.folder / files.SUMMARY, sealed(files.plain(summary)))
         return summary
@@ -203,6 +204,8 @@ class HitsSeen:
             self.last, self.hits = monotonic(), row["hits"]
 
 
+IDENTITY = ("body", "born", "copy")
+"""First columns of aggregates.csv, before those of `analysis.frame_statistics`; the table may have no rows."""
 WHOLE = ("step", "clusters", "largest_cluster", "grains", "flights", "hits", "bound")
 """Columns of whole numbers."""
 POPULATION = "dilute population"
