@@ -158,7 +158,7 @@ def single(charge):
 def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, moves):
     """They recede at r ≥ 2b̂(u), or 4b̂(u) if bodies keep their motion, with ½m̄u² + U(r) = E; charges go to U = 0.
 
-    r is at most 1.5 times as large, as a step is a tenth of r/u, and the last distance is that of a speed that is still a
+    r is at most 1.5 times as large, as a step is a tenth of r/u, and the last distance is that of a speed still a
     little larger.  r × u stays: of charges exactly, of dipoles it goes into spins.  Energies of the hit add up to 0.
     U of two moments μ is between −2kμ²/r³ and half of it, aligned but for angles of their line.  Flights of steps five
     times shorter than usual have errors below 0.2 k_BT.
@@ -230,7 +230,7 @@ def test_a_population_in_which_nothing_hits_is_resumed_with_the_same_bits(tmp_pa
     Only `until` ends it.  The checkpoint is that of the draw before.  Files are those of a run that was not killed.
     """
     own = grains(moment=None, charge=np.full(100, 30.0) * 1.602176634e-19)
-    how = {**NUMBERS, "between": between, "hits": "stick", "until": "0.1 s", "seed": 3}
+    how = {**NUMBERS, "between": between, "hits": "stick", "until": "8000 s", "seed": 3}
     forces = [CONTACT, sand.Charges()]
     one = dilute_growth.grow(own, forces, **how, out=tmp_path / "one")
     assert one.ledger["hits"][-1] == 0 and len(one.encounters["end"]) > 400
