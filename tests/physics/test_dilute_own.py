@@ -177,7 +177,7 @@ def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, m
     pair = 0.0 if any(charges) else -2.0 * MAGNETIC * MOMENT**2 / r**3 / HEAT
     assert total - 0.2 <= kinetic <= total - pair + 0.2
     if any(charges):
-        assert kinetic == pytest.approx(total, rel=1e-3)
+        assert kinetic == pytest.approx(total, rel=1e-3, abs=0.0)
         assert hit.energies["distant"] == pytest.approx(-phase.pair, rel=1e-3, abs=0.0)
         assert np.linalg.norm(orbit) == pytest.approx(phase.orbit, rel=1e-6, abs=0.0)
     there = kinetic - COULOMB * np.prod(charges) * 1.602176634e-19**2 / r / HEAT
