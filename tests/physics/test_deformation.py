@@ -263,7 +263,8 @@ def test_the_run_ends_before_a_grain_has_two_images_in_reach():
     sim = packing("-3e7 1/s", number=4, side=9e-7)
     result = sim.run(until="1 us")
     assert result.outcome is sand.Outcome.BOX_TOO_SMALL
-    assert sim.box.lengths[0] == pytest.approx(6.0 * RADIUS, rel=1e-2, abs=0.0)
+    # the next step would strain the box by at most 1e-3
+    assert 6.0 * RADIUS <= sim.box.lengths[0] <= 6.0 * RADIUS / (1.0 - 1e-3)
 
 
 def test_a_pressure_is_reached_and_kept():

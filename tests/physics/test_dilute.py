@@ -186,7 +186,7 @@ def test_the_energy_of_a_hit_is_accounted_for(phase):
     The error is that of Verlet steps, 25 a period of the contact: second order, 7e-4. Mass is exact; one contact forms,
     one body is left; its net moment, extent and moments of inertia are those of bodies that stick, to 1e-2.
     """
-    rule, stick = Resolve(phase, RigidFlights(HEAT)), Stick(CONTACT, IRON.materials)
+    rule, stick = Resolve(phase, RigidFlights(HEAT), Majorant(T)), Stick(CONTACT, IRON.materials)
     touching = start_state(GRAIN, GRAIN, 1.0, 0.0, (2.0 + TOUCH) * RADIUS)
     dimer, _ = body_of(*stick(GRAIN, GRAIN, touching).pieces[0])
     found, _ = flights_of_pair(dimer, GRAIN, 60)
@@ -396,7 +396,7 @@ def test_half_magnetic_grains_stick_and_resolve(phase_of_two):
     """A magnetic grain hits one without a moment: the engine for both kinds accounts for the energy to 1e-3."""
     plain = body_of(sand.Grains([[0.0, 0.0, 0.0]], "8 nm", "iron").arrays, NO_CONTACTS)[0]
     state = start_state(GRAIN, plain, 2.0, 1e-9, 1.8e-8 * (1.0 + TOUCH))
-    hit = Resolve(phase_of_two, RigidFlights(HEAT))(GRAIN, plain, state)
+    hit = Resolve(phase_of_two, RigidFlights(HEAT), Majorant(T))(GRAIN, plain, state)
     body, _ = body_of(*hit.pieces[0])
     assert hit.made == 1 and body.mass == pytest.approx(GRAIN.mass + plain.mass, rel=1e-14, abs=0.0)
     assert abs(sum(hit.energies.values())) < 1e-3 * -hit.energies["contacts"]

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 import sand
-from sand.basics.constants import MAGNETIC
+from sand.basics.constants import COULOMB, MAGNETIC
 from sand.basics.errors import BadInput
 from sand.experiments import dilute_files, dilute_growth
-from sand.experiments.dilute_body import body_of, in_space, momenta_of
+from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space, momenta_of
 from sand.experiments.dilute_encounters import Encounters
 from sand.experiments.dilute_flight import RigidFlights
 from sand.experiments.dilute_hits import Hit, Resolve, Stick
+from sand.experiments.dilute_majorant import Majorant
 from sand.experiments.dilute_own import OWN_START, OwnMajorant, thermal_body
-from sand.experiments.dilute_population import Population
-from sand.simulation.contact_phase import ContactPhase
+from sand.experiments.dilute_population import Population, sizes_of
+from sand.simulation.contact_phase import CHANGES, ContactPhase, Settled
 from tests.physics.test_dilute import CONTACT, HEAT, IRON, T
 from tests.physics.test_dilute_runs import FORCES, NUMBERS, Stopped, Stopper, files_of, grains
 from tests.unit.experiments.test_dilute import GRAIN, MOMENT, RADIUS, aggregate
@@ -71,7 +72,7 @@ def test_an_encounter_keeps_momentum_energy_and_angular_momentum(hits):
     """
     rule = Stick(CONTACT, IRON.materials)
     if hits == "resolve":
-        rule = Resolve(ContactPhase(IRON, [CONTACT, sand.Dipoles(cutoff=None)]), RigidFlights(HEAT))
+        rule = Resolve(ContactPhase(IRON, [CONTACT, sand.Dipoles(cutoff=None)]), RigidFlights(HEAT), Majorant(T))
     bodies, watched = population(40), Watched(rule)
     now, seen = Encounters(bodies, RigidFlights(HEAT), watched, 2), {"hit": 0, "miss": 0}
     size = np.sqrt(40.0 * GRAIN.mass * 3.0 * HEAT)
@@ -102,26 +103,102 @@ def left_out(a, b, state):
     return Hit([], 0, 0, 0, 0.0, 0, {}, [])
 
 
-def temperatures(number, widening, cold, encounters, seed=1):
-    """Energies of motion and rotation [k_BT] after each encounter (K, 2), and the misses whose b′ exceeds b̂(v′)."""
-    bodies = population(number, BENT, seed, widening, cold)
-    # all pairs of grains: energy that flights lose or gain adds up
-    now = Encounters(bodies, RigidFlights(HEAT, step_fraction=0.05, group_size=0.0), left_out, seed)
-    found = []
-    for _ in range(encounters):
-        now.step()
-        found.append(bodies.temperatures)
-    return np.array(found)
-
-
-def test_equilibrium_is_kept():
+def test_flights_that_miss_keep_the_energy_of_a_population():
     """With touching flights left out the energy of 50 bodies, 3 k_BT each at the start, stays to 1e-3.
 
     Each of 600 encounters changes it by its energy error and the interaction where flights start and end, below
     1e-3 k_BT rms: 0.03 of 150 k_BT in all.
     """
-    found = temperatures(50, 1.0, False, 600).sum(axis=1)
-    assert np.abs(found / found[0] - 1.0).max() < 1e-3 and np.ptp(found) > 0.0
+    bodies, found = population(50, BENT), []
+    # all pairs of grains: energy that flights lose or gain adds up
+    now = Encounters(bodies, RigidFlights(HEAT, step_fraction=0.05, group_size=0.0), left_out, 1)
+    for _ in range(600):
+        now.step()
+        found.append(energy(bodies))
+    assert np.abs(np.array(found) / found[0] - 1.0).max() < 1e-3 and np.ptp(found) > 0.0
+
+
+class Rebounds:
+    """A contact phase after which two grains recede at a gap of 0.1 radii, with the energies of a list [k_BT].
+
+    They do not rotate, have moments along their line, and velocities at 0.1 rad to it.
+    """
+
+    def __init__(self, *energies):
+        self.left = list(energies)
+
+    def run(self, grains, contacts):
+        """The pieces, with one contact that has formed and broken."""
+        apart = grains.position[:, 0] - grains.position[:, 1]
+        along, distance = apart / np.linalg.norm(apart), 2.1 * RADIUS
+        across = np.cross(along, [0.6, 0.0, 0.8])
+        size = np.linalg.norm(grains.moment, axis=0)
+        pair = COULOMB * np.prod(grains.charge) / distance - 2.0 * MAGNETIC * np.prod(size) / distance**3
+        speed = math.sqrt(2.0 * (self.left.pop(0) * HEAT - pair) / (0.5 * grains.mass[0]))
+        heading = math.cos(0.1) * along + math.sin(0.1) * across / np.linalg.norm(across)
+        sides = np.array([0.5, -0.5])
+        after = grains._replace(
+            position=distance * np.outer(along, sides), velocity=speed * np.outer(heading, sides),
+            spin=np.zeros((3, 2)), moment=np.outer(along, size),
+        )  # fmt: skip
+        self.orbit, self.pair = distance * speed * math.sin(0.1), pair
+        return Settled(after, NO_CONTACTS, np.arange(2), 1, 0, 1, 0.0, 0, dict.fromkeys(CHANGES, 0.0))
+
+
+def single(charge):
+    """A grain with so many elementary charges, or one with a moment if 0."""
+    if charge == 0:
+        return GRAIN
+    grains = sand.Grains([[0.0, 0.0, 0.0]], RADIUS, "iron", charge=charge * 1.602176634e-19)
+    return body_of(grains.arrays, NO_CONTACTS)[0]
+
+
+@pytest.mark.parametrize("moves", [False, True], ids=["thermal", "own"])
+@pytest.mark.parametrize("charges", [(0, 0), (1, -1), (2, 1)], ids=["dipoles", "opposite charges", "equal charges"])
+def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, moves):
+    """They recede at r ≥ 2b̂(u), or 4b̂(u) if bodies keep their motion, with ½m̄u² + U(r) = E; charges go to U = 0.
+
+    r is at most 1.5 times as large, as a step is a tenth of r/u, and the last distance is that of a speed still a
+    little larger.  r × u stays: of charges exactly, of dipoles it goes into spins.  Energies of the hit add up to 0.
+    U of two moments μ is between −2kμ²/r³ and half of it, aligned but for angles of their line.  Flights of steps five
+    times shorter than usual have errors below 0.2 k_BT.
+    """
+    a, b = (single(charge) for charge in charges)
+    if moves:
+        a, b = (thermal_body(each, HEAT, 1, k) for k, each in enumerate((a, b)))
+    majorant, phase = Majorant(T), Rebounds(5.0 if charges[1] < 1 else 30.0)
+    total = phase.left[0]
+    state = np.array([2.001 * RADIUS, 0, 0, -1.0, 0, 0, *[0, 0, 0, 1.0] * 2, *[0.0] * 6])
+    hit = Resolve(phase, RigidFlights(HEAT, step_fraction=0.02), majorant)(a, b, state)
+    assert (hit.made, len(hit.pieces)) == (1, 2) and not phase.left
+    orbit, u = hit.relative
+    r = np.linalg.norm(momenta_of(hit.pieces[0][0])[0] - momenta_of(hit.pieces[1][0])[0])
+    kinetic = 0.25 * a.mass * float(u @ u) / HEAT
+    pair = 0.0 if any(charges) else -2.0 * MAGNETIC * MOMENT**2 / r**3 / HEAT
+    assert total - 0.2 <= kinetic <= total - pair + 0.2
+    if any(charges):
+        assert kinetic == pytest.approx(total, rel=1e-3, abs=0.0)
+        assert hit.energies["distant"] == pytest.approx(-phase.pair, rel=1e-3, abs=0.0)
+        assert np.linalg.norm(orbit) == pytest.approx(phase.orbit, rel=1e-6, abs=0.0)
+    there = kinetic - COULOMB * np.prod(charges) * 1.602176634e-19**2 / r / HEAT
+    speed = math.sqrt(2.0 * there * HEAT / (0.5 * a.mass))
+    far = (4.0 if moves else 2.0) * majorant.bound(sizes_of(a), sizes_of(b), speed)
+    assert far <= r <= 1.5 * far
+    assert abs(sum(hit.energies.values())) < 0.2 * HEAT
+
+
+@pytest.mark.parametrize("charges", [(0, 0), (1, -1)], ids=["dipoles", "opposite charges"])
+def test_pieces_that_come_back_touch_again(charges):
+    """With E = −0.1 k_BT the distance grows to 40 or 167 radii, where −2kμ²/d³ or −Q/d is E: beyond 2b̂(u) before.
+
+    After the second contact phase, with E > 0, they part.
+    """
+    phase = Rebounds(-0.1, 5.0)
+    a, b = (single(charge) for charge in charges)
+    state = np.array([2.001 * RADIUS, 0, 0, -1.0, 0, 0, *[0, 0, 0, 1.0] * 2, *[0.0] * 6])
+    hit = Resolve(phase, RigidFlights(HEAT, step_fraction=0.02), Majorant(T))(a, b, state)
+    assert phase.left == [] and (hit.made, len(hit.pieces)) == (2, 2)
+    assert hit.time > 1e-9
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +220,37 @@ def test_a_population_of_bodies_that_keep_their_motion_is_resumed_with_the_same_
         dilute_growth.grow(grains(), FORCES, **NUMBERS, **OWN, out=place, observers=[Stopper(hits)])
     dilute_growth.grow(grains(), FORCES, **NUMBERS, **OWN, out=place)
     assert files_of(place) == files_of(kept.folder)
+
+
+@pytest.mark.parametrize("between", ["own", "thermal"])
+@pytest.mark.parametrize("draws", [1, 300])
+def test_a_population_in_which_nothing_hits_is_resumed_with_the_same_bits(tmp_path, monkeypatch, between, draws):
+    """Grains with 30 elementary charges at 100 K, 7500 k_BT at a touch, never hit; killed after a draw, they go on.
+
+    Only `until` ends it.  The checkpoint is that of the draw before.  Files are those of a run that was not killed.
+    """
+    own = grains(moment=None, charge=np.full(100, 30.0) * 1.602176634e-19)
+    how = {**NUMBERS, "between": between, "hits": "stick", "until": "8000 s", "seed": 3}
+    forces = [CONTACT, sand.Charges()]
+    one = dilute_growth.grow(own, forces, **how, out=tmp_path / "one")
+    assert one.ledger["hits"][-1] == 0 and len(one.encounters["end"]) > 400
+    place, left, add = tmp_path / "killed", [draws], dilute_files.PopulationFiles.add
+
+    def killed(self, *arguments):
+        add(self, *arguments)
+        left[0] -= 1
+        if left[0] == 0:
+            raise Stopped
+
+    with monkeypatch.context() as patched:
+        patched.setattr(dilute_files, "CHECKPOINT_EVERY", 0.0)
+        patched.setattr(dilute_files.PopulationFiles, "add", killed)
+        with pytest.raises(Stopped):
+            dilute_growth.grow(own, forces, **how, out=place)
+    assert dilute_files.kept_population(place)[1]["event"] == draws
+    dilute_growth.grow(own, forces, **how, out=place)
+    assert files_of(place) == files_of(one.folder)
+    assert not len(one.aggregates["grains"])
 
 
 def test_the_ledger_has_the_energies_of_the_bodies(kept):

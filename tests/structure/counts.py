@@ -32,7 +32,7 @@ CAPABILITIES = {
     "stress of contacts, walls, pair forces, Ewald sums and rigid clusters; tables of contacts with walls, shares of "
     "grains in frames, pictures and page": 491,
     "Ewald sums of dipoles and charges, forces with cut-offs, and rigid clusters in a box that is deformed at any "
-    "rates": 468,
+    "rates": 471,
     "frames of all seeds and last box of a packing read before its first run, scales with the factor of the surface "
     "energy, folders of several runs named by view": 21,
     "figures of papers on packings that are compressed and stretched, tables that runs of a sweep have of their own, "
@@ -45,7 +45,7 @@ CAPABILITIES = {
     "filled again, populations as runs, charges, a field, kernel": 2006,
     "figures in the width and style of a journal, several runs in one figure, s² n_s, stills as outlines, percolating "
     "packings inside the box, shares of each value of a sweep, materials of files in methods": 759,
-    "bodies of dilute dust that keep momentum and spin between encounters": 242,
+    "bodies of dilute dust that keep momentum and spin between encounters": 278,
     "populations of dilute dust in sweeps, their template, and the kernel of several with the fit of Eq. 14": 285,
     "films of runs by the page in a browser without a window or by the renderer of figures (sand view --movie)": 354,
 }

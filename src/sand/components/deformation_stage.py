@@ -52,14 +52,18 @@ class DeformationNumbers(NamedTuple):
 
 @stage("the time step of a box that is deformed")
 def limit_strain(cell, scratch, parameters):
-    """Lower `scratch[LIMIT]` to a power of two of a second; returns `Stop.BOX_TOO_SMALL` where the box is."""
+    """Lower `scratch[LIMIT]` to a power of two of a second.
+
+    Returns `Stop.BOX_TOO_SMALL` where a side is too short, or may become so in a step of this length.
+    """
     fastest = abs(cell.span[SHEAR])
     for a in range(3):
-        if cell.span[a] < parameters.shortest:
-            return Stop.BOX_TOO_SMALL.value
         fastest = max(fastest, abs(cell.span[RATE + a]))
     if fastest * scratch[LIMIT] > LARGEST_STRAIN:
         scratch[LIMIT] = quantise_step(1.0, LARGEST_STRAIN / fastest, True)
+    for a in range(3):
+        if cell.span[a] * (1.0 + min(cell.span[RATE + a], 0.0) * scratch[LIMIT]) < parameters.shortest:
+            return Stop.BOX_TOO_SMALL.value
     return Stop.NONE.value
 
 

@@ -1,8 +1,8 @@
 """Forces between distant grains in a box that is deformed: which there are, and the parameters of their Ewald sums.
 
 While the box is deformed, the loops sum energies at constant α, r_c and integers n of the wave vectors, whose exact
-derivatives are the virials (`forces.pair.ewald_loops`, `mesh_loops`).  After a change of a side by MOST_STRAIN at most,
-the parameters are chosen anew, for the same accuracy; the change of the energy is `lost_cutoff_changed`.
+derivatives are the virials (`forces.pair.ewald_loops`, `mesh_loops`).  Before ln L of a side has changed by more than
+MOST_STRAIN, the parameters are chosen anew, for the same accuracy; the change of the energy is `lost_cutoff_changed`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ..forces.base import Force
 from ..forces.pair.dipoles import Dipoles
 from ..forces.pair.ewald import EwaldChoice
 from ..forces.pair.ewald_force import MOST_STRAIN, EwaldForce
+from .deformation_stage import LARGEST_STRAIN
 
 
 def problems_of_forces(setup: Setup) -> Iterator[str]:
@@ -82,14 +83,20 @@ def use_choices(engine: Engine, cell: CellArrays, fixed: float) -> None:
 
 
 def follow_box(engine: Engine, cell: CellArrays, fixed: float, fastest: float) -> None:
-    """Choose the parameters anew if sides may soon have changed by MOST_STRAIN, at rates up to `fastest` [1/s]."""
+    """Choose the parameters anew if sides may soon have changed by MOST_STRAIN, at rates up to `fastest` [1/s].
+
+    They last for the time t = (MOST_STRAIN − ε − change)/fastest.  The step that passes t, of a strain x of at most
+    LARGEST_STRAIN or that of a fixed step, changes ln L by up to ε = x + x² > −ln(1 − x).
+    """
     state = engine.stored_state
     forces = [force for force, _, _ in engine.long_range]
     sums = [k for k, force in enumerate(forces) if isinstance(force, EwaldForce) and force.chosen is not None]
     if not sums or state.time < cell.lasts[0]:
         return
     change = float(np.abs(np.log(cell.span[:3] / cell.chosen)).max())
-    if change > 0.5 * MOST_STRAIN:
+    strain = max(LARGEST_STRAIN, fastest * engine.parameters.criteria.fixed)
+    lasting = MOST_STRAIN - strain * (1.0 + strain)
+    if change > 0.5 * lasting:
         before, change = math.fsum(pair_energy(engine, k) for k in sums), 0.0
         cell.chosen[:] = cell.span[:3]
         ewald = [force for force in forces if isinstance(force, EwaldForce) and force.chosen is not None]
@@ -98,4 +105,4 @@ def follow_box(engine: Engine, cell: CellArrays, fixed: float, fastest: float) -
         engine.sort_in_space()
         engine.stepper.sum_loads(engine)
         state.lost[CUTOFF_CHANGED] += before - math.fsum(pair_energy(engine, k) for k in sums)
-    cell.lasts[0] = state.time + (MOST_STRAIN - change) / fastest if fastest > 0.0 else math.inf
+    cell.lasts[0] = state.time + max(lasting - change, 0.0) / fastest if fastest > 0.0 else math.inf

@@ -15,7 +15,7 @@ from .dilute_body import Body, Motion, body_of
 from .dilute_flight import FlightResult, RigidFlights, kepler_start, start_distance
 from .dilute_hits import Hit, HitRule
 from .dilute_majorant import Approach
-from .dilute_own import OWN_START, centre_velocity, own_start, parted, repelled, turned_copy
+from .dilute_own import OWN_START, centre_velocity, has_reverse, own_start, parted, repelled, turned_copy
 from .dilute_population import Population, sizes_of
 from .scattering.event_draws import event_uniforms
 from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
@@ -183,7 +183,7 @@ class Encounters:
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[flight.end])
         hit = self.rule(a, b, flight.state)
         if hit.is_miss:
-            if a.motion is not None and len(hit.pieces) == 2:
+            if a.motion is not None and len(hit.pieces) == 2 and has_reverse(a, b, *hit.relative, population.majorant):
                 population.replace(i, j, pieces_of(a, b, hit, [(each.number, each.born, each.copy) for each in (a, b)]))
             return Encounter(**drawn, **own, **NO_HIT, end=ENDS[MISS])
         self._replace(i, j, hit)

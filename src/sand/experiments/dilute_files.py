@@ -1,4 +1,4 @@
-"""Files of a population of dilute dust: ledger, one row per draw, aggregates, frames, and checkpoints after hits."""
+"""Files of a population of dilute dust: ledger, one row per draw, aggregates, frames, and checkpoints."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .dilute_state import arrays_of, set_apart
 from .scattering.flights import ENDS
 
 CHECKPOINT_EVERY = 30.0
-"""Longest wall time [s] between checkpoints, which are written after hits."""
+"""Wall time [s] after which a checkpoint is written, at the next draw."""
 SHOWN_EVERY = 0.5
 """Wall time [s] between two lines of progress."""
 FRAMES_PER_DECADE = 10
@@ -133,14 +133,13 @@ class PopulationFiles:
         self.ledger.append(row)
 
     def add(self, now: Encounters, encounter: Encounter, start: float) -> None:
-        """A draw; after a hit a row of the ledger, a frame at ten values of S per decade, a checkpoint if it is due."""
+        """A draw; after a hit a row of the ledger, a frame at ten values of S per decade; a checkpoint if it is due."""
         self.waiting.append(encounter_row(encounter))
-        if encounter.end != "hit":
-            return
-        before = self.rows[-1]
-        self.add_row(ledger_row(now, start, before, encounter))
-        if _frames_until(self.rows[-1]["mean_cluster_size"]) > _frames_until(before["mean_cluster_size"]):
-            self.frame(now)
+        if encounter.end == "hit":
+            before = self.rows[-1]
+            self.add_row(ledger_row(now, start, before, encounter))
+            if _frames_until(self.rows[-1]["mean_cluster_size"]) > _frames_until(before["mean_cluster_size"]):
+                self.frame(now)
         if monotonic() - self.saved > CHECKPOINT_EVERY:
             self.save(now)
 
@@ -177,7 +176,7 @@ class PopulationFiles:
         self.trajectory.close()
         self.ledger.close()
         rows = aggregate_rows(self.folder / files.TRAJECTORY, now)
-        write_table(self.folder / files.AGGREGATES, rows, ("body", "born", "copy", *COLUMNS))
+        write_table(self.folder / files.AGGREGATES, rows, (*IDENTITY, *COLUMNS))
         summary = {"outcome": outcome, **self.rows[-1], **self.ledger.described(), "sand": __version__}
         files.write_json(self.folder / files.SUMMARY, sealed(files.plain(summary)))
         return summary
@@ -205,6 +204,8 @@ class HitsSeen:
             self.last, self.hits = monotonic(), row["hits"]
 
 
+IDENTITY = ("body", "born", "copy")
+"""First columns of aggregates.csv, before those of `analysis.frame_statistics`; the table may have no rows."""
 WHOLE = ("step", "clusters", "largest_cluster", "grains", "flights", "hits", "bound")
 """Columns of whole numbers."""
 POPULATION = "dilute population"

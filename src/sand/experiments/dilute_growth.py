@@ -249,7 +249,7 @@ def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]
     check_charges(settings.forces, settings.grains)
     rule: HitRule = Stick(contact, settings.grains.materials)
     if hits == "resolve":
-        rule = Resolve(ContactPhase(settings.grains, forces), rigid_flights)
+        rule = Resolve(ContactPhase(settings.grains, forces), rigid_flights, majorant)
     if kept is not None:
         arrays, meta = kept
         now = Encounters(population_from(arrays, meta, majorant), rigid_flights, rule, settings.seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -14,8 +15,12 @@ from ..basics.material import Material
 from ..contact.model import Contact
 from ..simulation.contact_phase import CHANGES, ContactPhase
 from .dilute_body import Body, body_of, closest_pair, in_space, momenta_of, part_of
-from .dilute_flight import RigidFlights
-from .scattering.flight_driver import HIT
+from .dilute_flight import START, FlightResult, RigidFlights, start_distance
+from .dilute_majorant import Majorant
+from .dilute_own import OWN_START, repulsion_of, velocity_far_away
+from .dilute_population import sizes_of
+from .scattering.flight_driver import HIT, MISS
+from .scattering.initial_conditions import R, U
 
 MOST_RETURNS = 100
 """Contact phases of one encounter after which bodies that part again and again are an error."""
@@ -24,19 +29,26 @@ MOST_RETURNS = 100
 class Hit(NamedTuple):
     """What became of two bodies that touched."""
 
-    pieces: list[tuple[GrainArrays, StrainedContacts]]  # in any frame
+    pieces: list[tuple[GrainArrays, StrainedContacts]]  # in the frame of the pair
     made: int  # contacts that formed, slipped and broke
     slipped: int
     broken: int
     time: float  # of contact phases, and of flights between them [s]
     steps: int  # contact steps
     energies: dict[str, float]  # changes [J] by channel: `simulation.contact_phase.CHANGES`
-    motions: list[tuple[np.ndarray, np.ndarray]]  # of the pieces: velocity in the frame of the pair, and L
+    # of the pieces: velocity in the frame of the pair, of parted charges at an infinite distance, and L
+    motions: list[tuple[np.ndarray, np.ndarray]]
 
     @property
     def is_miss(self) -> bool:
         """Whether the grains have not touched after all."""
         return not self.made
+
+    @property
+    def relative(self) -> tuple[np.ndarray, np.ndarray]:
+        """r × u (3,) [m²/s] of two pieces, and their relative velocity u (3,)."""
+        (one, own, _), (two, other, _) = (momenta_of(grains) for grains, _ in self.pieces)
+        return np.cross(one - two, own - other), own - other
 
 
 class Stick:
@@ -84,16 +96,17 @@ class Resolve:
         Contact steps with the forces of the grains.
     rigid_flights : RigidFlights
         Computes flights.
+    majorant : Majorant
+        Its b̂ is the unit of the distance to which pieces fly.
     """
 
-    def __init__(self, phase: ContactPhase, rigid_flights: RigidFlights):
-        self.phase, self.rigid_flights = phase, rigid_flights
+    def __init__(self, phase: ContactPhase, rigid_flights: RigidFlights, majorant: Majorant):
+        self.phase, self.rigid_flights, self.majorant = phase, rigid_flights, majorant
 
     def __call__(self, a: Body, b: Body, state: np.ndarray) -> Hit:
         """Compute a hit in the state of a pair.  Raises BadInput if the contact steps fail."""
         grains, contacts = in_space(a, b, state)
         counts, time, steps, energies = np.zeros(3, int), 0.0, 0, dict.fromkeys(CHANGES, 0.0)
-        escape = float(np.linalg.norm(state[:3])) + a.extent + b.extent
         for _ in range(MOST_RETURNS):
             end = self.phase.run(grains, contacts)
             counts += (end.made, end.slipped, end.broken)
@@ -106,7 +119,7 @@ class Resolve:
             if len(pieces) != 2:
                 break
             one, two, y = moving_pair(pieces)
-            flight = self.rigid_flights.onward(one, two, y, escape)
+            flight = self.flight_apart(one, two, y, START if a.motion is None else OWN_START)
             time += flight.time
             energies["kinetic"] += flight.energy - flight.potential - (flight.energy_start - flight.potential_start)
             energies["distant"] += flight.potential - flight.potential_start
@@ -119,6 +132,39 @@ class Resolve:
         made, slipped, broken = counts.tolist()
         motions = [momenta_of(part)[1:] for part, _ in pieces]
         return Hit(pieces, made, slipped, broken, time, steps, energies, motions)
+
+    def flight_apart(self, a: Body, b: Body, state: np.ndarray, start: float) -> FlightResult:
+        """Flight from a state (20,) to a touch, or until the bodies are where a flight of their speed would begin.
+
+        That is at `start` in units of b̂, which grows while the bodies lose speed on their way.  Charges are taken to an
+        infinite distance from there; bodies that they bring back touch again.
+        """
+        first = flight = self.rigid_flights.onward(a, b, state, self._distance_apart(a, b, state, start))
+        time = flight.time
+        while flight.end == MISS:
+            far = self._distance_apart(a, b, flight.state, start)
+            if far <= np.linalg.norm(flight.state[R : R + 3]):
+                break
+            flight = self.rigid_flights.onward(a, b, flight.state, far)
+            time += flight.time
+        whole = flight._replace(time=time, potential_start=first.potential_start, energy_start=first.energy_start)
+        r, u, repulsion = flight.state[R : R + 3], flight.state[U : U + 3], repulsion_of(a, b)
+        velocity = velocity_far_away(r, u, repulsion)
+        if flight.end != MISS or repulsion == 0.0 or velocity is None:
+            return whole
+        square, orbit = float(velocity @ velocity), np.cross(r, u)
+        gained = 0.5 * a.mass * b.mass / (a.mass + b.mass) * (square - float(u @ u))
+        # on the line that their orbit comes to, with the same r × u
+        flight.state[R : R + 3] = np.linalg.norm(r) / np.sqrt(square) * velocity + np.cross(velocity, orbit) / square
+        flight.state[U : U + 3] = velocity
+        return whole._replace(kinetic=whole.kinetic + gained, potential=whole.potential - gained)
+
+    def _distance_apart(self, a: Body, b: Body, state: np.ndarray, start: float) -> float:
+        """Distance [m] at which a flight of the present speed begins; infinite if charges bring the bodies back."""
+        r, u = state[R : R + 3], state[U : U + 3]
+        if velocity_far_away(r, u, repulsion_of(a, b)) is None:
+            return math.inf
+        return start_distance(a, b, float(self.majorant.bound(sizes_of(a), sizes_of(b), np.linalg.norm(u))), start)
 
 
 def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple[Body, Body, np.ndarray]:

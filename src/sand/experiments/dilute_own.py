@@ -202,19 +202,27 @@ def repelled(a: Body, b: Body, approach: Approach, event: tuple[int, int]) -> li
 def parted(a: Body, b: Body, state: np.ndarray, majorant: Majorant) -> list[Body]:
     """Both bodies after an encounter without a touch, from the state of the pair.
 
-    They are unchanged if charges bring them back, and if b′ > b̂(v′) afterwards: encounters are drawn up to b̂, so that
-    the reverse of such a one never happens, and with it translation and rotation would not keep equal temperatures.
+    They are unchanged if charges bring them back, and if the encounter has no reverse (`has_reverse`).
     """
     r, u, momenta = state[R : R + 3], state[U : U + 3], state[ANGULAR1:].reshape(2, 3).copy()
     velocity = velocity_far_away(r, u, repulsion_of(a, b))
-    speed = 0.0 if velocity is None else float(np.linalg.norm(velocity))
-    if velocity is None or np.linalg.norm(np.cross(r, u)) > speed * majorant.bound(sizes_of(a), sizes_of(b), speed):
+    if velocity is None or not has_reverse(a, b, np.cross(r, u), velocity, majorant):
         return [a, b]
     found = []
     for body, turn, lab in zip(with_velocities(a, b, velocity), (TURN1, TURN2), momenta, strict=True):
         own = Rotation.from_quat(state[turn : turn + 4]).inv().apply(lab)
         found.append(dataclasses.replace(body, motion=Motion(motion_of(body).velocity, lab, own)))
     return found
+
+
+def has_reverse(a: Body, b: Body, orbit: np.ndarray, velocity: np.ndarray, majorant: Majorant) -> bool:
+    """Whether b′ ≤ b̂(v′) for two bodies that have parted, from r × u (3,) and their velocity v′ far away.
+
+    Encounters are drawn up to b̂, so that the reverse of one with b′ > b̂(v′) never happens.  With such ones translation
+    and rotation would not keep equal temperatures.
+    """
+    speed = float(np.linalg.norm(velocity))
+    return bool(np.linalg.norm(orbit) <= speed * majorant.bound(sizes_of(a), sizes_of(b), speed))
 
 
 def with_velocities(a: Body, b: Body, relative: np.ndarray) -> list[Body]:

@@ -1,12 +1,13 @@
 """Dilute dust whose bodies keep their motion: rates, phases of free rotation, orbits of charges, momenta."""
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.stats import kstest
+from scipy.spatial.transform import Rotation
 
 import sand
 from sand.basics.constants import BOLTZMANN, COULOMB
@@ -28,6 +29,7 @@ from sand.experiments.dilute_own import (
 )
 from sand.experiments.dilute_population import Population, sizes_of
 from sand.experiments.scattering.event_draws import event_uniforms
+from sand.experiments.scattering.two_aggregates import TURN1, TURN2
 from tests.unit.experiments.test_dilute import DIMER, GRAIN, RADIUS, T, tree
 
 HEAT = BOLTZMANN * T
@@ -53,56 +55,120 @@ SHAPES = {
 }
 
 
+def free_rotation(own, inertia):
+    """L in the frame of a body at 64 equal times of one period of dL/dt = L × ω, ω_k = L_k/I_k, (64, 3).
+
+    A period ends where L passes the plane across its curve at the start, in the same direction.
+    """
+    size, (p, q, r) = np.linalg.norm(own), (1.0 / each for each in inertia)
+
+    def rate(_, y):
+        a, b, c = y
+        return np.array([b * c * (r - q), c * a * (p - r), a * b * (q - p)])
+
+    onward = rate(0.0, own)
+
+    def plane(_, y):
+        return float((y - own) @ onward)
+
+    plane.terminal, plane.direction = True, 1.0
+    how = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12 * size}
+    begin = 0.01 * min(inertia) / size
+    first = solve_ivp(rate, (0.0, begin), own, **how).y[:, -1]
+    run = solve_ivp(rate, (begin, 1e6 * begin), first, events=plane, dense_output=True, **how)
+    period, last = run.t_events[0][0], run.y_events[0][0]
+    assert last == pytest.approx(own, abs=1e-8 * size) and period > 64.0 * begin
+    return np.vstack([own, run.sol(period * np.arange(1, 64) / 64.0).T])
+
+
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_phase_of_free_rotation_keeps_energy_and_angular_momentum(name):
-    """|L|² and Σ L_k²/I_k at all phases are those of the start, to 1e-10; the axis that L circles keeps its sign."""
-    inertia = SHAPES[name]
-    for own in np.random.default_rng(1).normal(size=(20, 3)):
-        for phase in (0.0, 0.1, 0.37, 0.62, 0.999):
-            found = angular_at(own, inertia, phase)
-            assert found @ found == pytest.approx(own @ own, rel=1e-10, abs=0.0)
-            assert (found**2 / inertia).sum() == pytest.approx((own**2 / inertia).sum(), rel=1e-10, abs=0.0)
+def test_a_phase_of_free_rotation_is_a_point_of_the_motion_of_its_body(name):
+    """|L|² and Σ L_k²/I_k at all phases are those of the start, to 1e-10; L keeps its sign along the axis it circles.
 
-
-@pytest.mark.parametrize("name", ["asymmetric", "nearly prolate", "oblate"])
-def test_phases_of_free_rotation_are_uniform_in_time(name):
-    """Means of L_k² and L₁L₂L₃… over phases are those over time of Euler's equations dL/dt = L × ω, to 1e-3.
-
-    The mean over 64 phases of a period is exact but for rounding; that over time, 300 turns, errs by 1/300 of the
-    change within one period: 1e-3 of |L|², and the fourth moments alike.
+    This is the third axis if Σ L_k²/I_k < |L|²/I₂, and the first one otherwise.
     """
     inertia = np.array(SHAPES[name])
-    for own in np.random.default_rng(2).normal(size=(3, 3)):
-        found = np.array([angular_at(own, SHAPES[name], (k + 0.5) / 64) for k in range(64)])
-        end = 300.0 * 2.0 * math.pi * inertia.max() / np.linalg.norm(own) * 10.0
-        times = np.linspace(0.0, end, 20_001)
-        run = solve_ivp(
-            lambda _, y: np.cross(y, y / inertia), (0.0, end), own, "DOP853", times, rtol=1e-9, atol=1e-11
-        ).y.T
-        for power in (2, 4):
-            size = np.linalg.norm(own) ** power
-            assert (found**power).mean(axis=0) == pytest.approx((run**power).mean(axis=0), abs=3e-3 * size)
+    for own in np.random.default_rng(1).normal(size=(20, 3)):
+        along = 2 if (own**2 / inertia).sum() < own @ own / inertia[1] else 0
+        for phase in (0.0, 0.1, 0.37, 0.62, 0.999):
+            found = angular_at(own, SHAPES[name], phase)
+            assert found @ found == pytest.approx(own @ own, rel=1e-10, abs=0.0)
+            assert (found**2 / inertia).sum() == pytest.approx((own**2 / inertia).sum(), rel=1e-10, abs=0.0)
+            assert found[along] * own[along] > 0.0
 
 
-def test_before_a_flight_a_body_has_its_angular_momentum_and_a_random_angle_about_it():
-    """q L_body = L, with L_body on its curve; a direction across L averages to 0 within 4 standard errors of 400."""
+@pytest.mark.parametrize("name", ["asymmetric", "nearly prolate", "prolate", "oblate"])
+def test_phases_of_free_rotation_are_uniform_in_time(name):
+    """Phases 0 … 1 are one period of Euler's equations: L at equal phases is L at equal times, and all of the curve.
+
+    From the L of phase 0, integrated forwards or backwards, to 1e-7 |L|.  So means are those over time: of the
+    components that circle they are 0.  From L itself, at another time of the same curve, the means of L_k, L_jL_k and
+    L_k⁴ over 64 times are equal to 1e-7: sums over equal parts of a period converge as exp(−64 × K′/K).
+    """
+    for own in np.random.default_rng(2).normal(size=(6, 3)):
+        size = np.linalg.norm(own)
+        found = np.array([angular_at(own, SHAPES[name], k / 64) for k in range(64)])
+        forwards = free_rotation(found[0], SHAPES[name])
+        backwards = np.roll(forwards[::-1], 1, axis=0)
+        assert min(np.abs(found - run).max() for run in (forwards, backwards)) < 1e-7 * size
+        run = free_rotation(own, SHAPES[name])
+        for moment in (lambda y: y, lambda y: y[:, :, None] * y[:, None], lambda y: y**4):
+            both = moment(found / size).mean(axis=0), moment(run / size).mean(axis=0)
+            assert both[0] == pytest.approx(both[1], abs=1e-7)
+        along = int(np.argmax(np.abs(found.mean(axis=0))))
+        assert np.delete(found.mean(axis=0), along) == pytest.approx(np.zeros(2), abs=1e-9 * size)
+
+
+def angle_about(axis, vectors):
+    """Angle [turns, 0 … 1] of vectors (n, 3) about an axis."""
+    first = np.cross(axis, [0.0, 0.0, 1.0])
+    second = np.cross(axis, first) / np.linalg.norm(axis)
+    return np.arctan2(vectors @ second, vectors @ first) / (2.0 * math.pi) % 1.0
+
+
+def assert_uniform(*angles):
+    """Angles φ (n,) [turns] are uniform and independent: n |⟨exp 2πi Σ kφ⟩|² < 12 for all k = −2 … 2 but 0.
+
+    This is Rayleigh's test: the number has an exponential distribution, and exceeds 12 with a probability of 6e-6.
+    """
+    for factors in itertools.product(range(-2, 3), repeat=len(angles)):
+        combined = sum(factor * angle for factor, angle in zip(factors, angles, strict=True))
+        if any(factors):
+            assert abs(np.exp(2.0j * math.pi * combined).mean()) ** 2 * len(angles[0]) < 12.0, factors
+
+
+def test_before_a_flight_a_body_has_its_angular_momentum_and_random_phases():
+    """L in space stays: q L_body = L with L_body on its curve, on the same side of the axis that it circles.
+
+    Its phase on the curve, the time of free rotation in periods, and the angle of the body about L are uniform, and
+    independent of each other.  The phase is that of Euler's equations at the same angle about the axis.
+    """
     body = moving(tree(7, 1))
-    own_axes = []
-    for event in range(400):
-        uniforms = event_uniforms(3, event)[:3]
-        pose = pose_of(body, uniforms)
-        inside = pose.T @ body.motion.angular
-        assert (inside**2 / body.flying.inertia).sum() == pytest.approx(2.0 * body.rotation, rel=1e-9, abs=0.0)
-        own_axes.append(pose[:, 0])
-    along = body.motion.angular / np.linalg.norm(body.motion.angular)
-    across = np.array(own_axes) - np.outer(np.array(own_axes) @ along, along)
-    assert np.abs(across.mean(axis=0)).max() < 4.0 * math.sqrt(1.0 / 400)
-    angle = np.arctan2(across @ np.cross(along, [0.0, 0.0, 1.0]), across[:, 2])
-    spread = across / np.linalg.norm(across, axis=1)[:, None]
-    first = np.cross(along, [0.0, 0.0, 1.0])
-    first /= np.linalg.norm(first)
-    angle = np.arctan2(spread @ np.cross(along, first), spread @ first)
-    assert kstest((angle + math.pi) / (2.0 * math.pi), "uniform").pvalue > 1e-3
+    own, inertia = body.motion.own, np.array(body.flying.inertia)
+    along = 2 if (own**2 / inertia).sum() < own @ own / inertia[1] else 0
+    poses = np.array([pose_of(body, event_uniforms(3, event)[:3]) for event in range(2000)])
+    inside = np.einsum("nji,j->ni", poses, body.motion.angular)
+    assert (inside**2 / inertia).sum(axis=1) == pytest.approx(np.full(2000, 2.0 * body.rotation), rel=1e-9, abs=0.0)
+    assert (inside[:, along] * own[along] > 0.0).all()
+    times = np.resize(free_rotation(own, inertia), (64, 3))
+    axis = np.eye(3)[along]
+    phases = np.sort(angle_about(axis, times))
+    found = angle_about(axis, inside)
+    share = np.interp(found, np.concatenate([phases[-1:] - 1.0, phases, phases[:1] + 1.0]), np.arange(66) - 0.5)
+    assert_uniform(share / 64.0 % 1.0, angle_about(body.motion.angular, poses[:, :, 1]))
+
+
+def test_flights_begin_at_random_azimuths_and_independent_orientations():
+    """The azimuth of b about v and the angles of both bodies about their L are uniform and independent; 2000 events."""
+    a, b = moving(tree(7, 1), 1), moving(tree(5, 2), 2)
+    relative = a.motion.velocity - b.motion.velocity
+    speed = float(np.linalg.norm(relative))
+    states = np.array([own_start(a, b, Approach(speed, 5e-8, 6e-8), 4e-7, (1, k)) for k in range(2000)])
+    azimuth, angles = angle_about(relative, states[:, :3]), []
+    for body, turn in ((a, TURN1), (b, TURN2)):
+        axes = Rotation.from_quat(states[:, turn : turn + 4]).as_matrix()[:, :, 1]
+        angles.append(angle_about(body.motion.angular, axes))
+    assert_uniform(azimuth, *angles)
 
 
 def test_a_body_at_rest_has_a_random_orientation():
