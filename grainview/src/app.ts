@@ -36,6 +36,7 @@ const NO_REFRESH = new Set(["speed", "loop", "live", "plot", "look", "frame", "t
 /** Width and height of the page [pixels] below which the panel of settings is hidden at first. */
 const [NARROW, LOW] = [720, 480];
 
+const CLOSE_UP = "The largest cluster. Press r for the whole box.";
 const CONTEXT_LOST = "The browser lost the graphics card (WebGL context); if the picture does not return, reload.";
 
 export class App implements FrameDisplay, LiveRun {
@@ -161,23 +162,24 @@ export class App implements FrameDisplay, LiveRun {
     };
   }
 
-  /** Show the first picture: the settings are those of the address; without one, the largest cluster is in view. */
-  async start(look: string, showLargest: boolean): Promise<void> {
+  /** Show the first picture: the settings are those of the address; without one, see `CameraController.showFirst`. */
+  async start(look: string, isFirst: boolean): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
     this.picture.setFrame(await this.frames.nearest(first, this.manifest.times.length));
     this.picture.update(false);
     this.applyViewSettings();
     this.setTheme();
     await this.navigation.go(first);
-    this.setInitialLook(look, showLargest);
+    this.setInitialLook(look, isFirst);
     this.address?.connect();
   }
 
-  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview or the largest cluster. */
-  private setInitialLook(text: string, showLargest = false): void {
-    const look = lookFromText(text);
+  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview or the first view. */
+  private setInitialLook(text: string, isFirst = false): void {
+    const [look, height] = [lookFromText(text), this.page.canvas.clientHeight];
     if (look) this.stage.look = look;
-    else this.camera.showCluster(showLargest ? this.selection.largestCluster() : null);
+    else if (!isFirst) this.camera.reset();
+    else if (this.camera.showFirst(this.selection.largestCluster(), height)) this.note.showBriefly(CLOSE_UP);
     this.selection.anchor();
     this.stage.draw();
   }

@@ -26,6 +26,8 @@ export interface CentredSelection {
 
 /** Height of a view relative to that of its content. */
 const MARGIN = 1.08;
+/** Height [pixels] of the largest cluster in the view of everything from which on that view shows its shape. */
+const LEGIBLE = 30;
 
 export class CameraController {
   constructor(
@@ -71,6 +73,20 @@ export class CameraController {
     const everything = this.overview();
     const near = cluster && this.overview(everything.from, everything.up, cluster);
     this.camera.look = near ? { ...near, height: Math.min(2 * near.height, everything.height) } : everything;
+  }
+
+  /**
+   * The first view: everything, or the cluster where it would be too small in that view to show its shape.
+   *
+   * @param pixels height of the picture
+   * @returns whether the cluster is aimed at, so that the box may be cut off
+   */
+  showFirst(cluster: Uint8Array | null, pixels: number): boolean {
+    const everything = this.overview();
+    const near = cluster && this.overview(everything.from, everything.up, cluster);
+    const aims = near !== null && (near.height / everything.height) * pixels < LEGIBLE;
+    this.showCluster(aims ? cluster : null);
+    return aims;
   }
 
   /** Fit the isolated cluster to the view, if it differs from the grains shown before (a mask; null: all). */
