@@ -27,7 +27,7 @@ export interface CentredSelection {
 /** Height of a view relative to that of its content. */
 const MARGIN = 1.08;
 /** Height [pixels] of the largest cluster in the view of everything from which on that view shows its shape. */
-const LEGIBLE = 30;
+const LEGIBLE = 12;
 
 export class CameraController {
   constructor(

@@ -93,7 +93,7 @@ function rest({ manifest }: Dataset, { at_rest: flags, cluster, position }: Fram
   const resting = [...awake.values()].filter((on) => !on).length;
   const [colours, words] = [[...manifest.colours.rest, null], ["awake (contact steps)", "at rest (rigid)", "single"]];
   return [{
-    title: `clusters at rest inside (rigid bodies): ${resting} of ${awake.size}`,
+    title: `rigid clusters (at rest): ${resting} of ${awake.size}`,
     shares: manifest.colours.rest.map((colour, k) => ({ colour, share: counts[k] / grains })),
     rows: counts.map((count, k) => ({ colour: colours[k], text: `${count} ${words[k]}` })),
   }];

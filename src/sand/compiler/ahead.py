@@ -97,7 +97,7 @@ def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], proc
         """What is done, and for how long; no time that is left, which depends on what else the machine computes."""
         ready = sum(in_cache(*each.kernel) for each in tasks)
         spent = time.perf_counter() - began
-        return f"compiling for the first run: {ready} of {len(tasks)} stages after {spent:.0f} s; later runs need none"
+        return f"compiling, once for runs of this kind: {ready} of {len(tasks)} stages after {spent:.0f} s"
 
     try:
         with making_code, _helpers([each.recipe for each in tasks if each.recipe], helpers), shown_line(progress):

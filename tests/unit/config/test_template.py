@@ -7,6 +7,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
+from sand.cli.new import READERS
 from sand.components.deformation import Deformation
 from sand.components.driven import Driven
 from sand.config.build import simulation_of
@@ -125,8 +126,8 @@ def test_parts_of_a_class_are_documented():
 
 
 MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case, "sweep": CollisionCase} | LOADINGS
-MODEL["encounters"] = SweptPopulation.model({})
-READER = {command: command for command in TEMPLATES} | {"encounters": "grow"}
+MODEL |= {"encounters": SweptPopulation.model({}), "magnetic": Case}
+READER = {command: command for command in TEMPLATES} | READERS
 
 
 @pytest.mark.parametrize("command", list(TEMPLATES))
