@@ -47,7 +47,7 @@ KINDS = {
     "m/s": "a speed",
     "kg/m^3": "a density",
     "N": "a force",
-    "J": "an energy",
+    "J": "an energy or a torque",
     "Pa": "a pressure",
     "J/m^2": "an energy per area",
     "T": "a flux density",

@@ -397,7 +397,7 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
     wrong = f"is {kind[:-2]}; it " if size is None and (kind := kind_of(moment)) else ""
     if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
         raise BadInput(
-            f"moment = {shown(moment)} {wrong}must be (N, 3) or three numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
-            "or, per mass, '200 A m^2/kg', or 'material'"
+            f"moment = {shown(moment)} {wrong}must be (N, 3) or three numbers in A m^2, or a size ≥ 0 such as "
+            "'6.6e-18 A m^2' or, per mass, '200 A m^2/kg', or 'material'"
         )
     return np.broadcast_to(np.asarray(size, dtype=np.float64), mass.shape)
