@@ -2,7 +2,7 @@
 
 import { actionsOf } from "./actions";
 import { AddressBar } from "./address";
-import { CameraController } from "./camera";
+import { CameraController, CLOSE_UP } from "./camera";
 import { Frames } from "./data/frames";
 import { type Told, toldOf } from "./data/glance";
 import { awakeGrains, type Dataset } from "./data/quantities";
@@ -36,7 +36,6 @@ const NO_REFRESH = new Set(["speed", "loop", "live", "plot", "look", "frame", "t
 /** Width and height of the page [pixels] below which the panel of settings is hidden at first. */
 const [NARROW, LOW] = [720, 480];
 
-const CLOSE_UP = "The largest cluster. Press r for the whole box.";
 const CONTEXT_LOST = "The browser lost the graphics card (WebGL context); if the picture does not return, reload.";
 
 export class App implements FrameDisplay, LiveRun {
@@ -178,8 +177,7 @@ export class App implements FrameDisplay, LiveRun {
   private setInitialLook(text: string, isFirst = false): void {
     const [look, height] = [lookFromText(text), this.page.canvas.clientHeight];
     if (look) this.stage.look = look;
-    else if (!isFirst) this.camera.reset();
-    else if (this.camera.showFirst(this.selection.largestCluster(), height)) this.note.showBriefly(CLOSE_UP);
+    else if (this.camera.showFirst(isFirst && this.selection.largestCluster(), height)) this.note.showBriefly(CLOSE_UP);
     this.selection.anchor();
     this.stage.draw();
   }

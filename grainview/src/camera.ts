@@ -24,6 +24,8 @@ export interface CentredSelection {
   centre(): number[] | null;
 }
 
+/** What the page tells of a first view of the largest cluster. */
+export const CLOSE_UP = "The largest cluster. Press r for the whole box.";
 /** Height of a view relative to that of its content. */
 const MARGIN = 1.08;
 /** Height [pixels] of the largest cluster in the view of everything from which on that view shows its shape. */
@@ -81,11 +83,11 @@ export class CameraController {
    * @param pixels height of the picture
    * @returns whether the cluster is aimed at, so that the box may be cut off
    */
-  showFirst(cluster: Uint8Array | null, pixels: number): boolean {
+  showFirst(cluster: Uint8Array | null | false, pixels: number): boolean {
     const everything = this.overview();
-    const near = cluster && this.overview(everything.from, everything.up, cluster);
-    const aims = near !== null && (near.height / everything.height) * pixels < LEGIBLE;
-    this.showCluster(aims ? cluster : null);
+    const near = cluster ? this.overview(everything.from, everything.up, cluster).height : Infinity;
+    const aims = (near / everything.height) * pixels < LEGIBLE;
+    this.showCluster(aims && cluster ? cluster : null);
     return aims;
   }
 
