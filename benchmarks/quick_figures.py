@@ -1,10 +1,10 @@
 """`python -m benchmarks --quoted`: measure what README and docs quote and a few minutes can measure.
 
-It installs SAND in a new virtual environment, runs examples/iron-gas.toml by the command line, with an empty cache and with a full one, draws the pictures of
-README and docs from its last frame (`pictures.py`, by a Chromium), runs the scripts of README and of the first page
-of the docs, and writes docs/measured.json and the copies in README, CONTRIBUTING and ARCHITECTURE. Times are CPU
-times of one thread, because machines are shared. Records that it does not measure stay as they are. `--tests` adds
-the wall time of the default tests on two cores.
+It installs SAND in a new virtual environment, runs examples/iron-gas.toml by the command line, with an empty cache
+and with a full one, draws the pictures of README and docs from its last frame (`pictures.py`, by a Chromium), runs
+the scripts of README and of the first page of the docs, and writes docs/measured.json and the copies in README,
+CONTRIBUTING and ARCHITECTURE. Times are CPU times of one thread, because machines are shared. Records that it does
+not measure stay as they are. `--tests` adds the wall time of the default tests on two cores.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def environment(cache: Path) -> dict[str, str]:
 
 
 def installation(top: Path) -> dict[str, Any]:
-    """CPU time of the first line of commands in README: a virtual environment, and SAND with all that it needs in it."""
+    """CPU time of the first commands of README: a virtual environment, and SAND with what it needs in it."""
     folder = top / "venv"
     taken = ran([sys.executable, "-m", "venv", str(folder)])[0]
     return {"time": duration(taken + ran([str(folder / "bin" / "pip"), "install", str(quoted.TOP)])[0])}
