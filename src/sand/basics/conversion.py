@@ -56,6 +56,8 @@ KINDS = {
     "C": "a charge",
     "V": "a voltage",
     "Hz": "a frequency",
+    "rad/s": "an angular velocity",
+    "A/m": "a magnetic field strength",
 }
 """What a quantity in each unit is, for values of a wrong unit."""
 DEEPEST = 8
