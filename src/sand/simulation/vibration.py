@@ -54,7 +54,7 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
     if hot and share > 0.0:
         most = max(row["internal"] for row in grown) / share
         notes["vibration"] = (
-            f"contacts vibrate: kinetic energy within clusters, up to {most:.3g} k_B T₀ per grain, first above {HOT:g} "
+            f"grains in contact vibrate: kinetic energy within clusters, up to {most:.3g} k_B T₀ per grain, first above {HOT:g} "
             f"at t = {format_quantity(hot[0]['time'], 's')}; T₀ is the temperature at the start{advice}"
         )
     if grown and (broken := rows[-1]["broken"]):
