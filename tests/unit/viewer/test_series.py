@@ -23,7 +23,7 @@ def test_series_are_the_ledgers(finished_run):
     )
     assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
     change = sim.ledger["total"] - sim.ledger["total"][0]
-    assert plots["balance"]["change of the total"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
+    assert plots["balance"]["change of the total energy"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
     assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
     assert plots["losses"]
     for label, lost in plots["losses"].items():  # a logarithmic axis cannot show 0
