@@ -1,10 +1,10 @@
 """`python -m benchmarks --quoted`: measure what README and docs quote and a few minutes can measure.
 
-It runs examples/iron-gas.toml by the command line, with an empty cache and with a full one, draws the pictures of
-README and docs from its last frame (`pictures.py`, by a Chromium), runs the scripts of README and of the first page
-of the docs, and writes docs/measured.json and the copies in README, CONTRIBUTING and ARCHITECTURE. Times are CPU
-times of one thread, because machines are shared. Records that it does not measure stay as they are. `--tests` adds
-the wall time of the default tests on two cores.
+It installs SAND in a new virtual environment, runs examples/iron-gas.toml by the command line, with an empty cache
+and with a full one, draws the pictures of README and docs from its last frame (`pictures.py`, by a Chromium), runs
+the scripts of README and of the first page of the docs, and writes docs/measured.json and the copies in README,
+CONTRIBUTING and ARCHITECTURE. Times are CPU times of one thread, because machines are shared. Records that it does
+not measure stay as they are. `--tests` adds the wall time of the default tests on two cores.
 """
 
 from __future__ import annotations
@@ -60,6 +60,13 @@ def environment(cache: Path) -> dict[str, str]:
     told = {"PYTHONPATH": os.pathsep.join(filter(None, paths)), "PATH": os.pathsep.join(places)}
     told |= {"SAND_CACHE": str(cache), "SAND_EXAMPLES": str(quoted.TOP / "examples"), "SAND_NO_BROWSER": "1"}
     return os.environ | told | {"NUMBA_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+
+
+def installation(top: Path) -> dict[str, Any]:
+    """CPU time of the first commands of README: a virtual environment, and SAND with what it needs in it."""
+    folder = top / "venv"
+    taken = ran([sys.executable, "-m", "venv", str(folder)])[0]
+    return {"time": duration(taken + ran([str(folder / "bin" / "pip"), "install", str(quoted.TOP)])[0])}
 
 
 def main_job(top: Path) -> dict[str, Any]:
@@ -118,7 +125,7 @@ def tests(top: Path) -> dict[str, Any]:
 
 def write(with_tests: bool) -> str:
     """Measure, and write docs/measured.json, the pictures and the copies; the values as text."""
-    measures = [main_job, picture, script, first_page, commands, *([tests] if with_tests else [])]
+    measures = [installation, main_job, picture, script, first_page, commands, *([tests] if with_tests else [])]
     records = quoted.read()
     about = {"commit": commit(), "date": str(datetime.date.today()), "machine": processor()}
     told = []

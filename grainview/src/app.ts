@@ -2,7 +2,7 @@
 
 import { actionsOf } from "./actions";
 import { AddressBar } from "./address";
-import { CameraController } from "./camera";
+import { CameraController, CLOSE_UP } from "./camera";
 import { Frames } from "./data/frames";
 import { type Told, toldOf } from "./data/glance";
 import { awakeGrains, type Dataset } from "./data/quantities";
@@ -161,23 +161,23 @@ export class App implements FrameDisplay, LiveRun {
     };
   }
 
-  /** Show the first picture: the settings are those of the address; without one, the largest cluster is in view. */
-  async start(look: string, showLargest: boolean): Promise<void> {
+  /** Show the first picture: the settings are those of the address; without one, see `CameraController.showFirst`. */
+  async start(look: string, isFirst: boolean): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
     this.picture.setFrame(await this.frames.nearest(first, this.manifest.times.length));
     this.picture.update(false);
     this.applyViewSettings();
     this.setTheme();
     await this.navigation.go(first);
-    this.setInitialLook(look, showLargest);
+    this.setInitialLook(look, isFirst);
     this.address?.connect();
   }
 
-  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview or the largest cluster. */
-  private setInitialLook(text: string, showLargest = false): void {
-    const look = lookFromText(text);
+  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview or the first view. */
+  private setInitialLook(text: string, isFirst = false): void {
+    const [look, height] = [lookFromText(text), this.page.canvas.clientHeight];
     if (look) this.stage.look = look;
-    else this.camera.showCluster(showLargest ? this.selection.largestCluster() : null);
+    else if (this.camera.showFirst(isFirst && this.selection.largestCluster(), height)) this.note.showBriefly(CLOSE_UP);
     this.selection.anchor();
     this.stage.draw();
   }

@@ -24,8 +24,12 @@ export interface CentredSelection {
   centre(): number[] | null;
 }
 
+/** What the page tells of a first view of the largest cluster. */
+export const CLOSE_UP = "The largest cluster. Press r for the whole box.";
 /** Height of a view relative to that of its content. */
 const MARGIN = 1.08;
+/** Height [pixels] of the largest cluster in the view of everything from which on that view shows its shape. */
+const LEGIBLE = 12;
 
 export class CameraController {
   constructor(
@@ -71,6 +75,20 @@ export class CameraController {
     const everything = this.overview();
     const near = cluster && this.overview(everything.from, everything.up, cluster);
     this.camera.look = near ? { ...near, height: Math.min(2 * near.height, everything.height) } : everything;
+  }
+
+  /**
+   * The first view: everything, or the cluster where it would be too small in that view to show its shape.
+   *
+   * @param pixels height of the picture
+   * @returns whether the cluster is aimed at, so that the box may be cut off
+   */
+  showFirst(cluster: Uint8Array | null | false, pixels: number): boolean {
+    const everything = this.overview();
+    const near = cluster ? this.overview(everything.from, everything.up, cluster).height : Infinity;
+    const aims = (near / everything.height) * pixels < LEGIBLE;
+    this.showCluster(aims && cluster ? cluster : null);
+    return aims;
   }
 
   /** Fit the isolated cluster to the view, if it differs from the grains shown before (a mask; null: all). */

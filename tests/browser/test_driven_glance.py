@@ -107,10 +107,10 @@ def test_clusters_at_rest(view, frame):
     size = np.bincount(label, minlength=GRAINS)[label]
     rest, names = at_rest(frame), np.unique(label[size > 1])
     resting = sum(bool(rest[label == name].all()) for name in names)
-    title, shares, rows = told(view)["clusters at rest"]
-    assert title == f"clusters at rest: {resting} of {len(names)}"
+    title, shares, rows = told(view)["rigid clusters (at rest)"]
+    assert title == f"rigid clusters (at rest): {resting} of {len(names)}"
     awake, asleep, single = ((~rest) & (size > 1)).sum(), (rest & (size > 1)).sum(), (size == 1).sum()
-    assert rows == [f"{awake} awake", f"{asleep} at rest", f"{single} single"]
+    assert rows == [f"{awake} awake (contact steps)", f"{asleep} at rest (rigid)", f"{single} single"]
     assert shares == pytest.approx([100 * awake / GRAINS, 100 * asleep / GRAINS], abs=1e-3)
 
 

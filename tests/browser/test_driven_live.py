@@ -71,7 +71,10 @@ def test_awake_grains_of_a_running_simulation(page, tmp_path, bundle):
             run.append(frames - run.count)
             until(view, f"{frames} frames")
             assert f"frame {frames - 1} of {frames - 1} · {awake} awake" in " ".join(view.text(".gv-time").split())
-            assert view.text(".gv-legend").split("\n")[1:] == [f"{awake} awake", f"{GRAINS - awake} at rest"]
+            assert view.text(".gv-legend").split("\n")[1:] == [
+                f"{awake} awake (contact steps)",
+                f"{GRAINS - awake} at rest (rigid)",
+            ]
             colours = np.array(view.run("[...app.picture.painted.colour]")).reshape(-1, 4)
             assert len(np.unique(colours, axis=0)) == (2 if awake else 1)
         told = view.run("app.plot.chart.data[1]")

@@ -55,7 +55,7 @@ def test_ticks_are_where_events_are(view, theme):
         seen = rows[..., marked[np.argmax(rows[0, marked, 3])], :3][0]
         assert np.abs(seen - [int(wanted[k : k + 2], 16) for k in (1, 3, 5)]).max() < 12
     view.put(frame=MERGED)
-    assert view.text(".gv-time").endswith("1 made")
+    assert view.text(".gv-time").endswith("contacts: 1 formed")
     view.put(frame=PARTED)
     assert view.text(".gv-time").endswith("1 broken")
 

@@ -39,7 +39,11 @@ def test_legend_and_numbers(page, shows, source):
         frame = view.go(k)
         awake = int((~frame.at_rest).sum())
         told = page.inner_text(".gv-legend").split("\n")
-        assert told == ["grains of clusters that are", f"{awake} awake", f"{len(frame) - awake} at rest"]
+        assert told == [
+            "grains of clusters that are",
+            f"{awake} awake (contact steps)",
+            f"{len(frame) - awake} at rest (rigid)",
+        ]
         assert f"frame {k} of {FRAMES - 1} · {awake} awake" in " ".join(page.inner_text(".gv-time").split())
     view.go(MEETING)
     for grain, words in ((0, "awake, by contact steps"), (99, "at rest, as a rigid body")):

@@ -315,7 +315,7 @@ def test_wrong_changes_are_refused():
         state.own["heating"] = [1.0, 2.0]
     assert [problem.split(";")[0][:44] for problem in caught.value.problems] == [
         "own: the simulation has no 'charm'",
-        "temperature = '3 m' is not a quantity in K",
+        "temperature = '3 m' is a length, not a quant",
         "heating has shape (2,) but must be (5,) for 5 grains (own quantity, in W/m^2)"[:44],
         "own: 'age' cannot be left out of a simulatio",
     ]

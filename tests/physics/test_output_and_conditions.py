@@ -224,7 +224,7 @@ def test_frames_by_time(finished_run_of_frames):
     for time in ("3.1 ns", -1e-9):
         with pytest.raises(sand.BadInput, match="has frames from 0 s to 3 ns"):
             frames.at(time)
-    with pytest.raises(sand.BadInput, match="time = '1 m' is not a quantity in s"):
+    with pytest.raises(sand.BadInput, match="time = '1 m' is a length, not a quantity in s"):
         frames.at("1 m")
 
 

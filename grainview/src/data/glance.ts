@@ -91,9 +91,9 @@ function rest({ manifest }: Dataset, { at_rest: flags, cluster, position }: Fram
   });
   const grains = counts[0] + counts[1] + counts[2];
   const resting = [...awake.values()].filter((on) => !on).length;
-  const [colours, words] = [[...manifest.colours.rest, null], ["awake", "at rest", "single"]];
+  const [colours, words] = [[...manifest.colours.rest, null], ["awake (contact steps)", "at rest (rigid)", "single"]];
   return [{
-    title: `clusters at rest: ${resting} of ${awake.size}`,
+    title: `rigid clusters (at rest): ${resting} of ${awake.size}`,
     shares: manifest.colours.rest.map((colour, k) => ({ colour, share: counts[k] / grains })),
     rows: counts.map((count, k) => ({ colour: colours[k], text: `${count} ${words[k]}` })),
   }];

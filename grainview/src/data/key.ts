@@ -62,7 +62,7 @@ function materials({ manifest }: Dataset): KeyPart {
 
 function rest({ values }: Painted, position: Float32Array, { manifest }: Dataset): KeyPart {
   const present = values.filter((_, i) => !Number.isNaN(position[3 * i])); // without absent grains
-  const rows: Swatch[] = ["awake", "at rest"].map((name, value) => {
+  const rows: Swatch[] = ["awake (contact steps)", "at rest (rigid)"].map((name, value) => {
     const count = present.filter((v) => v === value).length;
     return { colour: css(colourOfRest(value, manifest)), text: `${count} ${name}` };
   });

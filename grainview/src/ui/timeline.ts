@@ -36,9 +36,20 @@ interface Events {
   broken: number;
 }
 
+/** What awake grains are. */
+const AWAKE = "of clusters whose contacts are integrated; all others move as rigid bodies";
+
+/** Contacts that formed and broke, in words; empty without any. */
+function eventText(made: number, broken: number): string {
+  const parts = [made ? `${made} formed` : "", broken ? `${broken} broken` : ""].filter(Boolean);
+  return parts.length ? `contacts: ${parts.join(", ")}` : "";
+}
+
 export class TimeLine {
   readonly slider = h("input", { type: "range", min: 0, step: 1, "aria-label": "Frame", class: "gv-slider" });
   readonly ticks = h("canvas", { class: "gv-ticks", "aria-hidden": "true" });
+  /** What the ticks are. */
+  private readonly key = h("div", { class: "gv-ticks-key" });
   private readonly label = h("output", { class: "gv-time" });
   private readonly playButton: HTMLButtonElement;
   readonly element: HTMLElement;
@@ -48,7 +59,7 @@ export class TimeLine {
   constructor(playback: Playback) {
     this.playButton = button("play", "Play", () => playback.toggle(), "space");
     this.slider.addEventListener("input", () => playback.go(Number(this.slider.value)));
-    const track = h("div", { class: "gv-track" }, this.slider, this.ticks);
+    const track = h("div", { class: "gv-track" }, this.slider, this.ticks, this.key);
     this.element = h(
       "div",
       { class: "gv-timeline", role: "group", "aria-label": "Time line" },
@@ -86,6 +97,9 @@ export class TimeLine {
       byFrame.set(frame, sum);
     });
     this.events = [...byFrame.values()].sort((a, b) => a.frame - b.frame);
+    const kinds = [["made", "contacts formed"], ["broken", "contacts broken"]] as const;
+    this.key.replaceChildren(...kinds.filter(([kind]) => this.events.some((m) => m[kind]))
+      .map(([kind, text]) => h("span", { class: `gv-${kind}` }, text)));
     this.drawTicks();
   }
 
@@ -104,13 +118,13 @@ export class TimeLine {
   show(frame: number, step: number, awake: number | null = null): void {
     this.slider.value = String(frame);
     const { made, broken } = this.eventsOf(frame);
-    const events = [made ? `${made} made` : "", broken ? `${broken} broken` : ""].filter(Boolean).join(", ");
+    const events = eventText(made, broken);
     const time = quantity(this.times[frame], "s");
     const moving = awake === null ? "" : `${awake} awake`;
     this.label.textContent = [`t = ${time}`, `frame ${frame} of ${this.times.length - 1}`, moving, events]
       .filter(Boolean)
       .join("  ·  ");
-    this.label.title = `step ${step}`;
+    this.label.title = [`step ${step}`, moving && `grains ${AWAKE}`].filter(Boolean).join("; awake: ");
     this.slider.setAttribute("aria-valuetext", `frame ${frame}, ${time}`);
   }
 

@@ -39,6 +39,27 @@ EXAMPLES = {
 }
 """One quantity per unit, for error messages."""
 
+KINDS = {
+    "m": "a length",
+    "s": "a time",
+    "kg": "a mass",
+    "K": "a temperature",
+    "m/s": "a speed",
+    "kg/m^3": "a density",
+    "N": "a force",
+    "J": "an energy or a torque",
+    "Pa": "a pressure",
+    "J/m^2": "an energy per area",
+    "T": "a flux density",
+    "A m^2": "a magnetic moment",
+    "A m^2/kg": "a magnetic moment per mass",
+    "C": "a charge",
+    "V": "a voltage",
+    "Hz": "a frequency",
+    "rad/s": "an angular velocity",
+    "A/m": "a magnetic field strength",
+}
+"""What a quantity in each unit is, for values of a wrong unit."""
 DEEPEST = 8
 """Lists within lists that are looked through."""
 HINTS = (
@@ -218,7 +239,12 @@ def not_a_quantity(value: Any, unit: str, name: str) -> BadInput:
     if unit == "1":
         return BadInput(f"{label} is not a number; give one without a unit")
     example = f"give a number in SI or text such as '{EXAMPLES.get(unit, f'1 {unit}')}'"
-    return BadInput(f"{label} is not a quantity in {unit}; {hints[0] if hints else example}")
+    return BadInput(f"{label} is {kind_of(value)}not a quantity in {unit}; {hints[0] if hints else example}")
+
+
+def kind_of(value: Any) -> str:
+    """What a value with a unit is, such as "a mass, "; empty for other values."""
+    return next((f"{kind}, " for unit, kind in KINDS.items() if _is_of(value, unit) and not _is_of(value, "1")), "")
 
 
 def _is_of(value: Any, unit: str) -> bool:

@@ -12,6 +12,7 @@ from .arguments import checked
 from .array_groups import GRAINS, Array
 from .box import Box
 from .constants import LIGHT
+from .conversion import kind_of
 from .errors import BadInput, NoSuchAttribute, NoSuchGrain, did_you_mean, shown
 from .material import Material, as_material
 from .own_quantities import OwnQuantities, read_own, refuse_same_letters
@@ -393,9 +394,10 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
                 raise BadInput(f"moment = {shown(moment)} is {reason}")
             size = found * factor
     fits = size is not None and np.shape(size) in ((), mass.shape)
+    wrong = f"is {kind[:-2]}; it " if size is None and (kind := kind_of(moment)) else ""
     if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
         raise BadInput(
-            f"moment = {shown(moment)} must be (N, 3) or three numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
-            "or, per mass, '200 A m^2/kg', or 'material'"
+            f"moment = {shown(moment)} {wrong}must be (N, 3) or three numbers in A m^2, or a size ≥ 0 such as "
+            "'6.6e-18 A m^2' or, per mass, '200 A m^2/kg', or 'material'"
         )
     return np.broadcast_to(np.asarray(size, dtype=np.float64), mass.shape)

@@ -6,34 +6,27 @@ from typing import Any
 
 from . import report
 
-COMPILATION = 5.0
-"""Wall time [s] expected of the compilation of a stage that was never compiled on this machine."""
-
 
 def cost_of(
     simulation: Any, end: float, last_step: float, condition: str | None, runs: int = 1, figures: int = 1
 ) -> tuple[dict[str, Any], report.Rows]:
     """Expected cost of a run, or of several like it one after the other, which draw one figure or one each."""
-    from ..compiler.jit import COMPILE_TIMES
-    from ..compiler.progress import compile_times
-
     cost, missing = simulation.expected_cost(end, last_step, condition), simulation._engine.uncompiled()
     if cost.seconds is not None:
         parts = {name: (figures if name == "start" else runs) * value for name, value in cost.parts.items()}
         # collisions of many seeds keep no files
         disk = runs * cost.disk if figures == runs and cost.disk is not None else None
         cost = cost._replace(parts=parts, seconds=sum(parts.values()), disk=disk)
-    known = compile_times(COMPILE_TIMES)
-    compilation = sum(known.get(name, COMPILATION) for name in missing)
-    names = f"{', '.join(missing[:3])}{f' and {len(missing) - 3} more' if len(missing) > 3 else ''}"
+    compilation, names = sum(missing.values()), list(missing)
+    stages = f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if len(names) > 3 else ''}"
     rows = [
         ("steps", _steps(cost)),
         ("wall time", _wall_time(cost)),
         ("memory", f"about {report.format_bytes(cost.memory)}"),
         *([] if cost.disk is None else [("disk", f"about {report.format_bytes(cost.disk)}")]),
-        ("compilation", f"about {compilation:.0f} s, if all is used: {names}" if missing else "none"),
+        ("compilation", f"about {compilation:.0f} s of one core, once: {stages}" if missing else "none"),
     ]
-    content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": missing}
+    content = {**cost._asdict(), "measured": bool(cost.measured), "compiled": names}
     return content | {"compilation_seconds": compilation}, rows
 
 

@@ -11,9 +11,9 @@ from ..basics.errors import BadInput
 from ..config.commands import PACKINGS
 from . import options, parsing, report
 
-OF_GROW = "encounters"
-"""Kind of cases of `sand grow`."""
-KINDS = ("run", "collide", "scatter", "grow", OF_GROW, *PACKINGS, "sweep")
+READERS = {"magnetic": "run", "encounters": "grow"}
+"""Kinds of cases that are no commands, and the commands that read them."""
+KINDS = ("run", "magnetic", "collide", "scatter", "grow", "encounters", *PACKINGS, "sweep")
 """Commands that read a case file, and kinds of their cases; as `experiments.templates.TEMPLATES`, which takes long to
 import."""
 
@@ -35,6 +35,7 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
 
     \b
     run         a gas of silica grains
+    magnetic    a gas of magnetic grains of iron of two sizes, for sand run
     collide     two fluffy aggregates of silica
     scatter     cross-sections of two magnetic grains of iron
     grow        the gas, for several seeds
@@ -56,7 +57,7 @@ def command(name: str, reader: str, overwrite: bool, **output: bool) -> None:
     if not path.parent.is_dir():
         raise BadInput(f"there is no folder {path.parent}; make it first")
     replace_file(path, TEMPLATES[reader](str(path)).encode())
-    command = "grow" if reader == OF_GROW else reader
+    command = READERS.get(reader, reader)
     quoted = shlex.quote(str(path))
     rows = [("file", str(path)), ("check with", f"sand info {quoted}"), ("run with", f"sand {command} {quoted}")]
     report.answer({"file": str(path), "command": command}, f"new {path}", rows, **output)

@@ -308,15 +308,15 @@ def results(summary: dict[str, Any]) -> Rows:
     from ..basics.units import format_quantity
 
     rigid = summary.get("rigid_clusters")
-    awake: Rows = [("awake", awake_share(rigid))] if rigid else []
+    awake: Rows = [("contact steps", awake_share(rigid))] if rigid else []
     return [
         ("time", f"{format_quantity(summary['time'], 's')} in {summary['steps']} steps"),
         *awake,
         ("clusters", clusters(summary)),
         (
             "contacts",
-            f"{summary['contacts']} ({summary['contacts_made']} made, {summary['contacts_moved']} moved, "
-            f"{summary['contacts_broken']} broken)",
+            f"{summary['contacts']} ({summary['contacts_made']} formed, {summary['contacts_broken']} broken); "
+            f"{summary['contacts_moved']} slips (sliding, rolling or twisting beyond its limit)",
         ),
         *temperatures(summary),
         ("energy drift", f"{summary['drift']:.2g} of the dissipated and kinetic energy"),
@@ -345,8 +345,8 @@ def wall_time(summary: dict[str, Any]) -> str:
 def awake_share(rigid: dict[str, Any]) -> str:
     """How long clusters were awake, and steps of contacts, from `rigid_clusters` of a summary."""
     return (
-        f"some cluster {rigid['time_awake']:.2%} of the time, a grain {rigid['grains_awake']:.2%} of it on average; "
-        f"{rigid['contact_steps']} contact steps"
+        f"{rigid['contact_steps']}, of clusters that are awake: some cluster {rigid['time_awake']:.2%} of the time, a "
+        f"grain {rigid['grains_awake']:.2%} of it on average"
     )
 
 

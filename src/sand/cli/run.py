@@ -74,7 +74,6 @@ def command(
         elif (folder / CASE).exists():
             advice = f"to run its case: sand run {shlex.quote(str(folder / CASE))}"
         raise BadInput(f"{case} is a folder; {advice}")
-    from ..config.build import simulation_of
     from ..config.case import GrainsSection, read_case
     from .launch import launch, refuse_folder
 
@@ -97,6 +96,8 @@ def command(
     refuse_folder(folder, Path(name), overwrite=overwrite)
 
     def build() -> Any:
+        from ..config.build import simulation_of  # slow: after all checks of the case
+
         with naming(name):
             return simulation_of(described, folder, overwrite=overwrite)
 

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from multiprocessing import spawn
 from pathlib import Path
@@ -31,7 +31,7 @@ from .recipes import NoRecipe, made_from, recipe_of
 from .stage import PythonStage, Stage
 from .table import Table, structure_of
 
-__all__ = ["compile_ahead", "compile_free", "kernel_from", "number_of_helpers", "share_compilation"]
+__all__ = ["compile_ahead", "compile_free", "expected_seconds", "kernel_from", "number_of_helpers", "share_compilation"]
 
 WORTH_HELPERS = 6.0
 """Expected time [s] of compilation from which on a helper saves 2 s: it needs 0.5 s to start, and 1 s more for its
@@ -40,8 +40,6 @@ HELPER_BYTES = 5e8
 """Memory that a helper needs (measured)."""
 LOOK = 0.05
 """Wall time [s] between two looks whether other processes have compiled the last stages."""
-SHORTEST = 1.0
-"""Least time [s] that the line of progress announces."""
 PACKAGE = Path(__file__).parents[2]
 """Folder that contains SAND."""
 COMMAND = "import sys; sys.path[:] = sys.argv[1:]; from sand.compiler.helper import main; main()"
@@ -96,9 +94,10 @@ def compile_ahead(stages: Iterable[tuple[Table, Stage | PythonStage, Any]], proc
     helpers, began = wanted if alone else 0, time.perf_counter()
 
     def progress() -> str:
-        left = [each.seconds for each in tasks if not in_cache(*each.kernel)]
-        rest = max(total / (helpers + 1) - time.perf_counter() + began, 0.5 * sum(left) / (helpers + 1), SHORTEST)
-        return f"compiling {len(tasks) - len(left)} of {len(tasks)} stages, {rest:.0f} s left; done once"
+        """What is done, and for how long; no time that is left, which depends on what else the machine computes."""
+        ready = sum(in_cache(*each.kernel) for each in tasks)
+        spent = time.perf_counter() - began
+        return f"compiling, once for runs of this kind: {ready} of {len(tasks)} stages after {spent:.0f} s"
 
     try:
         with making_code, _helpers([each.recipe for each in tasks if each.recipe], helpers), shown_line(progress):
@@ -134,8 +133,19 @@ def _missing(stages: Iterable[tuple[Table, Stage | PythonStage, Any]]) -> list[T
         _looked_at.add(key)
         if each.is_cached and not each.is_compiled(table, parameters):
             kernel = each.to_compile(table.place, structure_of(parameters))
-            found.append(Task(kernel, known.get(each.purpose, each.seconds), _recipe(each, table, parameters)))
+            found.append(Task(kernel, expected_seconds(each, known), _recipe(each, table, parameters)))
     return sorted(found, key=lambda task: (task.recipe is not None, -task.seconds))
+
+
+def expected_seconds(each: Stage, known: Mapping[str, float]) -> float:
+    """Time [s] that the compilation of a stage is expected to take: that of the last one on this machine, if known.
+
+    Parameters
+    ----------
+    known : mapping of str to float
+        Last durations by what stages compute, see `compile_times`.
+    """
+    return known.get(each.purpose, each.seconds)
 
 
 def _recipe(each: Stage, table: Table, parameters: Any) -> Any:

@@ -26,6 +26,7 @@ from ..setup.gas import gas_with_contacts
 from ..simulation.condition import GIVEN
 from ..simulation.simulation import Simulation
 from .case import THERMAL, Case, check_case
+from .key_errors import as_in_file
 
 
 def read_state(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -112,10 +113,8 @@ def _of_gas(case: Case) -> Start:
             section.number, case.box.space, seed=case.run.seed, materials=case.materials_by_name(), **given
         )
     except BadInput as error:
-        problems = error.problems
-        raise BadInput(
-            f"grains.{line}" if line.startswith(("classes", "extent")) else line for line in problems
-        ) from None
+        named = (f"grains.{line}" if line.startswith(("classes", "extent")) else line for line in error.problems)
+        raise BadInput(map(as_in_file, named)) from None
 
 
 def _of_file(case: Case) -> Start:

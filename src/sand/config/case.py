@@ -178,7 +178,7 @@ class GrainsSection(Section):
             yield from errors.problems
             for k, one in enumerate(self.classes):
                 if one.kind != "file" and one.radius is None and self.radius is None:
-                    yield f"classes.{k}: radius is missing; add it here, or to [grains]"
+                    yield f"classes[{k}]: radius is missing; add it here, or to [grains]"
 
     def recipe(self) -> dict[str, Any]:
         """The [grains] table that describes these grains, all defaults filled in."""
@@ -310,7 +310,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
         classes = section.get("classes")
         parts = {table: section.get("material", default)}
         for k, one in enumerate(classes if isinstance(classes, list) else []):
-            parts[f"{table}.classes.{k}"] = one.get("material") if isinstance(one, dict) else None
+            parts[f"{table}.classes[{k}]"] = one.get("material") if isinstance(one, dict) else None
         for place, given in parts.items():
             for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
                 if isinstance(name, str) and name not in known:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import typing
 from collections.abc import Iterable
 from typing import Any, TypeVar
@@ -14,6 +15,11 @@ from ..basics.settings import Setting
 from .sections import INTEGRATORS
 
 Model = TypeVar("Model", bound=BaseModel)
+LISTS = {"classes": "grains.classes", "walls": "walls", "driven": "driven"}
+"""Lists of tables, by the last part of their names, with the names."""
+_IN_LIST = re.compile(
+    rf"(?:grains(?:\.|: ))?(?P<list>{'|'.join(LISTS)})\[(?P<number>\d+)\](?P<key>\.?)(?P<rest>.*)", re.DOTALL
+)
 RENAMED = {"path": "file"}
 """Keys of earlier versions, with their present names."""
 
@@ -46,8 +52,20 @@ def validate(model: type[Model], content: Any, name: str, problems: Iterable[str
         lines = [line for slip in slips[:MOST_ERRORS] for line in _messages(slip, model, table)]
         found += first_problems(lines, len(lines) + max(len(slips) - MOST_ERRORS, 0), "errors")
     if found or case is None:
-        raise BadInput(f"{name}: {problem}" for problem in found)
+        raise BadInput(f"{name}: {as_in_file(problem)}" for problem in found)
     return case
+
+
+def as_in_file(problem: str) -> str:
+    """The message with the place of a list of tables as a case file has it.
+
+    'grains.classes[0].radius: …' becomes '[[grains.classes]] no. 1: radius: …'.
+    """
+    found = _IN_LIST.match(problem)
+    if not found:
+        return problem
+    table = f"[[{LISTS[found['list']]}]] no. {int(found['number']) + 1}"
+    return f"{table}: {found['rest']}" if found["key"] else f"{table}{found['rest']}"
 
 
 def _messages(slip: Any, model: type, table: str) -> list[str]:
@@ -55,6 +73,7 @@ def _messages(slip: Any, model: type, table: str) -> list[str]:
     kind, path, given = slip["type"], slip["loc"], slip["input"]
     parts = [str(part) for part in ((table,) if table else ()) + tuple(path)]
     place = ".".join(part for part in parts if not part.startswith("function-"))
+    place = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", place) if any(isinstance(part, int) for part in path) else place
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         allowed = keys_at(model, path[:-1])
         renamed = RENAMED.get(str(path[-1]))

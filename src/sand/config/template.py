@@ -31,8 +31,8 @@ HEAD = """\
 # Numbers are SI, or text with a unit such as "10 nm".  A line that begins with # and no space is a key, or a table,
 # that is not in use, with its default value; remove the # to use it.
 """
-Values = dict[str, dict[str, Any]]
-"""Values of keys, by table."""
+Values = dict[str, Any]
+"""Values of keys by table: a dict, or of a list of tables one for each."""
 EXAMPLES: Values = {
     "run": {"until": "20 us", "frame_every": "0.1 us", "seed": 1},
     "box": {"periodic": "3 um"},
@@ -40,6 +40,26 @@ EXAMPLES: Values = {
     "forces.contact": {"damping": "critical", "damping_ratio": 0.2},
 }
 """Keys in use, by table: a gas of silica grains with damped contacts."""
+MAGNETIC: Values = {
+    "run": {"until": "5 us", "frame_every": "25 ns", "seed": 1},
+    "box": {"periodic": "1.2 um"},
+    "grains": {
+        "kind": "gas",
+        "number": 100,
+        "material": "iron",
+        "moment": "200 A m^2/kg",
+        "temperature": "30 K",
+    },
+    "grains.classes": [{"share": 0.8, "radius": "7 nm"}, {"share": 0.2, "radius": "11 nm"}],
+    "forces.contact": {"damping": "critical", "damping_ratio": 0.2, "settling_time": "5 ns"},
+    "forces.dipoles": {"periodic": "ewald"},
+    "stepping": {"method": "rigid-clusters"},
+}
+"""Keys in use, by table: a gas of magnetic grains of iron of two sizes.
+
+Both are within the range where moments are permanent: above the blocking radius, 5.9 nm at 30 K, and below that of a
+single domain, 11.3 nm (`sand.theory.magnetic_limits`).
+"""
 
 
 REQUIRED = object()
@@ -113,16 +133,26 @@ def template(name: str, command: str = "run", tables: list[Table] | None = None,
         The command that reads it.
     tables : list of Table, optional
         Its tables; those of `sand run` by default.
-    used : dict of str to dict, optional
-        Values of the keys in use, by table.
+    used : dict of str to dict or list, optional
+        Values of the keys in use, by table; of a table that is there once for each method, with the method.
     """
     chosen = run_tables() if tables is None else tables
-    parts = ("\n" + "\n".join(_lines(table, used.get(table.head.strip("[]"), {}))) + "\n" for table in chosen)
+    parts = ("\n" + "\n".join(_lines(table, _used_of(table, used))) + "\n" for table in chosen)
     return HEAD.format(name=shlex.quote(name), command=command) + "".join(parts)
 
 
-def _lines(table: Table, used: dict[str, Any]) -> Iterator[str]:
-    """Lines of a table: its note, its name, and each key with its meaning."""
+def _used_of(table: Table, used: Values) -> list[dict[str, Any]]:
+    """Values of the keys in use of a table, of each one of a list."""
+    given = used.get(table.head.strip("[]"), {})
+    method = next((key.default for key in table.keys if key.name == "method" and table.head == "[stepping]"), None)
+    if method is not None and given.get("method") != method:
+        return [{}]
+    return given if isinstance(given, list) else [given]
+
+
+def _lines(table: Table, given: list[dict[str, Any]]) -> Iterator[str]:
+    """Lines of a table: its note, its name, and each key with its meaning; of further ones only the keys in use."""
+    used, *further = given
     yield from _comment(table.note)
     yield table.head if used else f"#{table.head}"
     for key in table.keys:
@@ -134,6 +164,8 @@ def _lines(table: Table, used: dict[str, Any]) -> Iterator[str]:
             yield f"{key.name} = {_toml(used[key.name])}"
         else:
             yield f"#{key.name} = {'' if default else _toml(key.default)}".rstrip()
+    for values in further:
+        yield from ("", table.head, *(f"{name} = {_toml(value)}" for name, value in values.items()))
 
 
 def _comment(text: str) -> list[str]:

@@ -34,13 +34,13 @@ def wall_errors(walls: Any, known: Collection[str]) -> list[str]:
             wall = WallSection.model_validate(section)
             if wall.material not in known:
                 hint = did_you_mean(wall.material, list(known))
-                problems.append(f"walls.{k}.material: unknown material '{wall.material}'; {hint}")
+                problems.append(f"walls[{k}].material: unknown material '{wall.material}'; {hint}")
             # any valid material will do: its name was checked above
             wall.model_copy(update={"material": "iron"}).build({})
         except ValidationError:
             continue  # reported by the validation of the whole file
         except BadInput as error:
-            problems += error.at(f"walls.{k}").problems
+            problems += error.at(f"walls[{k}]").problems
     return problems
 
 

@@ -32,6 +32,9 @@ from ..basics.state import (
     TIME,
     State,
 )
+from ..compiler.ahead import expected_seconds
+from ..compiler.jit import COMPILE_TIMES
+from ..compiler.progress import compile_times
 from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.constants_table import with_derived
@@ -290,11 +293,16 @@ class Engine(CompiledState):
             for each in self.components:
                 each.contacts_changed(self)
 
-    def uncompiled(self) -> list[str]:
-        """What the stages compute that a run would compile, if it calls them; nothing is compiled."""
-        stages = self.stages(self.table_for_call())
-        compiled = ((table, each, own) for table, each, own in stages if isinstance(each, Stage))
-        return list(dict.fromkeys(each.purpose for table, each, own in compiled if not each.is_compiled(table, own)))
+    def uncompiled(self) -> dict[str, float]:
+        """What the stages compute that a run would compile, if it calls them, with the expected times [s].
+
+        Nothing is compiled; the times are those of one process.
+        """
+        known, found = compile_times(COMPILE_TIMES), dict[str, float]()
+        for table, each, own in self.stages(self.table_for_call()):
+            if isinstance(each, Stage) and not each.is_compiled(table, own):
+                found[each.purpose] = found.get(each.purpose, 0.0) + expected_seconds(each, known)
+        return found
 
     def stages(self, table: Table) -> list[tuple[Table, Stage | PythonStage, Any]]:
         """As `CompiledState.stages`, with those of steps and of measurements."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import create_model
 
+from ..basics.arguments import MOST_GRAINS
 from ..basics.errors import BadInput
+from ..basics.settings import For, Whole
 from ..config.case import Case, GrainsSection
 from ..config.key_errors import validate
 from .dilute_case import DensitySection, MethodSection, check_dilute, describe_population, population_of
@@ -23,6 +25,10 @@ FINISHED = "finished"
 
 class DiluteGrains(GrainsSection, DensitySection):
     """[grains] with a number density."""
+
+    number: Annotated[int | None, Whole(1, MOST_GRAINS), For("kind", "gas", "given")] = None
+    """Number of grains, at least 100: a population of fewer has no statistics; with `classes` of grains and
+    aggregates."""
 
 
 class SweptPopulation(SweptCase):

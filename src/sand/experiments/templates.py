@@ -9,6 +9,7 @@ from typing import Any
 from ..config.case import RunSection
 from ..config.template import (
     EXAMPLES,
+    MAGNETIC,
     REQUIRED,
     Key,
     Table,
@@ -189,6 +190,7 @@ def _encounters(name: str) -> str:
 
 TEMPLATES: dict[str, Callable[[str], str]] = {
     "run": template,
+    "magnetic": partial(template, used=MAGNETIC),
     "collide": _collision,
     "scatter": _scattering,
     "grow": _growth,

@@ -150,7 +150,9 @@ class Neighbours(Settings):
                 return ChosenSearch(all_pairs, f"all pairs: fewer than {LIST_FROM} grains")
             share = share_within(grains.position, box, list_reach)
             if share > LIST_UP_TO:
-                reason = f"all pairs: a fraction {share:.2g} of the grains is within {distance}, more than {LIST_UP_TO}"
+                reason = (
+                    f"all pairs, faster than a list here: {share:.0%} of the grains are within {distance} of a grain"
+                )
                 return ChosenSearch(all_pairs, reason)
         if celled:
             reason = f"cells, for pairs closer than {distance} (contacts)"

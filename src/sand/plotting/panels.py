@@ -42,14 +42,27 @@ is motion within clusters that is removed."""
 LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, YELLOW, BROWN, TEXT_COLOUR, MUTED, INDIGO, ORANGE)
 EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
+CLUSTERS = {
+    "clusters": ("clusters", MUTED, 1.0),
+    "largest_cluster": ("largest size", SKY, 1.5),
+    "mean_cluster_size": ("mean size S = Σs²/Σs", BLUE, 1.9),
+}
+"""Ledger columns of clusters, each of s grains, with label, colour and width of the line."""
 COUNTS = {"contacts": ("contacts", BLUE), "made": ("formed so far", GREEN), "broken": ("broken so far", RED)}
 """Ledger columns of contact numbers, with label and colour."""
-CHANNEL_LABELS = {"outside": "external", "cutoff_changed": "cut-off"}
+CHANNEL_LABELS = {
+    "forming": "contact formation",
+    "breaking": "contact breaking",
+    "damping": "contact damping",
+    "settling": "settling of clusters",
+    "outside": "external",
+    "cutoff_changed": "cut-off",
+}
 """Labels of loss channels that differ from the name of the ledger column."""
 OPTIONAL_CHANNELS = ("damping", "stiffness", "settling", "gas", "outside", "cutoff_changed")
 """Loss channels of forces and options that are off by default; not listed as zero in the figure."""
 
-TEMPERATURE_LINES = (("translation", BLUE), ("rotation, mean", ORANGE), ("rotation, median", PURPLE))
+TEMPERATURE_LINES = (("translation of bodies", BLUE), ("rotation, mean", ORANGE), ("rotation, median", PURPLE))
 """Label and colour of each column of TEMPERATURES."""
 PRESSURES = {"pressure": ("instant", MUTED)} | {
     f"mean_pressure_{axis}": (f"mean, {axis}", colour)
@@ -149,29 +162,23 @@ def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
-    """Draw the mean cluster size S (Eq. 17) and the largest cluster; on the right axis the number of clusters.
+    """Draw the mean cluster size S (Eq. 17), the grains of the largest cluster and the number of clusters.
 
-    With rigid clusters also the number of awake grains, as an area.
+    With rigid clusters also the number of grains of awake clusters, whose contacts are integrated, as an area.
     """
     t = ledger["time"] / time.size
     style = _markers(t)
     awake = column(ledger, AWAKE) if AWAKE in ledger.columns else np.zeros(0)
-    right = axes.twinx()
-    right.plot(t, ledger["clusters"], color=MUTED, linewidth=1.0, label="clusters (right axis)", **style)
-    axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest", **style)
-    axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$", **style)
-    sizes = max([float(ledger[name].max()) for name in ("largest_cluster", "mean_cluster_size")] + [peak(awake)])
-    for own, top in ((axes, sizes), (right, float(ledger["clusters"].max()))):
-        own.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)))
-        log_ticks(own, plain=True)
-    areas = []
+    for name, (label, colour, width) in CLUSTERS.items():
+        axes.plot(t, ledger[name], color=colour, linewidth=width, label=label, **style)
+    top = max(*(float(ledger[name].max()) for name in CLUSTERS), peak(awake))
+    axes.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)), ylabel="number")
+    log_ticks(axes, plain=True)
     if awake.size:
         low = np.full(len(t), axes.get_ylim()[0])
         looks: dict[str, Any] = {"color": ORANGE, "alpha": 0.5, "linewidth": 0.0, "zorder": 0}
-        areas = [axes.fill_between(t, low, np.maximum(awake, low), step="mid", label="awake", **looks)]
-    axes.set_ylabel("grains" if areas else "size (grains)")
-    right.tick_params(axis="y", pad=1.0, labelcolor=MUTED, labelsize=points(7.0))
-    legend_above(axes, [*axes.get_lines(), *right.get_lines(), *areas])
+        axes.fill_between(t, low, np.maximum(awake, low), step="mid", label="awake grains (contact steps)", **looks)
+    legend_above(axes)
 
 
 def draw_energies(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:
@@ -204,7 +211,7 @@ def draw_temperatures(axes: Axes, ledger: Any, time: AxisUnit) -> None:
     known = set(TEMPERATURES) <= set(ledger.columns)
     drawn = [column(ledger, name) for name in TEMPERATURES] if known else []
     top = max(map(peak, drawn), default=0.0)
-    axes.set_ylabel("bodies (K)")
+    axes.set_ylabel("$T$ (K)")
     if top == 0.0:
         _no_data(axes, "all bodies are at rest" if known else "an earlier version of SAND wrote this ledger")
         return
@@ -289,13 +296,13 @@ def draw_balance(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> Non
     axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
     axes.plot(t, change, color=TEXT_COLOUR, linewidth=1.0, **_markers(t))
     half = max(1.3 * peak(change), MIN_BALANCE_RANGE * scale) or 1.0
-    axes.set(ylim=(-half, half), ylabel=f"Δ ({unit.name})")
+    axes.set(ylim=(-half, half), ylabel=rf"$\Delta E$ ({unit.name})")
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
     axes.yaxis.set_major_formatter(_tick_label)
     of = " of the energy dissipated and kinetic"
     full = axes.get_window_extent().width > WIDE_ENOUGH * axes.figure.dpi
     drift = f"{format_number(ledger.drift)}{of if full else ''}"
-    text = f"energy error: {drift if np.isfinite(ledger.drift) else 'not finite at the end'}"
+    text = f"error of the total energy: {drift if np.isfinite(ledger.drift) else 'not finite at the end'}"
     axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=points(7.5))
 
 
@@ -345,7 +352,7 @@ def log_ticks(axes: Axes, plain: bool = False) -> None:
     """Ticks at powers of ten, also at 2 and 5 on short axes; `plain` writes 1000 instead of 10³."""
     low, high = axes.get_ylim()
     short = high < 250.0 * low
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if short else LogLocator(numticks=5))
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12) if short else LogLocator(numticks=5))
     if plain or short:
         axes.yaxis.set_major_formatter(_tick_label)
     axes.yaxis.set_minor_formatter(NullFormatter())

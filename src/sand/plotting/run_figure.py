@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,8 @@ from .style import MUTED, RED, TEXT_COLOUR, format_si, panel_letter, plot_style,
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
+FEW_SIZES = 3
+"""Radii up to which the title of a run names each with its number of grains."""
 LETTERS = "abcdefgh"
 """Letters of the panels."""
 MIN_GRAIN_RADIUS = 11.0
@@ -53,7 +56,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 _HEIGHTS, _HEIGHTS_WITH_MORE, _HEIGHT = (1.0, 1.35, 1.1), (1.0, 1.25, 1.0), 0.8
 """Heights of the first panels over time, relative to each other, and of each of more between them and the balance."""
-_BALANCE = (0.5, 0.6)
+_BALANCE = (0.5, 0.8)
 """Height of the balance without, and with more panels."""
 _MARGIN = 0.012
 
@@ -127,10 +130,10 @@ def _header(simulation: Simulation) -> list[tuple[str, float]]:
         facts = [
             f"{count} cluster{'s' if count != 1 else ''}",
             f"mean size S = {mean:.0f}" if mean >= 100.0 else f"mean size S = {mean:.3g}",
-            f"largest {int(last['largest_cluster'])}",
+            f"largest of {int(last['largest_cluster'])} grains",
         ]
     facts.append(f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)")
-    facts += [unit.value.replace(", the kinetic temperature at the start", "")] if unit.value else []
+    facts += [unit.value.replace(", the kinetic temperature at the start", " at the start")] if unit.value else []
     notes = [(f"Note: {note.split(';')[0]}.", 7.0) for note in simulation.notes()]
     return [(title, 10.5), ("  ·  ".join(facts), 8.5), *notes]
 
@@ -145,12 +148,22 @@ def headline(grains: Any, box: Box, time: float, title: str = "") -> str:
     """
     names = material_names(grains)
     materials = ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
-    small, large = float(grains.radius.min()), float(grains.radius.max())
-    least = "" if large < 1.001 * small else f"{format_si(small, 'm')} to "
     what = title or f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {materials}"
-    parts = [what, f"r = {least}{format_si(large, 'm')}", *([] if title else [_describe_box(box)])]
+    parts = [what, f"r = {_radii(grains.radius)}", *([] if title else [_describe_box(box)])]
     parts.append(f"t = {format_si(time, 's')}")
     return ",  ".join(parts)
+
+
+def _radii(radius: np.ndarray) -> str:
+    """Radii in words: '10 nm'; of up to `FEW_SIZES` classes '5 nm (80) and 10 nm (20)'; of more '5 nm to 10 nm'."""
+    number = Counter(format_si(one, "m") for one in np.sort(radius).tolist())
+    texts = list(number)
+    if len(texts) == 1:
+        return texts[0]
+    if len(texts) > FEW_SIZES:
+        return f"{texts[0]} to {texts[-1]}"
+    counted = [f"{text} ({count})" for text, count in number.items()]
+    return f"{', '.join(counted[:-1])} and {counted[-1]}"
 
 
 def _describe_box(box: Box) -> str:
@@ -199,8 +212,7 @@ def _place_panels(figure: Figure, panels: list[Axes], heights: Sequence[float], 
     height = (top - bottom - sum(gaps)) / sum(heights)
     for axes, share, gap in zip(panels, heights, gaps, strict=True):
         top -= gap + share * height
-        for one in axes.get_shared_x_axes().get_siblings(axes):  # with the axis on the right
-            one.set_position((left, top, right - left, share * height))
+        axes.set_position((left, top, right - left, share * height))
 
 
 def _draw_grains(figure: Figure, scene: Scene, lost: int, layout: Layout, letters: str) -> None:

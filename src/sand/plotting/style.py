@@ -176,9 +176,9 @@ def format_si(value: float, unit: str) -> str:
 
 
 def format_number(value: float) -> str:
-    """Format a pure number with two digits: 6.7e-4 → '6.7×10⁻⁴', 31400 → '3.1×10⁴', 81.9 → '82'."""
+    """Format a pure number with two digits, three from 100 on: 6.7e-4 → '6.7×10⁻⁴', 31400 → '3.1×10⁴', 81.9 → '82'."""
     if value == 0.0 or not math.isfinite(value) or 0.01 <= abs(value) < 1e4:
-        return f"{value:.3g}" if abs(value) >= 100.0 else f"{value:.2g}"
+        return f"{float(f'{value:.3g}' if abs(value) >= 99.5 else f'{value:.2g}'):g}"
     digits, exponent = f"{value:.1e}".split("e")
     return rf"{digits}$\times 10^{{{int(exponent)}}}$"
 

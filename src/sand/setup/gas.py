@@ -232,14 +232,14 @@ def _members(
             _refuse_full(np.full(1, size), number, region)  # before arrays of this length are allocated
         return members_of(GrainClass(number=number, **defaults), number or 0, streams[0], materials)
     errors, groups = ErrorCollector(), []
-    found = [errors.take(class_from, one, defaults, f"classes.{k}") for k, one in enumerate(classes)]
+    found = [errors.take(class_from, one, defaults, f"classes[{k}]") for k, one in enumerate(classes)]
     errors.done()
     numbers = class_numbers(found, number)
     for k, (one, count) in enumerate(zip(found, numbers, strict=True)):
         try:
             groups.append(members_of(one, count, streams[k], materials))
         except BadInput as error:
-            errors.problems += error.at(f"classes.{k}").problems
+            errors.problems += error.at(f"classes[{k}]").problems
     errors.done()
     return joined_members(groups)
 

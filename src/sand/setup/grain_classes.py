@@ -173,7 +173,7 @@ def class_numbers(classes: Sequence[GrainClass], number: int | None) -> list[int
     numbers = divided(number, np.array(shares)).tolist()
     if 0 in numbers:
         k = numbers.index(0)
-        raise BadInput(f"classes.{k}: share = {shares[k]:g} of number = {number} is no member; raise one of them")
+        raise BadInput(f"classes[{k}]: share = {shares[k]:g} of number = {number} is no member; raise one of them")
     return numbers
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..basics.arguments import MOST_GRAINS, checked
+from ..basics.conversion import kind_of
 from ..basics.errors import BadInput, shown
 from ..basics.grains import Grains, materials_of
 from ..basics.material import Material, as_material
@@ -165,7 +166,7 @@ def radii_of(given: Any) -> Any:
     if values is None:
         if dimensions(given):
             raise not_a_quantity(given, "m", "radius")
-        raise BadInput(f"radius = {shown(given)} is not a radius or a distribution; give {FORMS}")
+        raise BadInput(f"radius = {shown(given)} is {kind_of(given)}not a radius or a distribution; give {FORMS}")
     if np.ndim(values) == 0:
         return si(given, "m", "radius", above=0.0)
     values = np.asarray(values)

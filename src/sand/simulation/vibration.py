@@ -54,8 +54,8 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
     if hot and share > 0.0:
         most = max(row["internal"] for row in grown) / share
         notes["vibration"] = (
-            f"grains in contact vibrate: from {format_quantity(hot[0]['time'], 's')} on their internal kinetic energy "
-            f"exceeds {HOT:g} k_B T₀ per grain, {most:.3g} at most{advice}"
+            f"grains in contact vibrate: kinetic energy within clusters, up to {most:.3g} k_B T₀ per grain, above "
+            f"{HOT:g} first at t = {format_quantity(hot[0]['time'], 's')}; T₀ is the temperature at the start{advice}"
         )
     if grown and (broken := rows[-1]["broken"]):
         cause = advice if damped or hot else ""

@@ -14,6 +14,7 @@ from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import plain
 from ..plotting.panels import (
     CHANNEL_LABELS,
+    CLUSTERS,
     COUNTS,
     TEMPERATURE_LINES,
     column,
@@ -23,7 +24,7 @@ from ..plotting.panels import (
     losses_drawn,
     peak,
 )
-from ..plotting.style import BLUE, MUTED, ON_DARK, RED, SKY, TEXT_COLOUR
+from ..plotting.style import BLUE, ON_DARK, RED, SKY, TEXT_COLOUR
 
 MAX_POINTS = 2000
 """Maximum number of points of a line."""
@@ -85,16 +86,16 @@ def series_from_frames(frames: Any, grains: int) -> dict[str, Any]:
 
 
 def _clusters(ledger: Any) -> dict[str, Any]:
-    lines = [
-        _line("mean size S", BLUE, ledger["mean_cluster_size"]),
-        _line("largest", SKY, ledger["largest_cluster"]),
-        _line("number of clusters", MUTED, ledger["clusters"]),
-    ]
+    lines = [_line(label, colour, ledger[name]) for name, (label, colour, _) in CLUSTERS.items()]
     return _plot("clusters", "Clusters", lines, log=True)
 
 
 def _awake(ledger: LedgerColumns) -> dict[str, Any]:
-    return _plot("awake", "Awake grains", [_line("grains of awake clusters", RED, column(ledger, AWAKE))])
+    return _plot(
+        "awake",
+        "Awake grains",
+        [_line("grains of awake clusters (contact steps)", RED, column(ledger, AWAKE))],
+    )
 
 
 def _temperatures(ledger: LedgerColumns) -> dict[str, Any]:
@@ -132,7 +133,7 @@ def _contacts(ledger: LedgerColumns) -> dict[str, Any]:
 
 def _balance(ledger: LedgerColumns) -> dict[str, Any]:
     total = column(ledger, "total")
-    return _plot("balance", "Balance", [_line("change of the total", TEXT_COLOUR, total - total[0])], "J")
+    return _plot("balance", "Balance", [_line("change of the total energy", TEXT_COLOUR, total - total[0])], "J")
 
 
 def _events(ledger: LedgerColumns) -> dict[str, Any]:

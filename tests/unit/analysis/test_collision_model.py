@@ -169,7 +169,7 @@ def test_lines_for_mcdust(tmp_path):
         ({"fragments": [[30], [29]]}, ["row 1: the fragments have 29 grains, the bodies 30"]),
         (
             {"speed": [1, "3 kg"]},
-            ["speed, row 1 = '3 kg' is not a quantity in m/s; give a number in SI or text such as '10 m/s'"],
+            ["speed, row 1 = '3 kg' is a mass, not a quantity in m/s; give a number in SI or text such as '10 m/s'"],
         ),
         ({"speed": [1, -1]}, ["speed, row 1 = -1 must be above 0 m/s"]),
     ],

@@ -92,7 +92,7 @@ def test_notes_on_vibration_and_breaking():
     assert notes([row(), row(99.0 * share, time=1e-9)]) == {}
     assert notes([row(), row(1e9 * share)], 0.0) == {}  # no temperature to compare with
     text = notes([row(), row(101.0 * share, time=2e-9), row(500.0 * share, time=3e-9)])["vibration"]
-    assert "from 2 ns on" in text and "500 at most" in text and "damping = 'critical'" in text
+    assert "up to 500 k_B T₀ per grain, above 100 first at t = 2 ns" in text and "damping = 'critical'" in text
     assert "damped already" in notes([row(), row(101.0 * share)], damped=True)["vibration"]
     cold = notes([row(), row(broken=2, clusters=4)])
     assert cold == {"breaking": "2 contacts broke while aggregates grew"}

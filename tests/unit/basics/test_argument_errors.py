@@ -77,7 +77,7 @@ def test_what_numpy_writes_into_a_change_keeps_its_unit(value):
         array = QuantityArray(np.zeros((2, 3)), "m/s", "velocity")
         write(array, value)
         assert np.asarray(array) == pytest.approx(np.full((2, 3), 0.01), rel=1e-15, abs=0.0)
-        with pytest.raises(sand.BadInput, match=r"velocity = .* is not a quantity in m/s"):
+        with pytest.raises(sand.BadInput, match=r"velocity = .* is a length, not a quantity in m/s"):
             write(array, "1 m" if isinstance(value, str) else value * UNIT.s)
     array.fill("2 mm/s")
     np.copyto(plain := np.zeros((2, 3)), array)

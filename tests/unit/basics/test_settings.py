@@ -176,7 +176,7 @@ def test_a_section_has_the_keys_of_a_class():
     for given, line in (
         ({"kind": "file"}, "file is missing: kind = 'file' needs a name"),
         ({"file": "a"}, "file = 'a' is not used by kind = 'gas'; leave it out, or give kind = 'file'"),
-        ({"length": "1 s"}, "length = '1 s' is not a quantity in m"),
+        ({"length": "1 s"}, "length = '1 s' is a time, not a quantity in m"),
     ):
         with pytest.raises(ValueError, match=line):
             Outer(**given)

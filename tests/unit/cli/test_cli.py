@@ -414,7 +414,7 @@ def test_info_of_a_run_that_was_killed(done, capsys):
     [
         ('until = "3 ns"', 0, "planned end  3 ns"),
         ('stop = "clusters == 1"', 0, "ends if  clusters == 1"),
-        ('until = "3 m"', 2, "case.toml: run: until = '3 m' is not a quantity in s"),
+        ('until = "3 m"', 2, "case.toml: run: until = '3 m' is a length, not a quantity in s"),
         ("until = [1]", 2, "case.toml: run: until = [1]"),
         ("stop = 3", 2, "case.toml: run.stop must be text"),
     ],

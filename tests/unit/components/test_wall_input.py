@@ -48,7 +48,9 @@ def test_a_condition_may_name_columns_of_walls():
     with pytest.raises(sand.BadInput, match="did you mean 'floor_force_z'"):
         check_case(case, "case")
     case["walls"][0]["material"] = "glas"
-    with pytest.raises(sand.BadInput, match=r"walls.0.material: unknown material 'glas'; did you mean 'glass'"):
+    with pytest.raises(
+        sand.BadInput, match=r"\[\[walls\]\] no. 1: material: unknown material 'glas'; did you mean 'glass'"
+    ):
         check_case(case, "case")
 
 

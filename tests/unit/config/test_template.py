@@ -1,12 +1,16 @@
 """`sand new`: a case file with every key, made from the classes that read the keys."""
 
 import json
+import re
 import tomllib
+import warnings
 
+import numpy as np
 import pytest
 
 import sand
 from sand.cli.main import main
+from sand.cli.new import READERS
 from sand.components.deformation import Deformation
 from sand.components.driven import Driven
 from sand.config.build import simulation_of
@@ -87,6 +91,27 @@ def test_every_key_is_there_with_its_meaning():
     assert max(map(len, text.splitlines())) <= 120
 
 
+def test_the_magnetic_gas_is_one_whose_moments_are_permanent(tmp_path, monkeypatch):
+    """Two sizes, both above the blocking radius at the temperature of the case and below that of a single domain.
+
+    The radii are those of `magnetic_limits`: E_B(r) = k_B T ln(t f) for the first, the estimate from wall and
+    stray-field energies for the second; `sand.Simulation` warns outside of them.
+    """
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "iron", "--for", "magnetic"]) == 0
+    case = read_case("iron.toml")
+    assert [one.share for one in case.grains.classes] == [0.8, 0.2]
+    limits = sand.theory.magnetic_limits(sand.IRON, 1e-8, case.grains.temperature)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        simulation = simulation_of(case, None)
+    radii, number = np.unique(simulation.grains.radius, return_counts=True)
+    assert number.tolist() == [80, 20]
+    assert limits.blocking_radius < radii.min() and radii.max() < limits.single_domain_radius
+    assert not [one for one in told if "moments" in str(one.message)]
+    assert simulation.grains.body_moment.any(axis=1).all()
+
+
 def test_a_class_without_a_source_has_the_meanings_of_its_base():
     """Python 3.13 finds no source of a class that `create_model` makes, older ones none of a class of another name."""
     made = type("Made", (MaterialSection,), {"__module__": MaterialSection.__module__})
@@ -125,8 +150,8 @@ def test_parts_of_a_class_are_documented():
 
 
 MODEL = {"run": Case, "collide": CollisionCase, "scatter": ScatterCase, "grow": Case, "sweep": CollisionCase} | LOADINGS
-MODEL["encounters"] = SweptPopulation.model({})
-READER = {command: command for command in TEMPLATES} | {"encounters": "grow"}
+MODEL |= {"encounters": SweptPopulation.model({}), "magnetic": Case}
+READER = {command: command for command in TEMPLATES} | READERS
 
 
 @pytest.mark.parametrize("command", list(TEMPLATES))
@@ -158,9 +183,11 @@ def test_each_command_has_a_case_with_all_its_keys(command):
         expected = {k: kept.get(k) or v for k, v in expected.items() if k not in NOT_FOR and k != "stepping"}
         expected = {k: v for k, v in expected.items() if not k.startswith("forces.") or k in kept}
     assert found == expected
-    before = ""
+    before, heads, is_further = "", set(), False
     for line in text.splitlines():
-        if " =" in line and not line.startswith("# ") and not before.startswith("#["):
+        if line.lstrip("#").startswith("["):  # a further table of a list in use has only its keys in use
+            is_further, heads = line in heads, {*heads, line}
+        elif " =" in line and not line.startswith("# ") and not before.startswith("#[") and not is_further:
             assert before.startswith("# "), line
         before = line
     assert max(map(len, text.splitlines())) <= 120
@@ -175,9 +202,10 @@ def test_each_key_is_read(command, tmp_path, capsys):
     heads = [k for k, line in enumerate(lines) if line.lstrip("#").startswith("[")]
     for first, end in zip(heads, [*heads[1:], len(lines)], strict=True):
         name = lines[first].lstrip("#")
-        others = [
-            line for line in lines if not line.startswith("#") and not (name == "[stepping]" and "stepping" in line)
-        ]
+        used_tables = "\n".join(line for line in lines if line and not line.startswith("#"))
+        if name == "[stepping]":  # one of several
+            used_tables = re.sub(r"\[stepping\][^\[]*", "", used_tables)
+        others = used_tables.splitlines()
         body = [line.lstrip("#") for line in lines[first + 1 : end] if line and not line.startswith("# ")]
         whole = [line if not line.endswith("=") else f"{line} {{}}" for line in body]
         k = others.index(name) if name in others else None
@@ -203,7 +231,7 @@ def test_info_describes_each_case(command, tmp_path, monkeypatch, capsys):
     assert main(["info", "my case.toml"]) == 0
     out = capsys.readouterr().out
     assert "a valid" in out
-    assert (f"sand {READER[command]} 'my case.toml'" in out) is (command != "run")
+    assert (f"sand {READER[command]} 'my case.toml'" in out) is (READER[command] != "run")
     assert tomllib.loads((tmp_path / "my case.toml").read_text("utf-8")) == tomllib.loads(TEMPLATES[command]("x"))
 
 

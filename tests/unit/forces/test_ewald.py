@@ -345,8 +345,9 @@ def test_the_choice_is_stated():
     force = sand.Dipoles(periodic="ewald", accuracy=1e-4, boundary="vacuum")
     sim = sand.Simulation(grains, [force], box=tuple(CUBE))
     line = sim.choices["dipoles cut-off"]
-    assert line.startswith("600 nm (radius of the real part of an Ewald sum, vacuum, accuracy 0.0001: alpha = ")
-    assert "wave vectors and their opposites; predicted errors of force " in line
+    assert line.startswith("600 nm (real part of an Ewald sum over all images: errors ")
+    assert " of torque, as accuracy = 0.0001 asks for; vacuum, alpha = " in line
+    assert line.endswith("wave vectors and their opposites)")
     kept = {"cutoff": "auto", "cut": "smooth", "periodic": "ewald", "accuracy": 1e-4, "boundary": "vacuum"}
     kept |= {"reciprocal": "auto", "open": "auto"}
     assert force.parameters() == force.resolved(grains, sim.box) == kept

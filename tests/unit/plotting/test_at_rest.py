@@ -120,7 +120,7 @@ def test_the_panel_of_clusters_shows_awake_grains():
         at = np.abs(path[:, 0] - k) < 0.51
         assert path[at, 1].max() >= value
     assert path[:, 1].max() == 7.0 < axes.get_ylim()[1]
-    assert "awake" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "awake grains (contact steps)" in [text.get_text() for text in axes.get_legend().get_texts()]
     without = [{name: value for name, value in row.items() if name != "awake"} for row in rows(told)]
     figure = history_figure(LedgerColumns.from_rows(without), "size", 10, 100.0)
     assert not figure.axes[0].collections and len(figure.axes[0].get_legend().get_texts()) == 3

@@ -104,9 +104,9 @@ def texts(figure):
 @pytest.mark.slow
 def test_clusters_drawn_are_the_ledgers(run_with_clusters, figure):
     """S, the largest cluster and the number of clusters are the ledger's columns over its times."""
-    drawn = lines(figure.axes[0]) | lines(figure.axes[4])
-    columns = {"mean size $S$": "mean_cluster_size", "largest": "largest_cluster"}
-    for label, column in {**columns, "clusters (right axis)": "clusters"}.items():
+    drawn = lines(figure.axes[0])
+    columns = {"mean size S = Σs²/Σs": "mean_cluster_size", "largest size": "largest_cluster", "clusters": "clusters"}
+    for label, column in columns.items():
         np.testing.assert_allclose(drawn[label][0], run_with_clusters.ledger["time"] / 1e-9)
         np.testing.assert_array_equal(drawn[label][1], run_with_clusters.ledger[column])
 
@@ -130,11 +130,12 @@ def test_energies_drawn_are_the_ledgers(run_with_clusters, figure):
 def test_losses_drawn_are_the_ledgers(run_with_clusters, figure):
     """Channels that lost something are drawn where they did; the others are named."""
     drawn = lines(figure.axes[2])
-    assert set(drawn) == {"forming", "sliding"}
-    for channel in drawn:
-        lost = drawn[channel][1] * 4 * BOLTZMANN * 100.0
+    columns = {"contact formation": "forming", "sliding": "sliding"}
+    assert set(drawn) == set(columns)
+    for label, channel in columns.items():
+        lost = drawn[label][1] * 4 * BOLTZMANN * 100.0
         np.testing.assert_allclose(np.nan_to_num(lost), run_with_clusters.ledger[f"lost_{channel}"])
-    assert "none: breaking, rolling, twisting" in texts(figure)
+    assert "none: contact breaking, rolling, twisting" in texts(figure)
 
 
 def test_balance_is_the_change_of_the_total(run_with_clusters, figure):
@@ -307,7 +308,7 @@ def test_largest_clusters_are_moved_as_rigid_bodies(run_with_clusters):
 
 def test_scale_bar_has_the_stated_length(figure):
     """The bar's length in data coordinates (metres) equals its label."""
-    axes = figure.axes[5]
+    axes = figure.axes[4]
     (bar,) = [line for line in axes.get_lines() if line.get_gid() == "scale"]
     length = float(np.ptp(bar.get_xdata()))
     assert format_si(length, "m") in [text.get_text() for text in axes.texts]
@@ -316,7 +317,7 @@ def test_scale_bar_has_the_stated_length(figure):
 @pytest.mark.slow
 def test_box_has_twelve_edges(figure):
     """A periodic box is drawn; open space is not."""
-    edges = [line for line in figure.axes[5].get_lines() if line.get_gid() == "box"]
+    edges = [line for line in figure.axes[4].get_lines() if line.get_gid() == "box"]
     assert len(edges) == 12
     alone = run_figure(run_of([[0.0, 0.0, 0.0]]))
     assert not [line for line in alone.axes[-1].get_lines() if line.get_gid() == "box"]

@@ -18,10 +18,12 @@ def test_series_are_the_ledgers(finished_run):
     series = run_dataset(folder).series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]  # fewer than ten bodies
-    assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
+    assert plots["clusters"]["mean size S = Σs²/Σs"] == pytest.approx(
+        sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0
+    )
     assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
     change = sim.ledger["total"] - sim.ledger["total"][0]
-    assert plots["balance"]["change of the total"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
+    assert plots["balance"]["change of the total energy"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
     assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
     assert plots["losses"]
     for label, lost in plots["losses"].items():  # a logarithmic axis cannot show 0
@@ -54,7 +56,7 @@ def test_without_a_ledger(tmp_path):
     series = dataset.series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert plots["contacts"]["contacts"] == [0, 1, 2]
-    assert plots["clusters"]["largest"] == [1, 2, 3] and plots["clusters"]["number of clusters"] == [5, 4, 3]
-    assert plots["clusters"]["mean size S"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
+    assert plots["clusters"]["largest size"] == [1, 2, 3] and plots["clusters"]["clusters"] == [5, 4, 3]
+    assert plots["clusters"]["mean size S = Σs²/Σs"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
     series_points = dataset.manifest()
     assert not series_points["running"] and series_points["outcome"] is None and series_points["name"] == "a"

@@ -155,9 +155,9 @@ class EwaldForce(CutoffForce):
         return CutoffChoice(
             chosen.radius,
             (auto if self.periodic == "auto" else "")
-            + f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
-            f"alpha = {chosen.product:g}/radius, {chosen.reciprocal}; predicted errors "
-            f"of force {chosen.force_error:.1e}, of {self.sources.field} {chosen.field_error:.1e}",
+            + f"real part of an Ewald sum over all images: errors {chosen.force_error:.1e} of force, "
+            f"{chosen.field_error:.1e} of {self.sources.field}, as accuracy = {self.accuracy:g} asks for; "
+            f"{self.boundary}, alpha = {chosen.product:g}/radius, {chosen.reciprocal}",
         )
 
     def ewald(self, grains: Grains, box: Box) -> EwaldChoice:
