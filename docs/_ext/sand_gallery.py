@@ -45,7 +45,7 @@ def scraped(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
 def quiet(gallery_conf: dict[str, Any], name: str) -> None:
     """Before each script: no window, and no warnings of limits, which the pages of the physics explain."""
     matplotlib.use("agg")
-    for start in ("contacts of", "moments of", "grains in contact vibrate"):
+    for start in ("contacts of", "grains in contact vibrate"):
         warnings.filterwarnings("ignore", message=start)
 
 

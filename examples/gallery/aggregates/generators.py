@@ -3,7 +3,7 @@ Aggregates from generators
 ==========================
 
 Six ways to build an aggregate of 125 to 150 grains without a simulation, from compact to open. Titles state the radius
-of gyration in grain radii and the mean number of contacts of a grain.
+of gyration in grain radii and the mean number of contacts of a grain; colours show the number of contacts.
 """
 
 import matplotlib.pyplot as plt
