@@ -48,6 +48,7 @@ CAPABILITIES = {
     "bodies of dilute dust that keep momentum and spin between encounters": 242,
     "populations of dilute dust in sweeps, their template, and the kernel of several with the fit of Eq. 14": 285,
     "films of runs by the page in a browser without a window or by the renderer of figures (sand view --movie)": 354,
+    "still pictures of tilted boxes as parallelepipeds with the grains in them; a colour of its own for a loss": 12,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8
