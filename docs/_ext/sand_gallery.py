@@ -44,10 +44,10 @@ def scraped(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
 
 
 def quiet(gallery_conf: dict[str, Any], name: str) -> None:
-    """Before each script: no window, no log of files, no warnings of limits, which the pages of the physics explain."""
+    """Before each script: no window, no log of files, no warnings of limits, which are explained in words."""
     matplotlib.use("agg")
     logging.getLogger("gsd").setLevel(logging.WARNING)  # Sphinx shows what is logged
-    for start in ("contacts of", "grains in contact vibrate"):
+    for start in ("contacts of", "grains in contact vibrate", "grains overlap too deeply"):
         warnings.filterwarnings("ignore", message=start)
 
 
