@@ -1,8 +1,9 @@
-"""Pictures of README and docs, of the last frame of examples/iron-gas.toml: a still, and the page of `sand view`."""
+"""Pictures of README and docs: a still and the page, of the last frame of examples/iron-gas.toml; a film."""
 
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +20,11 @@ from .timing import ran
 STATIC = quoted.TOP / "docs" / "_static"
 STILL = STATIC / "iron-gas.png"
 PAGE = STATIC / "grainview.png"
+FILM = STATIC / "collision.gif"
+FILMED = quoted.TOP / "examples" / "gallery" / "collisions" / "energy_of_a_collision.py"
+"""Script of the run in the film, which has its files in the folder `impact`."""
+HOW_FILMED = "--size 480x320 --fps 6 --frames :51:3 --settings theme=light&bonds=off --overwrite"
+"""17 frames, until the pieces have parted: below 300 kB."""
 WINDOW = {"width": 1200, "height": 640}
 """Of the browser, in pixels."""
 SURROUNDINGS = 1.15
@@ -71,6 +77,18 @@ def draw(folder: Path, top: Path, environment: Mapping[str, str]) -> int:
     shutil.copyfile(top / "plots" / "still.png", STILL)
     page(folder, len(frames) - 1, seen, PAGE)
     return seen.grains
+
+
+def film(top: Path, environment: Mapping[str, str]) -> None:
+    """A film of the collision of two aggregates, by the page; needs a Chromium.
+
+    Args:
+        top: a folder for files on the way.
+        environment: of the commands.
+    """
+    ran([sys.executable, "-W", "ignore", str(FILMED)], cwd=top, env=dict(environment))
+    words = ["--movie", str(FILM), "--renderer", "page", *HOW_FILMED.split()]
+    ran([*start_up.SAND, "view", str(top / "impact"), *words], env=dict(environment))
 
 
 def page(folder: Path, frame: int, seen: Broadside, target: Path) -> None:

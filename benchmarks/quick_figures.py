@@ -85,7 +85,8 @@ def main_job(top: Path) -> dict[str, Any]:
 
 
 def picture(top: Path) -> dict[str, Any]:
-    """Draw the most extended cluster of the main job; how many grains it has."""
+    """Draw the most extended cluster of the main job, and a film of a collision; how many grains the cluster has."""
+    pictures.film(top, environment(top / "cache"))
     return {"grains": [pictures.draw(top / "again", top, environment(top / "cache")), ""]}
 
 

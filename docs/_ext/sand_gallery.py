@@ -5,6 +5,7 @@ The scripts run in a copy of their folder, so that the files that they write are
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import tempfile
@@ -43,9 +44,10 @@ def scraped(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
 
 
 def quiet(gallery_conf: dict[str, Any], name: str) -> None:
-    """Before each script: no window, and no warnings of limits, which the pages of the physics explain."""
+    """Before each script: no window, no log of files, no warnings of limits, which are explained in words."""
     matplotlib.use("agg")
-    for start in ("contacts of", "moments of", "grains in contact vibrate"):
+    logging.getLogger("gsd").setLevel(logging.WARNING)  # Sphinx shows what is logged
+    for start in ("contacts of", "grains in contact vibrate", "grains overlap too deeply"):
         warnings.filterwarnings("ignore", message=start)
 
 

@@ -3,7 +3,7 @@ Aggregates from generators
 ==========================
 
 Six ways to build an aggregate of 125 to 150 grains without a simulation, from compact to open. Titles state the radius
-of gyration in grain radii and the mean number of contacts of a grain.
+of gyration in grain radii and the mean number of contacts of a grain; colours show the number of contacts.
 """
 
 import matplotlib.pyplot as plt
@@ -35,7 +35,7 @@ bodies = {
 figure, axes = plt.subplots(2, 3, figsize=(10, 7), layout="constrained")
 for ax, (name, body) in zip(axes.flat, bodies.items(), strict=True):
     frame = frame_of(name, body)
-    image = still_picture(frame, colour="coordination", size=(750, 600)).grains_only
+    image = still_picture(frame, colour="coordination", size=(500, 400)).grains_only
     rows, columns = np.nonzero(image[..., 3])
     ax.imshow(image[rows.min() : rows.max(), columns.min() : columns.max()])
     ax.axis("off")

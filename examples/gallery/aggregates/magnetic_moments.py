@@ -20,7 +20,7 @@ figure, axes = plt.subplots(1, 3, figsize=(12, 4.2), layout="constrained")
 for ax, moments in zip(axes, names, strict=True):
     body = sand.setup.bcca(40, radius="10 nm", material="iron", moment="200 A m^2/kg", moments=moments, seed=5)
     write_body(f"{moments}.gsd", body, overwrite=True)
-    image = still_picture(open_frames(f"{moments}.gsd")[0], colour="alignment", size=(900, 700)).grains_only
+    image = still_picture(open_frames(f"{moments}.gsd")[0], colour="alignment", size=(600, 470)).grains_only
     rows, columns = np.nonzero(image[..., 3])
     ax.imshow(image[rows.min() : rows.max(), columns.min() : columns.max()])
     ax.axis("off")

@@ -2,7 +2,7 @@ r"""
 Capture cross-section of magnetic grains
 ========================================
 
-How large a target are two magnetic grains for each other? Cross-sections from a thousand encounters at each speed.
+How large a target are two magnetic grains for each other? Cross-sections from over a thousand encounters at each speed.
 
 They are in units of the geometric one, :math:`\pi(2R)^2`. The line is the largest one that a centrifugal barrier lets
 pass, which falls as :math:`v^{-4/3}`.

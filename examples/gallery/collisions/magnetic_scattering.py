@@ -2,8 +2,9 @@
 Two magnetic grains pass each other
 ===================================
 
-Paths of an iron grain that passes another one, for several impact parameters. Attraction bends the path; below a
-limit, the capture radius, the grains collide. The moments are aligned, the grain flies in along x.
+Paths of an iron grain that passes another one, for several impact parameters. The grain flies in along x, slowly,
+with both moments along the line between the grains. Attraction bends the path; below a limit, the capture radius, the
+grains collide.
 """
 
 import matplotlib.pyplot as plt
@@ -35,7 +36,8 @@ plt.legend(fontsize="small")
 # What to change
 # --------------
 #
-# * `speed`: fast grains come closer before they are captured.
+# * `speed`: the capture radius falls as :math:`v^{-2/3}`, and moments have less time to follow the direction of the
+#   other grain.
 # * `spin="kT/2"`: grains that spin average the field of each other, and are captured less often.
 # * `orientation="random"` and other seeds, as a cross-section takes them.
 # * Two aggregates: `projectile=` and `target=` instead of radius, material and moment.

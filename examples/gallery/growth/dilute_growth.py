@@ -2,8 +2,8 @@
 Growth in dilute dust
 =====================
 
-In a thin nebula two bodies meet at a time. A population of 200 magnetic grains grows by such encounters, one after the
-other; the cost does not depend on the density. The picture shows the largest aggregate.
+In a thin nebula no more than two bodies meet at a time. A population of 200 magnetic grains grows by such encounters,
+one after the other; the cost does not depend on the density. The picture shows the largest aggregate.
 """
 
 import numpy as np
@@ -34,6 +34,6 @@ picture.savefig("dilute/largest.png")
 # --------------
 #
 # * `number_density`: only the time changes, as long as encounters stay binary.
-# * `temperature`: warm grains are captured from less far.
+# * `temperature`: warm grains fly faster, and are captured only from nearby.
 # * `hits="stick"`: bodies join at the first touch, without contacts that roll.
 # * A thousand grains and `stop="mean_cluster_size >= 30"`, as in `examples/dilute-growth.toml`.

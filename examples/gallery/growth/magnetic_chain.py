@@ -2,8 +2,8 @@
 Magnetic grains form a chain
 ============================
 
-A hundred magnetic iron grains of 20 nm at 100 K attract each other and stick. The picture shows the largest cluster
-after 5 µs, with the magnetic moment of each grain as an arrow.
+A hundred magnetic iron grains, 20 nm in diameter, at 100 K attract each other and stick. The picture shows the
+largest cluster after 5 µs, with the magnetic moment of each grain as an arrow.
 """
 
 import sand
@@ -27,7 +27,7 @@ picture.savefig("magnetic-chain/chain.png")
 # What to change
 # --------------
 #
-# * `temperature`: at 10 K grains of low speed are captured from farther away, at 1000 K from less far.
+# * `temperature`: at 10 K grains of low speed are captured from farther away, at 1000 K only from nearby.
 # * `moment="20 A m^2/kg"`: a tenth of the moment, and the attraction is a hundred times weaker.
 # * `until="10 us"`: clusters meet and join.
 # * `seed`: another gas, and another chain.

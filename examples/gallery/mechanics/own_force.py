@@ -2,8 +2,8 @@
 A force of your own
 ===================
 
-A formula with a decorator is a force: a harmonic trap draws eight grains together, and a soft repulsion keeps them
-apart. Both are compiled, and their energies are columns of the ledger.
+A formula with a decorator is a force: eight grains swing in a harmonic trap and repel each other. Both forces are
+compiled, and their energies are columns of the ledger.
 """
 
 import math
@@ -31,15 +31,19 @@ def soft_repulsion(apart, a, b, p):
 
 corners = [(x, y, z) for x in (-2e-6, 2e-6) for y in (-2.2e-6, 2.2e-6) for z in (-2.4e-6, 2.4e-6)]
 grains = sand.Grains(corners, "0.5 um", "silica")
-own = [trap(stiffness="200 nN/m"), soft_repulsion(strength="1 aJ", length="0.5 um")]
+own = [trap(stiffness="200 nN/m"), soft_repulsion(strength="100 aJ", length="0.5 um")]
 sim = sand.Simulation(grains, [sand.Contact(damping="critical"), *own])
-print(sim.run(until="0.2 ms"))
+print(sim.run(until="0.5 ms"))
 
 for name in ("translation", "trap", "soft_repulsion", "total"):
-    plt.plot(1e3 * sim.ledger["time"], sim.ledger[name], label=name.replace("_", " "))
+    plt.plot(1e3 * sim.ledger["time"], 1e18 * sim.ledger[name], label=name.replace("_", " "))
 plt.xlabel("time [ms]")
-plt.ylabel("energy [J]")
-plt.legend()
+plt.ylabel("energy [aJ]")
+plt.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)
+
+# %%
+# Two grains that touch would have a repulsive energy of 100 aJ :math:`e^{-2}` = 14 aJ, more than all eight have in
+# the trap at the start: they cannot touch. With a hundredth of the strength they stick.
 
 # %%
 # What to change

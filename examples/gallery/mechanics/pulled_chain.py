@@ -2,10 +2,10 @@ r"""
 A chain is pulled apart
 =======================
 
-The first grain of a chain is held, the last one is pulled. The force rises until a contact breaks, at the pull-off
-force of two grains.
+The first grain of a chain is held, the last one is pulled. The force rises to the pull-off force of two grains; there
+the contacts are no longer stable, and one of them parts.
 
-It is :math:`3\pi\gamma R` with the surface energy :math:`\gamma` and the reduced radius :math:`R`.
+The pull-off force is :math:`3\pi\gamma R` with the surface energy :math:`\gamma` and the reduced radius :math:`R`.
 """
 
 import matplotlib.pyplot as plt
@@ -32,6 +32,6 @@ print(f"largest force {max(forces):.3f} nN, pull-off force {1e9 * theory.pull_of
 # What to change
 # --------------
 #
-# * `velocity`: pulled faster, the chain oscillates.
+# * `velocity`: pulled faster, the chain vibrates, and the largest force at its end is no longer the pull-off force.
 # * Velocity along y: the chain bends, and contacts roll.
 # * Walls instead of driven grains: `examples/chain_between_walls.py`.

@@ -20,6 +20,7 @@ from .style import (
     INDIGO,
     MUTED,
     ORANGE,
+    PLUM,
     PURPLE,
     RED,
     SKY,
@@ -39,7 +40,7 @@ LOSS_CHANNELS = {name: (f"lost_{name}",) for name in LOST if name not in (*DAMPI
 }
 """Ledger columns of each loss channel of the figures; damping of the four modes of a contact is drawn together, and so
 is motion within clusters that is removed."""
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, YELLOW, BROWN, TEXT_COLOUR, MUTED, INDIGO, ORANGE)
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, PLUM, BROWN, TEXT_COLOUR, MUTED, INDIGO, ORANGE)
 EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
 CLUSTERS = {

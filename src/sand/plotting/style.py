@@ -29,7 +29,7 @@ BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#D9C400",
 )
 """After Okabe & Ito (2008): distinct for colour-blind readers."""
-BROWN, INDIGO = "#8A4B08", "#4B4FA8"
+BROWN, INDIGO, PLUM = "#8A4B08", "#4B4FA8", "#601860"
 """Further colours of lines."""
 MARKERS = "osD^vP*X<>"
 """Markers of lines."""
@@ -64,6 +64,7 @@ ON_DARK = {
     YELLOW: "#E8DA4F",
     BROWN: "#C98B4E",
     INDIGO: "#8F93E0",
+    PLUM: "#8C5CD6",
     TEXT_COLOUR: TEXT_ON_DARK,
     MUTED: MUTED_ON_DARK,
 }

@@ -129,6 +129,22 @@ def test_box_edges_are_hidden_by_grains_in_front():
     assert np.abs(there - line).max() > 0.05 and np.ptp(there) < 0.1
 
 
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_tilted_box_is_a_parallelepiped(whole):
+    """Its edges along z are (T, 0, L); all grains are in it, x − T z/L within L/2, each at one of its own images."""
+    side, tilt = 1e-7, 4e-8
+    x = side * np.random.default_rng(1).uniform(-0.5, 0.5, (40, 3))
+    frame = frame_of(x, box=sand.Box.periodic(side, tilt=tilt))
+    scene = still_picture(frame, size=(200, 200), whole=whole).scene
+    along = np.array([b - a for a, b, axis, _ in scene.edges() if axis == 2])
+    np.testing.assert_allclose(along, np.tile([tilt, 0.0, side], (4, 1)), atol=1e-12 * side)
+    flat = scene.position - np.outer(scene.position[:, 2], [tilt / side, 0.0, 0.0])
+    assert np.abs(flat).max() <= (0.5 + 1e-12) * side
+    moved = (scene.position - x)[:, 0] / side
+    np.testing.assert_allclose(moved, np.rint(moved), atol=1e-9)
+    assert (moved != 0.0).any()  # the rectangular box has these grains beside the parallelepiped
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_backgrounds(dark):

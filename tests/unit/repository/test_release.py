@@ -9,7 +9,10 @@ from sand.cli import references
 
 TOP = Path(__file__).parents[3]
 PROJECT = tomllib.loads((TOP / "pyproject.toml").read_text("utf-8"))["project"]
-RECIPE = (TOP / "recipe" / "meta.yaml").read_text("utf-8")
+_RECIPE = (TOP / "recipe" / "meta.yaml").read_text("utf-8")
+_VARIABLES = dict(re.findall(r'^{% set (\w+) = "(.+)" %}$', _RECIPE, re.M))
+RECIPE = re.sub(r"{{ (\w+) }}", lambda name: _VARIABLES.get(name[1], name[0]), _RECIPE)
+"""The recipe with the values of its variables."""
 ZENODO = json.loads((TOP / ".zenodo.json").read_text("utf-8"))
 PAPER = (TOP / "paper" / "paper.md").read_text("utf-8")
 BIBLIOGRAPHY = (TOP / "paper" / "paper.bib").read_text("utf-8")

@@ -100,7 +100,9 @@ class Scene:
         for axis, length in enumerate(self.box.lengths):
             if length is not None:
                 low[axis], high[axis] = -length / 2, length / 2
-        return np.array(list(itertools.product(*zip(low, high, strict=True)))).reshape(2, 2, 2, 3)
+        corners = np.array(list(itertools.product(*zip(low, high, strict=True)))).reshape(2, 2, 2, 3)
+        corners[..., 0] += _displacement(self.box, corners)
+        return corners
 
     def edges(self) -> list[tuple[np.ndarray, np.ndarray, int, bool]]:
         """The twelve edges of the box: two ends (3,) [m], axis, and whether the edge ends in the farthest corner."""
@@ -132,12 +134,12 @@ def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> 
         have no extent; otherwise every grain is drawn inside the box.
     """
     label = cluster_labels(len(grains), pairs)
-    position = box.wrap(np.where(np.isfinite(grains.position), grains.position, np.nan))
+    position = _in_box(box, np.where(np.isfinite(grains.position), grains.position, np.nan))
     if whole:
         inside, position = position, unwrapped(position, pairs, box)
         sizes = cluster_sizes(label)
         centre = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
-        position = position + (box.wrap(centre) - centre)[label]
+        position = position + (_in_box(box, centre) - centre)[label]
         percolates = np.zeros(len(sizes), bool)
         ends = np.asarray(pairs, np.int64).reshape(-1, 2)  # without contacts of any type
         percolates[label[ends[closes_through_boundary(position, ends, box), 0]]] = True
@@ -153,6 +155,20 @@ def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> 
         box,
         np.flatnonzero(finite),
     )
+
+
+def _displacement(box: Box, position: np.ndarray) -> np.ndarray:
+    """Displacement along x (…) [m] of a tilted box at positions (…, 3) [m], T z/L_z; 0 of another box."""
+    return box.tilt * box.span.inverse_z * position[..., 2]
+
+
+def _in_box(box: Box, position: np.ndarray) -> np.ndarray:
+    """Images (N, 3) [m] of positions in the box, which is a parallelepiped if it is tilted."""
+    position = box.wrap(position)
+    if box.tilt:
+        beyond = (position[:, 0] - _displacement(box, position)) * box.span.inverse_x
+        position[:, 0] -= box.span.x * np.rint(beyond)
+    return position
 
 
 def _arrows(moment: np.ndarray) -> np.ndarray:
