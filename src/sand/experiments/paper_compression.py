@@ -62,7 +62,7 @@ def compare_compression(rows: Sequence[Row]) -> list[Compared]:
         "E_imp/(N_k E_break) beyond which less than half of the mass stays together",
         "about 10 (2007, abstract)",
     )
-    verdict = broken.verdict(10.0, "the paper's aggregates are two-dimensional")
+    verdict = broken.verdict(10.0, "the paper's aggregates are two-dimensional", within=1.0)
     return [*compared, Compared(what, stated, broken.text(), verdict)]
 
 

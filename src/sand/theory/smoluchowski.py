@@ -166,7 +166,12 @@ class _Problem(NamedTuple):
 
 def _solve(problem: _Problem, t: np.ndarray) -> SizeDistribution:
     """The solution at the times t [s], up to the first limit reached."""
-    from scipy.integrate import solve_ivp
+    from scipy.integrate import BDF, solve_ivp
+
+    class Implicit(BDF):  # SciPy leaves its higher differences uninitialised, and NumPy warns where it subtracts them
+        def __init__(self, *args: Any, **kwargs: Any):
+            super().__init__(*args, **kwargs)
+            self.D[2:] = 0.0
 
     x, tolerance = problem.sizes, problem.tolerance
     grains = float((x * problem.numbers).sum())
@@ -184,9 +189,10 @@ def _solve(problem: _Problem, t: np.ndarray) -> SizeDistribution:
     start = np.append(x * problem.numbers / grains, 0.0)
     end = max(t[-1] / time_unit, 1e-300)
     # LSODA is no alternative: it fails when its Adams formulas encounter a stiff system
-    options = {"jac": system.jacobian} if problem.method == "BDF" else {}
+    implicit = problem.method == "BDF"
+    method, options = (Implicit, {"jac": system.jacobian}) if implicit else (problem.method, {})
     done = solve_ivp(
-        system.change, (0.0, end), start, problem.method, np.minimum(t / time_unit, end), events=[lost, large],
+        system.change, (0.0, end), start, method, np.minimum(t / time_unit, end), events=[lost, large],
         rtol=tolerance, atol=1e-4 * tolerance / np.append(x, 1.0), **options,
     )  # fmt: skip
     if done.status < 0:

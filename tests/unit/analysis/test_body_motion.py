@@ -197,7 +197,7 @@ def test_ledger_and_summary(tmp_path, stepping):
         found = body_temperatures(body_motion(frame, frame.pair, frame.box))
         assert [row[name] for name in TEMPERATURES] == pytest.approx(list(found), rel=1e-5, abs=0.0)
     assert [run.summary[name] for name in TEMPERATURES] == [sim.ledger.rows[-1][name] for name in TEMPERATURES]
-    assert has_temperatures(sim.ledger) and len(run_figure(sim).axes) == 8
+    assert has_temperatures(sim.ledger) and len(run_figure(sim).axes) == 7
 
 
 def ledger_rows(bodies=12):
