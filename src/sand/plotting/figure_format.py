@@ -53,11 +53,11 @@ def style_settings(style: Any, name: str = "style") -> dict[str, Any]:
         If there is no such file or style, or lines of it are no settings of matplotlib; one line for each.
     """
     import matplotlib
-    from matplotlib import style as styles
+    from matplotlib.style import library as named_styles
 
     text = str(style)
-    if text in styles.library:
-        found: Mapping[str, Any] = styles.library[text]
+    if text in named_styles:
+        found: Mapping[str, Any] = named_styles[text]
     elif not Path(text).is_file():
         raise BadInput(f"{name} = {shown(text)}: there is no such style file, nor a style of this name in matplotlib")
     else:
