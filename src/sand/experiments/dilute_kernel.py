@@ -26,9 +26,9 @@ class Kernel(NamedTuple):
     error: np.ndarray  # (C, C) its standard error
     hits: np.ndarray  # (C, C) hits from which it follows
     draws: np.ndarray  # (C, C)
-    # means over the pairs that K is the mean of, 0 if none was drawn: number of grains and mass [kg] of bodies of a class
-    sizes: np.ndarray  # (C,)
-    masses: np.ndarray  # (C,)
+    # of bodies of a class, means over the pairs that K is the mean of; 0 if none was drawn
+    sizes: np.ndarray  # (C,) number of grains
+    masses: np.ndarray  # (C,) mass [kg]
 
     def rows(self, draws: int = 1) -> list[tuple[float, float, float, float]]:
         """Rows (m1, m2, K over 1 m/s, 1 m/s) of all pairs of classes with hits, as `kernel_table.measured` takes them.
