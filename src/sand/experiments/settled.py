@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.body_motion import motion_of
+from ..analysis.bridges import SpanningTrees
 from ..analysis.internal_motion import rigid_motion
 from ..basics.arguments import checked
 from ..basics.state import CHANGED
@@ -115,13 +116,11 @@ def swings(grains: Any, pairs: np.ndarray, box: Any) -> Swings:
     u, w = grains.velocity - (total[:, 1:] / total[:, :1])[label] - np.cross(spin, x), grains.spin - spin
     second = (x[:, :, None] * x[:, None, :]).reshape(-1, 9)
     rows = np.hstack((mass, mass * x, mass * u, mass * np.cross(x, u) + inertia * w, mass * second, inertia))
-    tree = _spanning_tree(len(label), pairs, first)
-    sums = np.vstack((rows, np.zeros(rows.shape[1])))
-    for i in tree.order[:0:-1]:
-        sums[tree.parent[i]] += sums[i]
-    here, contact = tree.bridges, tree.contact[tree.bridges]
-    one, (i, j) = sums[here], np.asarray(pairs)[contact].T
-    other = sums[first[label[here]]] - one
+    trees = SpanningTrees(len(label), pairs, first)
+    sums, bridges = trees.over_subtrees(np.add, trees.at_nodes(rows)), trees.bridges()
+    contact, one = trees.contact[bridges], sums[bridges]
+    i, j = np.asarray(pairs)[contact].T
+    other = sums[trees.nodes_of(first[label[trees.grain[bridges]]])] - one
     at = x[i] + radius[i] / (radius[i] + radius[j]) * (x[j] - x[i])
     parts = _inertia_about(one, at), _inertia_about(other, at)
     return Swings(contact, parts[0] * parts[1] / (parts[0] + parts[1]), _kinetic(one) + _kinetic(other))
@@ -142,39 +141,6 @@ def _inertia_about(part: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Σ [m |x − c|² + I] [kg m²] about points c (B, 3), which no moment of inertia about an axis exceeds."""
     square = np.trace(part[:, 10:19].reshape(-1, 3, 3), axis1=1, axis2=2)
     return square - 2.0 * (part[:, 1:4] * at).sum(axis=1) + part[:, 0] * (at * at).sum(axis=1) + part[:, 19]
-
-
-class _Tree(NamedTuple):
-    """Spanning trees of all bodies, joined at one further node, N."""
-
-    order: np.ndarray  # nodes (N + 1,), each after its parent
-    parent: np.ndarray  # (N + 1,)
-    contact: np.ndarray  # (N + 1,) contact of each grain with its parent
-    bridges: np.ndarray  # grains whose contact with the parent is a bridge
-
-
-def _spanning_tree(count: int, pairs: np.ndarray, first: np.ndarray) -> _Tree:
-    """Spanning trees of bodies with N grains, from the first grain of each (K,), and their bridges."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order
-
-    ends = np.vstack((np.asarray(pairs, np.int64), np.column_stack((first, np.full(len(first), count)))))
-    numbers = np.arange(1, len(ends) + 1)
-    graph = coo_array((numbers, (ends[:, 0], ends[:, 1])), shape=(count + 1, count + 1)).tocsr()
-    graph = graph + graph.T
-    order, parent = breadth_first_order(graph, count)
-    contact, rank = np.full(count + 1, -1), np.empty(count + 1, np.int64)
-    rank[order] = np.arange(count + 1)
-    contact[order[1:]] = np.asarray(graph[order[1:], parent[order[1:]]]).ravel() - 1
-    in_ring = np.zeros(count + 1, bool)
-    in_ring[first] = in_ring[count] = True
-    up, above = parent.tolist(), rank.tolist()
-    for one, other in ends[np.setdiff1d(np.arange(len(pairs)), contact)].tolist():
-        while one != other:  # the path between both ends along the tree closes a ring
-            one, other = (one, other) if above[one] > above[other] else (other, one)
-            in_ring[one] = True
-            one = up[one]
-    return _Tree(order, parent, contact, np.flatnonzero(~in_ring))
 
 
 def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
@@ -238,10 +204,13 @@ def strength_of(simulation: Simulation, pairs: np.ndarray) -> Strength:
     grains, model = simulation.grains, contact_model(simulation)
     if model is None:
         return Strength(*np.zeros((len(Strength._fields), len(pairs))))
-    kinds, radii, material = grains.materials, np.asarray(grains.radius).tolist(), np.asarray(grains.material).tolist()
-    kinds_of = [(material[i], material[j], radii[i], radii[j]) for i, j in pairs.tolist()]
-    found = {
-        (a, b, *sizes): contact_strength(model.contact_law, model.pairing(kinds[a], kinds[b]), *sizes)
-        for a, b, *sizes in dict.fromkeys(kinds_of)
-    }
-    return Strength(*np.array([found[one] for one in kinds_of]).T)
+    radii, size = np.unique(np.asarray(grains.radius), return_inverse=True)
+    material, sizes = np.asarray(grains.material, np.int64), len(radii)
+    kind = material * sizes + size  # material and radius of a grain as one number, and of the two of a contact
+    kinds = len(grains.materials) * sizes
+    both, row = np.unique(kind[pairs[:, 0]] * kinds + kind[pairs[:, 1]], return_inverse=True)
+    found = []
+    for ends in zip(*np.divmod(both, kinds), strict=True):
+        pairing = model.pairing(*(grains.materials[one // sizes] for one in ends))
+        found.append(contact_strength(model.contact_law, pairing, *(float(radii[one % sizes]) for one in ends)))
+    return Strength(*np.array(found)[row].T)
