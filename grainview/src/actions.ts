@@ -7,6 +7,7 @@ export interface CameraActions {
   reset(): void;
   centre(): void;
   showCluster(cluster: Uint8Array | null): void;
+  showBroadside(cluster: Uint8Array | null): void;
   lookAlong(from: [number, number, number], up: [number, number, number]): void;
   turn(sideways: number, upwards: number): void;
   pan(right: number, upwards: number): void;
@@ -18,6 +19,7 @@ export interface SelectionActions {
   stepContact(by: 1 | -1): void;
   selectLargestCluster(): void;
   largestCluster(): Uint8Array | null;
+  cluster(): Uint8Array | null;
   measureFromSelected(): void;
   clear(): void;
 }
@@ -84,6 +86,8 @@ export function actionsOf({ playback, camera, selection, exports, page }: Comman
     { id: "centre", label: "Centre the selection, or everything", keys: ["z"], run: () => camera.centre() },
     { id: "view-largest", label: "View the largest cluster", keys: ["Y"],
       run: () => camera.showCluster(selection.largestCluster()) },
+    { id: "broadside", label: "View the selected or largest cluster broadside", keys: ["Z"],
+      run: () => camera.showBroadside(selection.cluster() ?? selection.largestCluster()) },
     { id: "reset", label: "Reset the view", keys: ["r", "0"], run: () => camera.reset() },
     ...AXES.map(([name, from, up], k) => ({
       id: `along-${name}`, label: `View along ${name}`, keys: [String(k + 1)], run: () => camera.lookAlong(from, up),

@@ -1,6 +1,7 @@
 // Camera movements: reset, centring, rotation, panning and zoom.
 
 import * as three from "three";
+import { principalAxes } from "./data/clusters";
 import type { Look } from "./scene/look";
 
 type Vector3 = [number, number, number];
@@ -28,6 +29,8 @@ export interface CentredSelection {
 export const CLOSE_UP = "The largest cluster. Press r for the whole box.";
 /** Height of a view relative to that of its content. */
 const MARGIN = 1.08;
+/** Height of a view broadside relative to that at which the cluster fills it: room for the legend beside it. */
+const BESIDE = 1.15;
 /** Height [pixels] of the largest cluster in the view of everything from which on that view shows its shape. */
 const LEGIBLE = 12;
 
@@ -75,6 +78,15 @@ export class CameraController {
     const everything = this.overview();
     const near = cluster && this.overview(everything.from, everything.up, cluster);
     this.camera.look = near ? { ...near, height: Math.min(2 * near.height, everything.height) } : everything;
+  }
+
+  /** A cluster with its longest axis across the view and its shortest towards the eye; null: show everything. */
+  showBroadside(cluster: Uint8Array | null): void {
+    if (!cluster) return this.reset();
+    const [from, up] = principalAxes(this.grains.positions, cluster)
+      .map((axis) => (axis[2] < 0 ? axis.map((x) => -x) : axis) as Vector3);
+    const look = this.overview(from, up, cluster);
+    this.camera.look = { ...look, height: BESIDE * look.height };
   }
 
   /**

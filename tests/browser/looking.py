@@ -29,7 +29,7 @@ CLOSE = 1e-3
 """Of numbers read from the page: what is shown has four digits, halves have eleven bits (5e-4)."""
 PREFIXES = {"y": -24, "z": -21, "a": -18, "f": -15, "p": -12, "n": -9, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9}
 RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-UNITS = ("m/s", "rad/s", "A m²", "kg", "m", "s", "J", "N", "C")
+UNITS = ("m/s", "rad/s", "A m²", "kg", "m", "s", "J", "N", "C", "Pa")
 NO_COVERS = """() => { for (const name of ["gv-legend", "gv-inspector", "gv-overlay"])
   document.querySelector("." + name).style.pointerEvents = "none"; }"""
 PIXELS = """() => sandView.page.canvas.toDataURL("image/png").split(",")[1]"""

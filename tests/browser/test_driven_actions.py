@@ -131,6 +131,19 @@ def sees_largest(view: Driven) -> None:
     assert view.look()["height"] <= view.run("app.camera.overview().height")
 
 
+def broadside(view: Driven) -> None:
+    """Of the largest cluster: variances of positions along the eye, upwards and across are the eigenvalues, in order.
+
+    Directions of equal variance, as across a straight chain, may be any.
+    """
+    sees_largest(view)
+    members = np.array(view.run("Array.from(app.selection.largestCluster())")) == 1
+    matrix = np.cov(np.reshape(view.run("Array.from(app.picture.positions)"), (-1, 3))[members].T)
+    ways = np.array([view.look()["from"], view.look()["up"], np.cross(view.look()["up"], view.look()["from"])])
+    found, wanted = np.diag(ways @ matrix @ ways.T), np.linalg.eigvalsh(matrix)
+    assert found == pytest.approx(wanted, rel=1e-4, abs=1e-4 * wanted[2])
+
+
 def is_reset(view: Driven) -> None:
     assert np.allclose(view.look()["from"], np.array([0.52, -0.74, 0.43]) / np.linalg.norm([0.52, -0.74, 0.43]))
     assert view.look()["height"] == pytest.approx(view.run("app.camera.overview().height"), rel=1e-6, abs=0.0)
@@ -170,6 +183,7 @@ ACTIONS: dict[str, tuple[dict, Check]] = {
     "clear": ({"grain": 3, "isolate": True, "follow": True, "ends": "1-2"}, captions()),
     "centre": ({"grain": 5}, centred),
     "view-largest": ({"frame": MERGED}, sees_largest),
+    "broadside": ({"frame": PARTED}, broadside),
     "reset": ({"look": "1,2,3,1,0,0,0,0,1,5"}, is_reset),
     "along-x": ({}, looks_along([1, 0, 0])),
     "along-y": ({}, looks_along([0, -1, 0])),
@@ -233,6 +247,17 @@ def test_an_action_by_its_button(view, action):
     view.tab.get_by_role("button", name=BUTTONS[action], exact=True).click()
     view.settle()
     check(view)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_cluster_broadside(view, seed):
+    """Grains of the largest cluster at random places, farther apart along one direction than along another."""
+    view.put(frame=MERGED)
+    rng = np.random.default_rng(seed)
+    places = rng.normal(size=(GRAINS, 3)) * [1.0, 2.0, 4.0] @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    view.run("app.picture.positions.set(told[0])", places.ravel().tolist())
+    view.press("Z")
+    broadside(view)
 
 
 def test_help_lists_all_keys(view):

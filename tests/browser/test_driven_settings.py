@@ -50,7 +50,7 @@ def theme(view: Driven) -> object:
 
 
 def plot(view: Driven) -> object:
-    return view.run("[app.plot.chart.axes[1].label.split(' (')[0], app.plot.chart.series.length]")
+    return view.text(".gv-plot-title").split(" (")[0], view.run("app.plot.chart.series.length")
 
 
 def seen(name: str) -> Callable[[Driven], object]:

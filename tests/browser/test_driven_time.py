@@ -91,16 +91,18 @@ def test_clicking_in_the_plot_goes_to_the_nearest_frame(view):
 
 
 def test_the_plots_have_what_the_ledger_has(view):
-    """Each of those offered: its title, its lines by name, its numbers of the last row."""
+    """Each of those offered: its title, its lines by name, its numbers of the last row, at their places on the axis."""
     names = view.run("app.state.setting('plot').options")
     assert [name for name, _ in names] == ["clusters", "energies", "losses", "contacts", "balance"]
     for name, title in names:
         view.control("plot").select_option(name)
         view.settle()
-        assert view.run("app.plot.chart.axes[1].label").startswith(title)
+        assert view.text(".gv-plot-title").startswith(title)
         assert view.text(".gv-plot .u-legend").count("\n") + 1 >= 1
     view.put(plot="contacts")
-    assert view.run("app.plot.chart.data.slice(1).map((line) => line.at(-1))") == [7, 8, 1]
+    low, high = view.run("[app.plot.axis.low, app.plot.axis.high]")
+    shares = np.array(view.run("app.plot.chart.data.slice(1).map((line) => line.at(-1))"))
+    assert low + (high - low) * shares == pytest.approx([7, 8, 1], rel=1e-6, abs=0.0)
     assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(FRAMES - 1, rel=1e-6, abs=0.0)
     assert "time (ns)" in view.run("app.plot.chart.axes[0].label")
 

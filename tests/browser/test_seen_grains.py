@@ -195,7 +195,7 @@ def test_colours_of_a_quantity(page, shows, palette, source):
     shown = shows("hundred")
     view = View(page, shown, source, look=LOOKS["hundred"], ortho=1, colour="speed", palette=palette, **BARE)
     every = np.concatenate([np.linalg.norm(np.asarray(f.velocity, float), axis=1) for f in shown.frames])
-    low, high = (np.percentile(every, p, method=m) for p, m in ((1.0, "lower"), (99.9, "higher")))
+    low, high = (np.percentile(every, p, method=m) for p, m in ((2.0, "lower"), (98.0, "higher")))
     table = np.rint(255 * matplotlib.colormaps[palette](np.linspace(0, 1, 64))[:, :3])
     for k in FRAMES["hundred"]:
         frame = view.go(k)

@@ -1,7 +1,7 @@
 // Contacts as they are drawn: bars between grains, cut at the contact where it lies beyond a face, and their colours.
 
 import { nearestImage } from "./clusters";
-import { colourAt, rgb, type Scale } from "./colours";
+import { colourAt, isClipped, rgb, type Scale } from "./colours";
 import type { Colour3, Frame, Manifest } from "./types";
 
 /** Modes of deformation of a contact, the columns of `share`. */
@@ -59,7 +59,8 @@ export function loadScale(manifest: Manifest, frame: Frame): Scale {
   let top = manifest.ranges.load?.[1] ?? 0;
   if (!(top > 0)) for (const f of frame.force) top = Math.max(top, Math.abs(f) || 0);
   top ||= 1;
-  return { low: -top, high: top, log: false, palette: manifest.palettes.diverging };
+  const clipped = isClipped("load", manifest);
+  return { low: -top, high: top, log: false, palette: manifest.palettes.diverging, clipped };
 }
 
 /**

@@ -150,3 +150,28 @@ export function measureCluster(
     alignment: moments > 0 ? Math.hypot(...moment) / moments : NaN,
   };
 }
+
+/**
+ * Directions of the shortest, the middle and the longest axis of the grains of a mask: eigenvectors of
+ * Σ (x − x̄)(x − x̄)ᵀ by Jacobi's rotations, which make one element off the diagonal zero after another.
+ */
+export function principalAxes(positions: Float32Array, mask: Uint8Array): [number, number, number][] {
+  const members = [...mask.keys()].filter((i) => mask[i]);
+  const centre = [0, 1, 2].map((a) => members.reduce((sum, i) => sum + positions[3 * i + a] / members.length, 0));
+  const t = [0, 1, 2].map((a) => [0, 1, 2].map((b) => (
+    members.reduce((sum, i) => sum + (positions[3 * i + a] - centre[a]) * (positions[3 * i + b] - centre[b]), 0)
+  )));
+  const axes: [number, number, number][] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  for (let sweep = 0; sweep < 12; sweep++) { // the rest after a sweep is about the square of that before
+    for (const [p, q] of [[0, 1], [0, 2], [1, 2]]) {
+      const angle = 0.5 * Math.atan2(2 * t[p][q], t[q][q] - t[p][p]);
+      const [c, s] = [Math.cos(angle), Math.sin(angle)];
+      for (const rows of [t, axes]) {
+        const [x, y] = [[...rows[p]], [...rows[q]]];
+        for (let a = 0; a < 3; a++) [rows[p][a], rows[q][a]] = [c * x[a] - s * y[a], s * x[a] + c * y[a]];
+      }
+      for (const row of t) [row[p], row[q]] = [c * row[p] - s * row[q], s * row[p] + c * row[q]];
+    }
+  }
+  return [0, 1, 2].sort((a, b) => t[a][a] - t[b][b]).map((a) => axes[a]);
+}

@@ -49,6 +49,8 @@ export interface Scale {
   high: number;
   log: boolean;
   palette: Colour3[];
+  /** Whether the ends are percentiles of the run, so that some values lie beyond. */
+  clipped: boolean;
 }
 
 /** Position of a value on a scale, from 0 to 1; NaN for NaN. */
@@ -72,13 +74,20 @@ export interface ScaleSettings {
   palette: string;
 }
 
+/** Whether the range of a quantity has percentiles as its ends. */
+export function isClipped(id: string, { ranges, percentiles }: Manifest): boolean {
+  return percentiles.of.includes(id) && ranges[id]?.[1] > 0;
+}
+
 /** The scale of a quantity: the range from the settings, else from the manifest, else from this frame. */
 function scaleOf(quantity: Quantity, values: Float32Array, settings: ScaleSettings, manifest: Manifest): Scale {
   if (quantity.kind === "diverging") {
     const reach = (quantity.unit && manifest.ranges[quantity.id]?.[1]) || 1;
-    return { low: -reach, high: reach, log: false, palette: manifest.palettes.diverging };
+    const clipped = isClipped(quantity.id, manifest);
+    return { low: -reach, high: reach, log: false, palette: manifest.palettes.diverging, clipped };
   }
   const range = manifest.ranges[quantity.id];
+  const own = !Number.isNaN(settings.low) || !Number.isNaN(settings.high); // told by the user
   let [low, high] = (range && range[1] > range[0] ? range : extent(values)) ?? [0, 1];
   if (!Number.isNaN(settings.low)) low = settings.low;
   if (!Number.isNaN(settings.high)) high = settings.high;
@@ -86,7 +95,8 @@ function scaleOf(quantity: Quantity, values: Float32Array, settings: ScaleSettin
   if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-3;
   const log = settings.log && high > 0;
   if (log && !(low > 0)) low = high * 1e-4;
-  return { low, high, log, palette: manifest.palettes[settings.palette] ?? Object.values(manifest.palettes)[0] };
+  const palette = manifest.palettes[settings.palette] ?? Object.values(manifest.palettes)[0];
+  return { low, high, log, palette, clipped: !own && isClipped(quantity.id, manifest) };
 }
 
 export interface Painted {

@@ -27,15 +27,15 @@ function losses(series: Series, time: number, dark: boolean): Shares[] {
   const row = rowAt(series.time, time);
   if (!plot?.lines.length || row < 0) return [];
   const all = plot.lines.map((line) => (
-    { text: line.label, colour: dark ? line.dark : line.light, size: line.values[row] ?? 0 }
+    { text: line.label, hint: line.hint, colour: dark ? line.dark : line.light, size: line.values[row] ?? 0 }
   ));
   const found = all.filter((one) => one.size > 0).sort((a, b) => b.size - a.size);
-  const gains = all.filter((one) => one.size < 0).map(({ text, colour, size }) => (
-    { colour, text: `${text}: gained ${quantity(-size, plot.unit, 2)}` }
+  const gains = all.filter((one) => one.size < 0).map(({ text, hint, colour, size }) => (
+    { colour, hint, text: `${text}: gained ${quantity(-size, plot.unit, 2)}` }
   ));
   const total = found.reduce((sum, one) => sum + one.size, 0);
-  const rows = found.slice(0, MAX_ROWS).map(({ text, colour, size }) => (
-    { colour, text: `${text} ${percent(size / total)}` }
+  const rows = found.slice(0, MAX_ROWS).map(({ text, hint, colour, size }) => (
+    { colour, hint, text: `${text} ${percent(size / total)}` }
   ));
   const others = found.slice(MAX_ROWS).reduce((sum, one) => sum + one.size, 0);
   return [{
@@ -91,9 +91,11 @@ function rest({ manifest }: Dataset, { at_rest: flags, cluster, position }: Fram
   });
   const grains = counts[0] + counts[1] + counts[2];
   const resting = [...awake.values()].filter((on) => !on).length;
-  const [colours, words] = [[...manifest.colours.rest, null], ["awake (contact steps)", "at rest (rigid)", "single"]];
+  const colours = [...manifest.colours.rest, null];
+  const words = ["awake (contact steps)", "at rest (rigid)", "single, not counted"];
   return [{
     title: `rigid clusters (at rest): ${resting} of ${awake.size}`,
+    hint: "Clusters of two grains and more; single grains are not counted. Clusters at rest move as rigid bodies.",
     shares: manifest.colours.rest.map((colour, k) => ({ colour, share: counts[k] / grains })),
     rows: counts.map((count, k) => ({ colour: colours[k], text: `${count} ${words[k]}` })),
   }];

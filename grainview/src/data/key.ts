@@ -10,11 +10,14 @@ export interface Swatch {
   colour: string | null;
   text: string;
   grain?: number;
+  /** More words, for who asks. */
+  hint?: string;
 }
 
 /** A colour bar; numbers below its ends and its middle. */
 export interface Bar {
   title: string;
+  hint?: string;
   bar: string[];
   numbers: string[];
 }
@@ -22,20 +25,28 @@ export interface Bar {
 /** A bar divided into shares of a whole; what they leave is empty. */
 export interface Shares {
   title: string;
+  hint?: string;
   shares: { colour: string; share: number }[];
   rows: Swatch[];
 }
 
-export type KeyPart = Bar | { title: string; rows: Swatch[] };
+export type KeyPart = Bar | { title: string; hint?: string; rows: Swatch[] };
 
 const MAX_CLUSTERS = 6; // rows for clusters
 
-function bar(scale: Scale, label: string, unit: string): KeyPart {
+function bar(scale: Scale, label: string, unit: string, limits: [number, number]): KeyPart {
   const size = Math.max(Math.abs(scale.low), Math.abs(scale.high));
   const [factor, name] = prefixed(size, unit);
   const middle = scale.log ? Math.sqrt(scale.low * scale.high) : (scale.low + scale.high) / 2;
   const numbers = [scale.low, middle, scale.high].map((v) => digits(v / factor, 3));
-  return { title: name ? `${label} (${name})` : label, bar: scale.palette.map(css), numbers };
+  const title = name ? `${label} (${name})` : label;
+  const colours = { bar: scale.palette.map(css), numbers };
+  if (!scale.clipped) return { title, ...colours };
+  // a scale from −x to x has the magnitudes up to x
+  const [low, high] = scale.low === -scale.high ? [0, limits[1]] : limits;
+  const hint = `Of all values of the run that are not zero, ${high - low} % are in this range; those beyond have the `
+    + "colours of its ends.";
+  return { title: `${title}, ${high - low} % of values`, hint, ...colours };
 }
 
 function clusters(painted: Painted, position: Float32Array, { manifest }: Dataset): KeyPart {
@@ -80,10 +91,11 @@ export function keyOf(
   bonds: { kind: string; scale: Scale },
 ): KeyPart[] {
   const parts: KeyPart[] = [];
-  if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit));
+  const { limits } = dataset.manifest.percentiles;
+  if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit, limits));
   else if (quantity.id === "material") parts.push(materials(dataset));
   else parts.push((quantity.id === "at_rest" ? rest : clusters)(painted, position, dataset));
-  if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + repulsive", "N"));
+  if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + repulsive", "N", limits));
   if (bonds.kind === "mode") {
     const { modes, within } = dataset.manifest.colours;
     const rows = MODES.map((mode, m) => ({ colour: modes[m], text: mode as string }));

@@ -32,6 +32,10 @@ export interface Manifest {
   periodic: boolean[];
   field: Field | null;
   ranges: Record<string, [number, number]>;
+  /** Lower and upper percentile that are the range of these quantities. */
+  percentiles: { limits: [number, number]; of: string[] };
+  /** What the values of a contact are, by name. */
+  hints: Record<string, string>;
   palettes: Record<string, Colour3[]>;
   colours: {
     big: string[];
@@ -87,6 +91,8 @@ export interface Frame extends Box {
 
 export interface Line {
   label: string;
+  /** What it is, in a sentence, or "". */
+  hint: string;
   light: string;
   dark: string;
   values: (number | null)[];
@@ -96,7 +102,9 @@ export interface Plot {
   id: string;
   title: string;
   unit: string;
-  log: boolean;
+  axis: "linear" | "log" | "symlog";
+  /** Lower end of a logarithmic axis; magnitude below which a symmetric logarithmic one is linear. */
+  least: number | null;
   lines: Line[];
 }
 

@@ -3,7 +3,7 @@
 const PREFIXES = ["y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"];
 
 /** Units written with a prefix; others, such as A m² and rad/s, get a power of ten. */
-const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "kg", "C", "T"]);
+const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "kg", "C", "T", "Pa"]);
 
 /** A number with at most `count` digits: 0.001234, 1.234×10⁻⁷, −12.3; null stands for NaN, as in JSON. */
 export function digits(value: number | null, count = 4): string {

@@ -8,7 +8,7 @@ import { digits, prefixed, quantity } from "../data/units";
 import { h } from "./dom";
 import { button } from "./icons";
 
-type Row = [name: string, value: string];
+type Row = [name: string, value: string, hint?: string];
 
 export type Table = [title: string, rows: Row[]];
 
@@ -48,17 +48,18 @@ export function grainRows(i: number, frame: Frame, dataset: Dataset): Row[] {
 }
 
 export function contactRows(c: number, frame: Frame, dataset: Dataset): Row[] {
+  const { hints } = dataset.manifest;
   const [i, j] = [frame.pair[2 * c], frame.pair[2 * c + 1]];
   const normal = normalForce(frame, c, dataset.manifest.periodic);
   const [mode, share] = limitingMode(frame, c);
   const rows: Row[] = [
     ["grains", `${i} and ${j}`],
-    ["overlap", quantity(frame.overlap[c], "m")],
+    ["overlap", quantity(frame.overlap[c], "m"), hints.overlap],
     ["first touch", quantity(frame.formed[c], "s")],
     ["normal force", `${quantity(normal, "N")}${normal < 0 ? " (pull)" : normal > 0 ? " (push)" : ""}`],
     ["force", magnitudeAndComponents(vector(frame.force, c), "N")],
   ];
-  MODES.forEach((name, m) => rows.push([`${name} / limit`, digits(frame.share[4 * c + m], 3)]));
+  MODES.forEach((name, m) => rows.push([`${name} / limit`, digits(frame.share[4 * c + m], 3), hints[`${name}_share`]]));
   if (mode >= 0) rows.push(["closest to limit", `${MODES[mode]}, ${digits(share, 3)}`]);
   return rows;
 }
@@ -127,7 +128,9 @@ export class Inspector {
   show(tables: Table[]): void {
     this.element.hidden = tables.length === 0;
     const elements = tables.map(([title, rows]) => {
-      const body = rows.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)));
+      const body = rows.map(([name, value, title]) => (
+        h("tr", { title }, h("th", { scope: "row" }, name), h("td", {}, value))
+      ));
       return h("table", {}, h("caption", {}, title), h("tbody", {}, ...body));
     });
     this.content.replaceChildren(...elements);

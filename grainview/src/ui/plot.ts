@@ -1,39 +1,26 @@
 // Plots over time below the time line; a cursor marks the time of the frame shown.
 
 import uPlot from "uplot";
-import type { Plot, Series } from "../data/types";
-import { digits, prefixed } from "../data/units";
+import { type Axis, axisOf } from "../data/axis";
+import type { Line, Plot, Series } from "../data/types";
+import { prefixed } from "../data/units";
 import { h } from "./dom";
 
-/** Values of the lines; on a logarithmic axis magnitudes without zeros. */
-function drawable(plot: Plot): (number | null)[][] {
-  return plot.lines.map((line) => (plot.log ? line.values.map((v) => (v ? Math.abs(v) : null)) : line.values));
-}
+/** Pixels between ticks of the vertical axis, about; height of what lies below the plotted area. */
+const [SPACING, BELOW] = [20, 44];
 
-function largest(lines: (number | null)[][]): number {
-  let max = 0;
-  for (const line of lines) for (const v of line) max = Math.max(max, Math.abs(v ?? 0));
-  return max;
-}
-
-/** Labels of an axis; on a logarithmic one at most six powers of ten, with multiples of 2 and 5 below three powers. */
-function labels(ticks: number[], log: boolean): string[] {
-  if (!log) return ticks.map((v) => digits(v, 3));
-  const power = (v: number): number | null => {
-    const exponent = Math.log10(v);
-    return v > 0 && Math.abs(exponent - Math.round(exponent)) < 1e-6 ? Math.round(exponent) : null;
-  };
-  if (ticks.filter((v) => power(v) !== null).length < 3) {
-    const round = (v: number): boolean => /^[125]e/.test(Number(v.toPrecision(6)).toExponential());
-    return ticks.map((v) => (v && round(v) ? digits(v, 3) : "")); // uPlot sets some of the values to null
-  }
-  const step = Math.ceil(ticks.filter((v) => power(v) !== null).length / 6);
-  return ticks.map((v) => ((power(v) ?? 0.5) % step === 0 ? digits(v, 3) : ""));
+/** The largest magnitude of all values. */
+function largest({ lines }: Plot): number {
+  return lines.reduce((max, line) => line.values.reduce<number>((top, v) => Math.max(top, Math.abs(v ?? 0)), max), 0);
 }
 
 export class LinkedPlot {
   readonly element = h("div", { class: "gv-plot", role: "img", "aria-label": "Plot" });
   private chart: uPlot | null = null;
+  /** The vertical axis of the plot shown. */
+  axis: Axis | null = null;
+  /** Title and legend, above the chart. */
+  private readonly head = h("div", { class: "gv-plot-head" });
   private time = 0;
   private content: { plot: Plot; series: Series; dark: boolean } | null = null;
   private readonly cursorLine = h("div", { class: "gv-cursor" });
@@ -59,31 +46,43 @@ export class LinkedPlot {
     const { series, plot, dark } = this.content;
     const ink = dark ? "#c9c7c1" : "#4a4f57";
     const grid = { stroke: dark ? "#2a2f3a" : "#e4e2dc", width: 1 };
+    const colourOf = (line: Line): string => (dark ? line.dark : line.light);
     const [factor, unit] = this.timeUnit();
-    const lines = drawable(plot);
-    const [size, name] = plot.log ? [1, plot.unit] : prefixed(largest(lines), plot.unit);
-    const scaled = lines.map((line) => line.map((v) => (v === null ? null : v / size)));
-    const data = [series.time.map((t) => t / factor), ...scaled] as uPlot.AlignedData;
-    const label = name ? `${plot.title} (${name})` : plot.title;
+    const [size, name] = plot.axis === "linear" ? prefixed(largest(plot), plot.unit) : [1, plot.unit];
+    const lines = plot.lines.map((line) => ({ ...line, values: line.values.map((v) => (v === null ? v : v / size)) }));
+    this.head.replaceChildren(h("span", { class: "gv-plot-title" }, name ? `${plot.title} (${name})` : plot.title));
+    this.element.append(this.head);
+    const tall = height - this.head.offsetHeight;
+    const axis = (this.axis = axisOf({ ...plot, lines }, Math.max((tall - BELOW) / SPACING, 2)));
+    // uPlot is told places from 0 to 1: its own ticks of small numbers do not end (of 1.0000000000000001e-24, say)
+    const span = axis.high / 2 - axis.low / 2;
+    const share = (place: number | null): number | null => (place === null ? null : (place / 2 - axis.low / 2) / span);
+    const shares = lines.map((line) => line.values.map((v) => share(axis.place(v))));
+    const data = [series.time.map((t) => t / factor), ...shares] as uPlot.AlignedData;
     const style = { stroke: ink, grid, ticks: grid, font: "11px system-ui", labelFont: "11px system-ui" };
+    const ticks = { splits: axis.ticks.map((tick) => share(tick.place) ?? 0), values: axis.ticks.map((t) => t.label) };
     this.chart?.destroy();
     this.chart = new uPlot(
       {
         width,
-        height,
-        legend: { show: true, live: false },
+        height: tall,
+        padding: [8, 14, 0, 0],
+        legend: {
+          show: true, live: false, mount: (_, table) => this.head.append(table),
+          markers: { width: 0, fill: (_, k) => colourOf(plot.lines[k - 1]) },
+        },
         hooks: { ready: [() => this.moveTo(this.time)] }, // only then the chart has a size
         cursor: { show: false },
-        scales: { x: { time: false }, y: { distr: plot.log ? 3 : 1 } },
+        scales: { x: { time: false }, y: { range: [0, 1] } },
         axes: [
-          { ...style, label: `time (${unit})`, size: 32, labelSize: 16 },
-          { ...style, label, size: 64, labelSize: 18, values: (_: uPlot, ticks: number[]) => labels(ticks, plot.log) },
+          { ...style, label: `time (${unit})`, size: 28, labelSize: 16 },
+          { ...style, size: 64, splits: () => ticks.splits, values: () => ticks.values },
         ],
         series: [
           {},
           ...plot.lines.map((line) => ({
             label: line.label,
-            stroke: dark ? line.dark : line.light,
+            stroke: colourOf(line),
             width: 1.6,
             points: { show: series.time.length < 3 },
           })),
@@ -92,6 +91,9 @@ export class LinkedPlot {
       data,
       this.element,
     );
+    this.head.querySelectorAll<HTMLElement>(".u-series").forEach((row, k) => {
+      row.title = [plot.lines[k].hint, "click: show or hide"].filter(Boolean).join("; ");
+    });
     this.element.append(this.cursorLine);
   }
 

@@ -12,6 +12,19 @@ from ..basics.errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..basics.state import DAMPING, LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
+LOSS_TEXTS = {name: f"dissipated by {name} beyond the limit" for name in ("sliding", "rolling", "twisting")} | {
+    **dict.fromkeys(DAMPING, "dissipated by the dashpots of the four modes of contacts"),
+    "forming": "dissipated when contacts formed",
+    "breaking": "dissipated when contacts broke, including the energy stored in their springs",
+    "stiffness": "removed from the springs by stiffnesses that follow the contact radius; may be negative",
+    "settling": "removed from the motion of grains relative to the rigid motion of their cluster",
+    "gas": "transferred to the gas by drag and random kicks; negative if the gas heats or drives the grains",
+    "outside": "work done on the sources of external forces, if fields change or grains cross periodic boundaries, "
+    "and of the user, by ramps, changes and driven grains; negative if the sources supplied energy",
+    "cutoff_changed": "energy removed by longer cut-offs of dipoles",
+    "quieting": "removed from vibrations of clusters that came to rest",
+}
+"""What each loss of LOST is, as docs/reference/ledger.md begins to say it."""
 DAMPED = tuple(f"lost_{name}" for name in DAMPING)
 ALWAYS_LOST = (
     *("lost_forming", "lost_breaking", "lost_sliding", "lost_rolling", "lost_twisting"),

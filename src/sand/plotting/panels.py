@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
-from ..analysis.ledger_columns import AWAKE, LOSSES
+from ..analysis.ledger_columns import AWAKE, LOSS_TEXTS, LOSSES
 from ..basics.constants import BOLTZMANN
 from ..basics.state import DAMPING, LOST
 from ..io.ledger_table import TEMPERATURES
@@ -152,6 +152,11 @@ def energies_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
     return {name: (values, colour[name]) for name, values in drawn.items()}
 
 
+def loss_text(channel: str) -> str:
+    """What a loss channel is, in words: the meanings of its ledger columns."""
+    return "; ".join(dict.fromkeys(LOSS_TEXTS[name.removeprefix("lost_")] for name in LOSS_CHANNELS[channel]))
+
+
 def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
     """Magnitudes of all losses [J] for a logarithmic axis, NaN for 0, with their colours.
 
@@ -218,8 +223,7 @@ def draw_temperatures(axes: Axes, ledger: Any, time: AxisUnit) -> None:
         return
     for values, (label, colour) in zip(drawn, TEMPERATURE_LINES, strict=True):
         axes.plot(t, np.where(values > 0.0, values, np.nan), color=colour, label=label, **_markers(t))
-    lowest = min(float(np.min(values, where=values > 0.0, initial=top)) for values in drawn)
-    axes.set(yscale="log", ylim=(max(lowest / 1.3, top * 10.0**-DECADES), 1.3 * top))
+    axes.set(yscale="log", ylim=(log_bottom(drawn), 1.3 * top))
     log_ticks(axes, plain=True)
     legend_above(axes)
 
@@ -251,8 +255,7 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
     drawn = {name: v for name, v in channels.items() if peak(v[0]) > top * 10.0**-DECADES}
     for name, (size, colour) in drawn.items():
         axes.plot(t, size, color=colour, label=CHANNEL_LABELS.get(name, name), **_markers(t))
-    smallest = min(float(np.nanmin(size)) for size, _ in drawn.values())
-    axes.set(yscale="log", ylim=(max(smallest / 2.0, top * 10.0**-DECADES), top * 2.5))
+    axes.set(yscale="log", ylim=(log_bottom([size for size, _ in drawn.values()], 2.0), top * 2.5))
     zero = [name for name, (size, _) in channels.items() if not peak(size) and name not in OPTIONAL_CHANNELS]
     small = [name for name, (size, _) in channels.items() if name not in drawn and peak(size)]
     notes = [
@@ -328,17 +331,32 @@ def _no_data(axes: Axes, text: str) -> None:
     axes.set_yticks([])
 
 
+def linear_below(curves: list[np.ndarray]) -> float | None:
+    """Magnitude below which a symmetric logarithmic axis of these curves is linear.
+
+    A power of ten below the smallest peak, but at least below 10^-DECADES of the largest; None if the peaks of all
+    curves but zeros are within a factor of 30, for which a linear axis does.
+    """
+    peaks = [size for size in map(peak, curves) if size] or [1.0]
+    least, top = min(peaks), max(peaks)
+    return None if least > top / 30.0 else float(10.0 ** np.floor(np.log10(max(least, top * 10.0**-DECADES))))
+
+
+def log_bottom(curves: list[np.ndarray], margin: float = 1.3) -> float:
+    """Lower end of a logarithmic axis, this factor below the smallest number above 0; at most DECADES are shown."""
+    top = max(map(peak, curves), default=0.0)
+    smallest = min((float(np.min(values, where=values > 0.0, initial=top)) for values in curves), default=top)
+    return max(smallest / margin, top * 10.0**-DECADES)
+
+
 def scale_values(axes: Axes, curves: list[np.ndarray]) -> None:
-    """Scale the axis linearly if the peaks of all curves are within a factor of 30, otherwise as symlog."""
-    peaks = [peak(values) for values in curves]
-    top = max(peaks)
-    if min(peaks) > top / 30.0:
+    """Scale the axis linearly or as symlog, see `linear_below`."""
+    linear = linear_below(curves)
+    if linear is None:
         axes.margins(y=0.08)
         axes.yaxis.set_major_locator(MaxNLocator(5))
         axes.yaxis.set_major_formatter(_tick_label)
         return
-    # The axis is linear below the smallest peak, but at least below 10^-DECADES of the largest.
-    linear = 10.0 ** np.floor(np.log10(max(min(peaks), top * 10.0**-DECADES)))
     high = max(2.5 * max(peak(np.maximum(values, 0.0)) for values in curves), 0.3 * linear)
     low = max(2.5 * max(peak(np.minimum(values, 0.0)) for values in curves), 0.3 * linear)
     decades = sum(np.log10(max(side / linear, 1.0)) for side in (high, low))

@@ -19,11 +19,12 @@ from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
+from ..simulation.contact_table import COLUMNS
 from .by_identity import ByIdentity
 from .dimensions import fit_dimension
 from .packets import frame_bytes, frame_packet, grains_packet
 from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, stale_note
-from .series import quantity_ranges, series_from_frames, series_from_ledger
+from .series import PERCENTILE_LIMITS, PERCENTILES, quantity_ranges, series_from_frames, series_from_ledger
 
 if TYPE_CHECKING:
     from .external_field import FieldDescription
@@ -171,6 +172,8 @@ class RunDataset:
                 "periodic": self.periodic,
                 "field": self._field_entry(numbers),
                 "ranges": self.ranges(),
+                "percentiles": {"limits": PERCENTILE_LIMITS, "of": PERCENTILES},
+                "hints": {name: text for name, _, text in COLUMNS},
                 "palettes": palettes(),
                 "colours": colours() | {"named": self._largest_clusters()},
                 "dimensions": None,

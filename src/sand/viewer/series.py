@@ -20,6 +20,9 @@ from ..plotting.panels import (
     column,
     energies_drawn,
     has_temperatures,
+    linear_below,
+    log_bottom,
+    loss_text,
     losses,
     losses_drawn,
     peak,
@@ -32,11 +35,12 @@ MAX_COUNTED = 20_000_000
 """Grains × frames whose clusters are counted if there is no ledger."""
 SAMPLED_FRAMES = 12
 """Number of frames, spread evenly over the run, from which ranges are computed."""
-PERCENTILES = ("speed", "spin", "kinetic_energy", "pressure")
-"""Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
-EXTREMES = ("size", "radius", "coordination", "moment", "load")
-"""Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""
-PERCENTILE_LIMITS = (1.0, 99.9)
+PERCENTILES = ("speed", "spin", "kinetic_energy", "pressure", "load")
+"""Quantities whose range leaves out outliers: PERCENTILE_LIMITS of all values that are not 0."""
+EXTREMES = ("size", "radius", "coordination", "moment")
+"""Quantities whose range goes from the smallest to the largest value; of `moment`, the magnitude."""
+PERCENTILE_LIMITS = (2.0, 98.0)
+"""A touch gives some contacts and grains a hundred times the usual load."""
 
 
 def evenly_spaced(count: int, most: int = MAX_POINTS) -> np.ndarray:
@@ -87,43 +91,40 @@ def series_from_frames(frames: Any, grains: int) -> dict[str, Any]:
 
 def _clusters(ledger: Any) -> dict[str, Any]:
     lines = [_line(label, colour, ledger[name]) for name, (label, colour, _) in CLUSTERS.items()]
-    return _plot("clusters", "Clusters", lines, log=True)
+    return _plot("clusters", "Clusters", lines, axis="log")
 
 
 def _awake(ledger: LedgerColumns) -> dict[str, Any]:
-    return _plot(
-        "awake",
-        "Awake grains",
-        [_line("grains of awake clusters (contact steps)", RED, column(ledger, AWAKE))],
-    )
+    label = "grains of awake clusters (contact steps)"
+    return _plot("awake", "Awake grains", [_line(label, RED, column(ledger, AWAKE))])
 
 
 def _temperatures(ledger: LedgerColumns) -> dict[str, Any]:
     drawn = zip(TEMPERATURES, TEMPERATURE_LINES, strict=True) if has_temperatures(ledger) else ()
     lines = [_line(label, colour, column(ledger, name)) for name, (label, colour) in drawn]
-    return _plot("temperatures", "Temperatures of bodies", lines, "K", log=True)
+    return _plot("temperatures", "Temperatures", lines, "K", "log")
 
 
 def _pressures(ledger: LedgerColumns) -> dict[str, Any]:
     """Of runs with `stress`."""
     named = {"pressure": TEXT_COLOUR, "pressure_xx": BLUE, "pressure_yy": SKY, "pressure_zz": RED}
     lines = [_line(name.replace("_", " "), colour, ledger[name]) for name, colour in named.items()]
-    return _plot("pressure", "Pressure", lines, "Pa")
+    return _plot("pressure", "Pressure", lines, "Pa", "symlog")
 
 
 def _energies(ledger: LedgerColumns) -> dict[str, Any]:
     lines = [_line(name, colour, values) for name, (values, colour) in energies_drawn(ledger).items()]
-    return _plot("energies", "Energies", lines, "J")
+    return _plot("energies", "Energies", lines, "J", "symlog")
 
 
 def _losses(ledger: LedgerColumns) -> dict[str, Any]:
     signed = losses(ledger)  # the page draws magnitudes, and tells losses from gains
     lines = [
-        _line(CHANNEL_LABELS.get(name, name), colour, np.copysign(size, signed[name]))
+        _line(CHANNEL_LABELS.get(name, name), colour, np.copysign(size, signed[name]), loss_text(name))
         for name, (size, colour) in losses_drawn(ledger).items()
         if peak(size)
     ]
-    return _plot("losses", "Losses", lines, "J", log=True)
+    return _plot("losses", "Losses", lines, "J", "log")
 
 
 def _contacts(ledger: LedgerColumns) -> dict[str, Any]:
@@ -153,12 +154,16 @@ def _events(ledger: LedgerColumns) -> dict[str, Any]:
     }
 
 
-def _plot(key: str, title: str, lines: list[dict[str, Any]], unit: str = "", log: bool = False) -> dict[str, Any]:
-    return {"id": key, "title": title, "unit": unit, "log": log, "lines": lines}
+def _plot(key: str, title: str, lines: list[dict[str, Any]], unit: str = "", axis: str = "linear") -> dict[str, Any]:
+    """A plot; `axis` is "linear", "log" (of magnitudes), or "symlog" if `linear_below` says so, as in figures."""
+    drawn = [np.abs(np.array(line["values"], float)) for line in lines]
+    least = {"log": log_bottom, "symlog": linear_below}[axis](drawn) if axis != "linear" else None
+    scale = {"axis": "linear" if least is None else axis, "least": least}
+    return {"id": key, "title": title, "unit": unit, **scale, "lines": lines}
 
 
-def _line(label: str, colour: str, values: np.ndarray) -> dict[str, Any]:
-    return {"label": label, "light": colour, "dark": ON_DARK[colour], "values": _json_numbers(values)}
+def _line(label: str, colour: str, values: np.ndarray, hint: str = "") -> dict[str, Any]:
+    return {"label": label, "hint": hint, "light": colour, "dark": ON_DARK[colour], "values": _json_numbers(values)}
 
 
 def _json_numbers(values: np.ndarray, digits: int = 7) -> list[float | None]:
@@ -196,7 +201,8 @@ def _magnitudes(frame: Any, name: str) -> np.ndarray:
 
 
 def _range(values: np.ndarray, name: str) -> list[float]:
+    low, high = PERCENTILE_LIMITS if name in PERCENTILES else (0.0, 100.0)
+    values = values[values != 0.0] if name in PERCENTILES else values  # grains without contacts have no pressure
     if not values.size:
         return [0.0, 0.0]
-    low, high = PERCENTILE_LIMITS if name in PERCENTILES else (0.0, 100.0)
     return [float(np.percentile(values, low, method="lower")), float(np.percentile(values, high, method="higher"))]
