@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from sand.basics.box import Box
+
 from .driving import Driven, served
-from .small_runs import SmallRun
+from .small_runs import R, SmallRun, grains, written
 
 SCREENS = {"desktop": (1280, 800), "phone": (390, 844), "phone on its side": (844, 390)}
 CORNERS = """[-1, 1].flatMap((x) => [-1, 1].flatMap((y) => [-1, 1].map((z) =>
@@ -71,6 +73,32 @@ def test_the_box_fits_and_nothing_is_covered(first):
                 b["y"] >= a["y"] + a["height"] - 1,
             ]
             assert any(apart), (a, b)
+
+
+@pytest.mark.parametrize(("side", "aims"), [(60.0, False), (1500.0, True)])
+def test_the_largest_cluster_where_the_box_would_not_show_it(page, tmp_path, side, aims):
+    """A row of four grains in a box of this many radii: the whole box, or the row if it had under 12 pixels there.
+
+    Told by a note then; `r` shows the whole box, in which the row is that small.
+    """
+    row = np.column_stack([2.0 * np.arange(4) - 3.0, np.zeros(4), np.zeros(4)])
+    pairs = np.column_stack([np.arange(3), np.arange(1, 4)])
+    with served(written(tmp_path / "row", [(grains(row), pairs)], Box.periodic(side * R))) as server:
+        view = Driven(page, server.url, bare=True)
+        first, note = view.look(), view.tab.locator(".gv-note")
+        assert note.is_visible() == aims
+        view.press("r")
+        whole = view.look()
+        assert np.allclose(first["from"], whole["from"], atol=1e-4)
+        assert (first["height"] == pytest.approx(whole["height"], rel=1e-3, abs=0.0)) == (not aims)
+        ends = np.array([view.pixel_of(0), view.pixel_of(3)])
+        assert (np.linalg.norm(ends[1] - ends[0]) < 12.0) == aims
+        if aims:
+            assert "Press r for the whole box" in note.inner_text()
+            view.run("app.camera.showFirst(app.selection.largestCluster(), app.page.canvas.clientHeight)")
+            view.settle()
+            ends = np.array([view.pixel_of(0), view.pixel_of(3)])
+            assert np.linalg.norm(ends[1] - ends[0]) > 100.0
 
 
 def test_an_address_with_settings_is_not_changed(page, address):

@@ -7,8 +7,8 @@ import base64
 import numpy as np
 import pytest
 
-from .driving import Driven, differ, image
-from .small_runs import FRAMES, GRAINS, MERGED, PARTED, STEP
+from .driving import Driven, differ, image, served
+from .small_runs import FRAMES, GRAINS, MERGED, PARTED, STEP, SmallRun
 
 
 def drag(view: Driven, start: tuple[float, float], by: tuple[float, float], button: str = "left") -> None:
@@ -58,6 +58,22 @@ def test_ticks_are_where_events_are(view, theme):
     assert view.text(".gv-time").endswith("contacts: 1 formed")
     view.put(frame=PARTED)
     assert view.text(".gv-time").endswith("1 broken")
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [(MERGED, []), (MERGED + 1, ["contacts formed"]), (FRAMES, ["contacts formed", "contacts broken"])],
+)
+def test_the_key_of_the_ticks(page, bundle, tmp_path, frames, words):
+    """Says what the ticks are, of the kinds that there are, each beside its colour."""
+    with served(SmallRun(tmp_path / "small", frames).folder) as server:
+        view = Driven(page, server.url)
+        assert view.tab.locator(".gv-ticks-key span").all_inner_texts() == words
+        for kind in ("made", "broken")[: len(words)]:
+            colour = "(e) => getComputedStyle(e, '::before').backgroundColor"
+            shown = view.tab.locator(f".gv-ticks-key .gv-{kind}").evaluate(colour)
+            wanted = view.run("getComputedStyle(app.timeline.ticks).getPropertyValue('--gv-' + told[0])", kind)
+            assert shown == f"rgb({', '.join(str(int(wanted[k : k + 2], 16)) for k in (1, 3, 5))})"
 
 
 def test_the_cursor_of_the_plot_is_the_time(view):

@@ -16,6 +16,7 @@ import click
 import pytest
 
 import sand
+from sand.analysis.ledger_columns import LOSS_TEXTS
 from sand.config.case import Case, MaterialSection
 from sand.config.sections import INTEGRATORS
 from sand.config.template import keys_of
@@ -33,6 +34,17 @@ PACKAGES = ("setup", "theory", "analysis", "experiments", "io")
 def text() -> str:
     """All pages."""
     return "\n".join(page.read_text("utf-8") for page in sorted(PAGES.iterdir()) if page.suffix in (".md", ".rst"))
+
+
+def test_words_on_losses_are_those_of_the_ledger():
+    """Each row `lost_…` begins with the words that the page shows for it, without its links."""
+    rows = re.findall(r"^\| (`lost_.*?) \| J \| (.*?) \|$", (PAGES / "ledger.md").read_text("utf-8"), re.MULTILINE)
+    meaning = {
+        name: re.sub(r"\[(.*?)\]\(.*?\)", r"\1", text) for names, text in rows for name in re.findall("`(.*?)`", names)
+    }
+    assert meaning.keys() == {f"lost_{name}" for name in LOSS_TEXTS}
+    for name, words in LOSS_TEXTS.items():
+        assert meaning[f"lost_{name}"].startswith(words), name
 
 
 def public(module):

@@ -42,6 +42,8 @@ KEYS = [
     "periodic",
     "field",
     "ranges",
+    "percentiles",
+    "hints",
     "palettes",
     "colours",
     "dimensions",

@@ -1,12 +1,16 @@
 """Time series for the page: the ledger's columns, thinned."""
 
 import json
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sand.analysis.ledger_columns import LedgerColumns
+from sand.plotting.panels import linear_below, log_bottom
+from sand.viewer import series as of_page
 from sand.viewer.dataset import run_dataset
-from sand.viewer.series import MAX_POINTS, evenly_spaced, series_from_ledger
+from sand.viewer.series import MAX_POINTS, evenly_spaced, quantity_ranges, series_from_ledger
 
 from ..synthetic_trajectories import write_trajectory
 
@@ -29,6 +33,10 @@ def test_series_are_the_ledgers(finished_run):
     for label, lost in plots["losses"].items():  # a logarithmic axis cannot show 0
         name = {"external": "outside"}.get(label, label)
         assert [v is None for v in lost] == [v == 0.0 for v in sim.ledger[f"lost_{name}"]]
+    scales = {plot["id"]: (plot["axis"], plot["least"]) for plot in series["plots"]}
+    assert scales["losses"][0] == scales["clusters"][0] == "log" and scales["balance"] == ("linear", None)
+    top = max(abs(v) for lost in plots["losses"].values() for v in lost if v)
+    assert scales["losses"][1] >= 1e-6 * top  # six decades are shown
     for plot in series["plots"]:
         assert all(len(line["values"]) == len(series["time"]) for line in plot["lines"])
         assert all(line[ground].startswith("#") for line in plot["lines"] for ground in ("light", "dark"))
@@ -60,3 +68,31 @@ def test_without_a_ledger(tmp_path):
     assert plots["clusters"]["mean size S = Σs²/Σs"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
     series_points = dataset.manifest()
     assert not series_points["running"] and series_points["outcome"] is None and series_points["name"] == "a"
+
+
+def test_axes_show_all_curves():
+    """Symmetric logarithmic from a factor of 30 between peaks, linear below a power of ten; zeros count for nothing.
+
+    A logarithmic axis begins a factor of 1.3 below the smallest number, but shows six decades at most.
+    """
+    zero, small, large = np.zeros(3), np.array([0.0, 2e-18, -1e-18]), np.array([0.0, -6e-15, -1e-15])
+    assert linear_below([zero, small, large]) == pytest.approx(1e-18, rel=1e-12, abs=0)
+    assert linear_below([zero, 29 * large, large]) is None and linear_below([31 * large, large]) is not None
+    assert linear_below([large, 1e-20 * large]) == pytest.approx(1e-21, rel=1e-12, abs=0)
+    assert linear_below([]) is None and linear_below([zero]) is None
+    assert log_bottom([np.array([np.nan, 0.0, 2.0]), np.array([1.0, 5.0])]) == pytest.approx(1 / 1.3, rel=1e-12, abs=0)
+    assert log_bottom([np.array([2e-27, 3e-15])]) == pytest.approx(3e-21, rel=1e-12, abs=0)
+    assert log_bottom([]) == log_bottom([zero]) == 0.0
+
+
+def test_an_outlier_does_not_set_the_range(monkeypatch):
+    """One contact in a hundred with a thousand times the pressure: the range is that of the others, of those pressed.
+
+    Of 97 numbers from 1 to 2 Pa, one of 1000 Pa and 300 zeros, the 98th percentile of what is not zero is below 2 Pa.
+    """
+    values = np.concatenate([np.linspace(1.0, 2.0, 97), [-1000.0], np.zeros(300)])
+    monkeypatch.setattr(of_page, "measured", lambda frame, name: values)
+    ranges = quantity_ranges([SimpleNamespace(own={}, moment=np.zeros((2, 3)))])
+    for name in ("pressure", "load", "speed"):
+        assert ranges[name][1] == 2.0 and 1.0 <= ranges[name][0] < 1.1
+    assert ranges["size"] == [0.0, 1000.0]
