@@ -25,10 +25,10 @@ FILMED = quoted.TOP / "examples" / "gallery" / "collisions" / "energy_of_a_colli
 """Script of the run in the film, which has its files in the folder `impact`."""
 HOW_FILMED = "--size 480x320 --fps 6 --frames :51:3 --settings theme=light&bonds=off --overwrite"
 """17 frames, until the pieces have parted: below 300 kB."""
-WINDOW = {"width": 1200, "height": 640}
+WINDOW = {"width": 1200, "height": 720}
 """Of the browser, in pixels."""
-SURROUNDINGS = 1.15
-"""Height of the view over that at which the cluster fills it."""
+KEYS = ("Z", *"[[[[[[")
+"""The largest cluster broadside; smaller grains, so that contacts and arrows are seen."""
 
 
 class Broadside(NamedTuple):
@@ -36,17 +36,11 @@ class Broadside(NamedTuple):
 
     Attributes:
         rank: by size, as `sand plot --cluster` counts; 1 is the largest.
-        grain: one of its grains.
-        grains: their number.
         shortest: direction of its shortest axis, towards the eye.
-        middle: direction of its middle axis, upwards.
     """
 
     rank: int
-    grain: int
-    grains: int
     shortest: np.ndarray
-    middle: np.ndarray
 
 
 def broadside(frame: Any) -> Broadside:
@@ -56,27 +50,24 @@ def broadside(frame: Any) -> Broadside:
     ranked = np.argsort(-np.bincount(labels), kind="stable")
     members = [np.flatnonzero(labels == k) for k in ranked if np.sum(labels == k) > 1]
     widest = int(np.argmax([gyration_radius(whole[body]) for body in members]))
-    axes = np.linalg.eigh(gyration_tensor(whole[members[widest]]))[1]
-    shortest, middle = (axis if axis[2] > 0.0 else -axis for axis in axes.T[:2])
-    return Broadside(widest + 1, int(members[widest][0]), len(members[widest]), shortest, middle)
+    shortest = np.linalg.eigh(gyration_tensor(whole[members[widest]]))[1][:, 0]
+    return Broadside(widest + 1, shortest if shortest[2] > 0.0 else -shortest)
 
 
 def draw(folder: Path, top: Path, environment: Mapping[str, str]) -> int:
-    """Draw both pictures of a run; number of grains of the cluster in them.
+    """Draw both pictures of a run; number of grains of the largest cluster, which that of the page shows.
 
     Args:
         folder: of the run.
         top: a folder for files on the way.
         environment: of the command that draws the still.
     """
-    frames = sand.open(folder).frames
-    seen = broadside(frames[-1])
+    seen = broadside(sand.open(folder).frames[-1])
     view = ",".join(f"{x:.1f}" for x in seen.shortest)
     words = ["--what", "still", "--cluster", str(seen.rank), f"--view={view}", "--perspective", "--size", "1200x520"]
     ran([*start_up.SAND, "plot", str(folder), *words, "--out", str(top / "plots")], env=dict(environment))
     shutil.copyfile(top / "plots" / "still.png", STILL)
-    page(folder, len(frames) - 1, seen, PAGE)
-    return seen.grains
+    return page(folder, PAGE)
 
 
 def film(top: Path, environment: Mapping[str, str]) -> None:
@@ -91,23 +82,17 @@ def film(top: Path, environment: Mapping[str, str]) -> None:
     ran([*start_up.SAND, "view", str(top / "impact"), *words], env=dict(environment))
 
 
-def page(folder: Path, frame: int, seen: Broadside, target: Path) -> None:
-    """A picture of the page of `sand view` with a cluster broadside, without the settings; needs a Chromium."""
+def page(folder: Path, target: Path) -> int:
+    """A picture of the page of `sand view` after the keys of README, KEYS; grains of the cluster; needs a Chromium."""
     from playwright.sync_api import sync_playwright
     from tests.browser.chromium import FLAGS, find
     from tests.browser.driving import Driven, served
 
     with sync_playwright() as playwright, served(folder, None) as server:
         browser = playwright.chromium.launch(executable_path=find(), headless=True, args=list(FLAGS))
-        tab = Driven(
-            browser.new_page(viewport=WINDOW), f"{server.url}#frame={frame}&grain={seen.grain}&isolate=1", bare=True
-        )
-        tab.run("app.camera.lookAlong(told[0], told[1])", seen.shortest.tolist(), seen.middle.tolist())
-        tab.press("z")  # the cluster fills the window
-        eye = tab.look()
-        look = [*eye["target"], *eye["from"], *eye["up"], SURROUNDINGS * eye["height"]]
-        look = ",".join(f"{x:.5g}" for x in look)
-        tab.open(f"{server.url}#frame={frame}&theme=light&bonds=load&size=0.75&box=0&look={look}")
-        tab.press("`")  # closes the settings
+        tab = Driven(browser.new_page(viewport=WINDOW), server.url, bare=True)
+        tab.press(*KEYS)
         tab.tab.screenshot(path=target)
+        grains = tab.run("app.selection.largestCluster().reduce((sum, one) => sum + one)")
         browser.close()
+    return int(grains)
