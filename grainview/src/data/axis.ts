@@ -18,8 +18,9 @@ export interface Axis {
 const MARGIN = 0.06;
 /** Relative differences up to which values count as one, so that labels of twelve digits differ. */
 const ROUNDING = 1e-9;
-/** Powers of ten on an axis up to which ticks are at 1, 2 and 5 times, or at 1 and 3 times, powers of ten. */
-const [VERY_FEW, FEW] = [1.5, 2.5];
+/** Powers of ten on an axis up to which ticks are also at multiples of them, the first of these that have room. */
+const FEW = 2.5;
+const FACTORS = [[1, 2, 3, 4, 5, 6, 8], [1, 2, 3, 5], [1, 2, 5], [1, 3], [1]];
 
 /** Multiples of a round number between two values, at most `room` + 1 of them. */
 function multiples(low: number, high: number, room: number): number[] {
@@ -75,10 +76,13 @@ function logarithmic(values: number[], least: number, room: number): Axis {
     const ticks = exponents(low, high, room).map((n) => ({ place: n, label: powerText(10 ** n) }));
     return { place, low, high, ticks };
   }
-  const [from, to, factors] = [10 ** low, 10 ** high, high - low > VERY_FEW ? [1, 3] : [1, 2, 5]];
-  const round = exponents(low - 1, high, 8).flatMap((n) => factors.map((m) => Number((m * 10 ** n).toPrecision(6))))
-    .filter((v) => v >= from && v <= to);
-  const ticks = round.length > 2 ? round : multiples(from, to, room).filter((v) => v > 0);
+  const [from, to] = [10 ** low, 10 ** high];
+  const sets = FACTORS.map((factors) => (
+    exponents(low - 1, high, 8).flatMap((n) => factors.map((m) => Number((m * 10 ** n).toPrecision(6))))
+      .filter((v) => v >= from && v <= to)
+  ));
+  const round = sets.find((set) => set.length <= room) ?? [];
+  const ticks = round.length > 1 ? round : multiples(from, to, room).filter((v) => v > 0);
   const labels = labelsOf(ticks);
   return { place, low, high, ticks: ticks.map((v, k) => ({ place: Math.log10(v), label: labels[k] })) };
 }

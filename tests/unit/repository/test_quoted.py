@@ -135,6 +135,13 @@ def test_links_lead_to_files(path):
     assert path.name != "README.md" or pictures.PAGE.relative_to(TOP).as_posix() in dict(links)
 
 
+def test_the_keys_of_the_picture_are_those_that_readme_names():
+    """The picture is made with `Z` and as many `[` as README says in words."""
+    (first, *others), text = pictures.KEYS, (TOP / "README.md").read_text("utf-8")
+    assert set(others) == {"["} and len(others) == 6
+    assert f"after the keys `{first}`" in text and "six times `[`" in text
+
+
 def test_a_changed_figure_is_noticed():
     """Checks the helper of the test before: another number, and another line of a block."""
     time = quoted.quotable()["main_job"]["time"]
