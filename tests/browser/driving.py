@@ -130,6 +130,11 @@ class Driven:
         self.settle()
         return image(base64.b64decode(self.tab.evaluate(CANVAS).split(",")[1]))
 
+    def plotted(self) -> np.ndarray:
+        """Values of the lines of the plot (L, K), from their places on its linear axis."""
+        low, high = self.run("[app.plot.axis.low, app.plot.axis.high]")
+        return low + (high - low) * np.array(self.run("app.plot.chart.data.slice(1)"), dtype=float)
+
     def text(self, selector: str) -> str:
         """Visible text of an element."""
         return self.tab.locator(selector).inner_text()
