@@ -157,7 +157,8 @@ def copied(view: Driven) -> None:
 
 
 def panel_hidden(view: Driven) -> None:
-    assert not view.tab.locator(".gv-panel").is_visible()
+    """Without a selection nothing stays beside the picture, no line at its right edge either."""
+    assert not view.tab.locator(".gv-panel").is_visible() and not view.tab.locator(".gv-side").is_visible()
     view.press("`")
     assert view.tab.locator(".gv-panel").is_visible()
 
