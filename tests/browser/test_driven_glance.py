@@ -134,6 +134,13 @@ def test_the_values_of_a_grain_leave_the_grain_free(page, address, screen):
     assert seen >= GRAINS - 2
 
 
+def test_a_narrow_page_tells_of_the_frame_without_the_settings(page, address):
+    page.set_viewport_size({"width": 400, "height": 840})
+    view = Driven(page, address)
+    assert view.run("app.page.root.classList.contains('gv-panel-hidden')")
+    assert view.run("app.page.glance.getBoundingClientRect().height") > 100.0
+
+
 def test_settings_are_folded(view):
     """Three choices of the picture are there at once, the other groups open by a click or by Enter."""
     folded = view.tab.locator(".gv-panel details").all()
