@@ -11,9 +11,9 @@ from pydantic import Field
 
 from ..basics.arguments import MOST_GRAINS
 from ..basics.grains import Grains
-from ..basics.material import PRESETS, Material
+from ..basics.material import Library, Material
 from ..basics.settings import For, List, Number, Reading, Whole, Word, declared
-from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
+from ..config.case import ForcesSection, MaterialSection, library_of, material_errors, read_content
 from ..config.key_errors import validate
 from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator
 from ..integrate.verlet import Verlet
@@ -124,9 +124,9 @@ class CollisionCase(Section):
     forces: ForcesSection = ForcesSection()
     stepping: Stepping = Verlet()
 
-    def materials_by_name(self) -> dict[str, Material]:
+    def materials_by_name(self) -> Library:
         """Presets and the materials of the case, by name."""
-        return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        return library_of(self.materials)
 
     def approach(self, seed: int) -> Approach:
         """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""

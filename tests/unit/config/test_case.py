@@ -11,6 +11,7 @@ from sand.basics.errors import BadInput
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.config.key_errors import validate
+from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
 from sand.simulation.serialise import case_of
 
@@ -189,3 +190,33 @@ def test_the_first_of_many_mistakes_are_described(content):
         check_case(whole | content, "case")
     assert 100 < len(caught.value.problems) < 220
     assert sum("more errors" in problem for problem in caught.value.problems) == 1
+
+
+def test_case_is_ignored_in_names_of_materials():
+    """Of presets and own materials, of grains, classes, mixtures, walls and bodies, as in Python; a name as it is first.
+
+    A case that a run writes with such a name is read again.
+    """
+    own = {"Dust": {"like": "Silica", "density": 2000.0}, "dust": {"like": "ice", "density": 900.0}}
+    wall = {"material": "SILICA", "point": [0, 0, "-90 nm"], "normal": [0, 0, 1]}
+    for given, name, density in (
+        ("Silica", "silica", 2650.0),
+        ("Dust", "Dust", 2000.0),
+        ("dust", "dust", 900.0),
+        ({"SILICA": 0.5, "Iron": 0.5}, "silica", 2650.0),
+    ):
+        content = changed(grains__material=given, box__periodic=["400 nm", "400 nm", "open"], grains__extent="150 nm")
+        case = check_case(content | {"materials": own, "walls": [wall]}, "case")
+        assert case.components()["walls"][0].material.name == "silica"
+        content["forces"].pop("dipoles")
+        content["grains"]["moment"] = 0.0
+        simulation = simulation_of(check_case(content | {"materials": own}, "case"), None)
+        found = {one.name: one.density for one in simulation.grains.materials}
+        assert found[name] == density
+        again = check_case(case_of(simulation, 1e-9, 1e9, None), "case")
+        assert {one.name for one in simulation_of(again, None).grains.materials} == set(found)
+    body = {"kind": "grain", "radius": "0.1 um", "material": "SILICA"}
+    collision = {"target": body, "projectile": body, "impact": {"speed": 1.0}, "forces": {"contact": {}}}
+    assert CollisionCase.model_validate(collision).approach(0).grains.materials[0].name == "silica"
+    with pytest.raises(BadInput, match="did you mean 'silica'"):
+        check_case(changed(grains__material="Silca"), "case")
