@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.basics.errors import BadInput
+from sand.basics.errors import BadInput, shown
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.config.key_errors import validate
@@ -74,6 +74,34 @@ def test_files_that_are_no_cases(tmp_path, content, part):
     assert len(caught.value.problems) == 1
     assert part in caught.value.problems[0]
     assert str(path) in caught.value.problems[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "advice"),
+    [
+        ("temperature = 50 K", 'a value with a unit needs quotation marks: "50 K"'),
+        ("temperature = 5e1K  # cold", '"5e1K"'),
+        ("moment = 200 A m^2/kg", '"200 A m^2/kg"'),
+        ("periodic = [1.2 um, 1.2 um, 1.2 um]", '"1.2 um"'),
+        ("periodic = [\n  1.2 um,\n]", '"1.2 um"'),
+        ("size = 5 µm", '"5 µm"'),
+        ("material = iron", 'text needs quotation marks: "iron"'),
+        ("material = {silica = 0.5, iron = half}", '"half"'),
+        ("number = 5 # grains\nnumber = 5 # K", None),
+        ('radius = "8 nm" "9 nm"', None),
+        ("radius = 1e-8,", None),
+        ("number = true false", None),
+    ],
+)
+def test_a_syntax_error_shows_its_line(tmp_path, line, advice):
+    """The line as it is in the file, and advice where a value lacks its quotation marks, else none."""
+    path = tmp_path / "some.toml"
+    path.write_text(f"[grains]\nkind = 'gas'\n{line}\n", "utf-8")
+    with pytest.raises(BadInput) as caught:
+        read_case(path)
+    (problem,) = caught.value.problems
+    assert any(shown(one.strip()) in problem for one in line.split("\n")) and "line " in problem
+    assert problem.endswith(advice) if advice else "needs" not in problem
 
 
 def test_an_empty_file_lacks_its_sections():
