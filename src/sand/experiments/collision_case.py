@@ -20,9 +20,8 @@ from ..integrate.verlet import Verlet
 from ..setup.aggregates import KINDS, build
 from ..setup.encounters import offset_of
 from ..setup.from_file import body_from_file
-from ..setup.grain_classes import BODY_FILE
+from ..setup.grain_classes import BODY_FILE, Radii
 from ..setup.moments import MOMENT_MODES
-from ..setup.population import radii_of
 from ..simulation.cadence import FRAMES
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, Ending, approach, prepare, run_to_end
@@ -45,7 +44,7 @@ class BodySection(Section):
     """Number of grains; required except for a grain, a lattice or a file."""
     shape: Annotated[list[int] | None, List(Whole(1, MOST_GRAINS))] = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
-    radius: Annotated[Any, Reading(lambda value, name: radii_of(value))] = None
+    radius: Radii = None
     """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
     radii."""
     material: str = "silica"

@@ -220,8 +220,20 @@ def test_the_first_of_many_mistakes_are_described(content):
     assert sum("more errors" in problem for problem in caught.value.problems) == 1
 
 
+@pytest.mark.filterwarnings("ignore:grain 0 has a radius of")
+def test_grains_above_a_millimetre_have_their_unit(tmp_path):
+    """The case that a run writes has the unit again; a number without one is refused (messages.txt), up to 1 mm not."""
+    for given, radius in (("8 m", 8.0), (["8 m"] * 8, 8.0), ("1.5 mm", 1.5e-3), (1e-3, 1e-3)):
+        case = check_case(changed(grains__radius=given, box__periodic="100 m"), "case")
+        simulation = simulation_of(case, None)
+        again = check_case(case_of(simulation, 1e-9, 1e9, None), "case")
+        assert (simulation_of(again, None).grains.radius == radius).all()
+    grains = sand.setup.gas(2, "100 m", radius=np.array([0.5, 0.6]), material="ice", seed=1)
+    assert sorted(grains.radius) == [0.5, 0.6]
+
+
 def test_case_is_ignored_in_names_of_materials():
-    """Of presets and own materials, of grains, classes, mixtures, walls and bodies, as in Python; a name as it is first.
+    """Of presets and own materials, of grains, classes, mixtures, walls and bodies, as in Python; exact names first.
 
     A case that a run writes with such a name is read again.
     """
