@@ -149,7 +149,7 @@ def did_you_mean(word: str, allowed: Sequence[str], most: int = 1) -> str:
 
 
 def shown(value: Any) -> str:
-    """Short text for a value in a message; arrays are shown by shape, classes by name, a cut one with its last bracket."""
+    """Short text for a value in a message; arrays are shown by shape, classes by name; cut text keeps its bracket."""
     if isinstance(value, type):
         return f"sand.{value.__name__}" if value.__module__.startswith("sand.") else value.__name__
     shape = getattr(value, "shape", None)
