@@ -65,6 +65,7 @@ def run_with_clusters():
             "field": -2e-20,
             "lost_forming": 3e-18 * k,
             "lost_sliding": 1e-22 * k,
+            "lost_settling": 1e-32 * k,
             "total": 1e-19 + 1e-22 * k,
             "clusters": 4 - k // 5,
             "mean_cluster_size": 1.0 + 0.15 * k,
@@ -370,7 +371,7 @@ def test_the_field_of_a_run_is_shown(run_with_clusters, width):
     for (axes, arrow), rotation in zip(drawn, rotations, strict=True):
         seen = np.array(arrow.xy) - arrow.xyann
         expected = (rotation @ [1, 2, 5])[:2]
-        assert seen @ expected == pytest.approx(np.hypot(*seen) * np.hypot(*expected), rel=1e-6)
+        assert seen @ expected == pytest.approx(np.hypot(*seen) * np.hypot(*expected), rel=1e-6, abs=0.0)
         assert {"x", "y", "z"} & {text.get_text() for text in axes.texts} and "B" in texts(figure)
     for axes in figure.axes[:4]:
         letter = next(text for text in axes.texts if text.get_text() in "abcdefgh")
