@@ -47,6 +47,7 @@ class SweptRun(SweptCase):
     NAME, GIVEN = "sand run", ("run.seed", "run.out", "grow")
     NO_RESULTS = (
         *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices"),
+        *("grains_in_words", "forces_in_words"),
         *("ns_per_grain_step", "versions", "source_digest", "sand"),
     )
     """Entries of the summary that are not results of the simulation; nor are those whose names begin with "wall_"."""
