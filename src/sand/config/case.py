@@ -139,7 +139,8 @@ class GrainsSection(Section):
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
     number: Annotated[int | None, Whole(1, MOST_GRAINS), For("kind", "gas", "given")] = None
-    """Number of grains; with `classes` of grains and aggregates."""
+    """Number of grains. With `classes` the number of their members, grains and aggregates, of which each class has its
+    `share`; where classes have a `number` each, this is the sum, and may be left out."""
     radius: Radii = None
     """Radius [m]: a length, `lognormal(MEDIAN, SIGMA, LEAST, MOST)`, `power law(EXPONENT, LEAST, MOST)`, or a list with
     one length for each grain; for a body from a file one length, only if the file has none."""
