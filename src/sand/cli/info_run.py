@@ -61,10 +61,10 @@ def _in_words(folder: Path) -> dict[str, str]:
     from ..io.trajectory import Frames
     from ..simulation.in_words import forces_in_words, grains_in_words
 
-    found = {}
+    found: dict[str, str] = {}
     with contextlib.suppress(SandError), contextlib.closing(Frames(folder / files.TRAJECTORY)) as frames:
-        if len(frames):
-            found["grains_in_words"] = grains_in_words(frames[0], kinetic_temperature(frames[0]))
+        start: Any = frames[0] if len(frames) else None
+        found |= {} if start is None else {"grains_in_words": grains_in_words(start, kinetic_temperature(start))}
     with contextlib.suppress(SandError):  # forces of the user that are not imported
         found["forces_in_words"] = forces_in_words(read_case(folder / files.CASE).forces.build())
     return found

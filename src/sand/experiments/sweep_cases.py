@@ -300,8 +300,6 @@ def units_of(content: dict[str, Any], columns: Iterable[str]) -> dict[str, str]:
     content = {table: value for table, value in content.items() if table != "sweep"}
     model = CASES[case_kind(content)].model(content)
     results = documented_units(Collision)  # whose names results of other kinds share
-    found = {}
-    for name in columns:
-        setting = setting_at(model, tuple(name.split("."))) if "." in name else None
-        found[name] = getattr(setting, "unit", "J" if name.startswith("lost_") else results.get(name, ""))
+    found = {name: "J" if name.startswith("lost_") else results.get(name, "") for name in columns}
+    found |= {key: getattr(setting_at(model, tuple(key.split("."))), "unit", "") for key in found if "." in key}
     return {name: unit for name, unit in found.items() if unit not in ("", "1")}

@@ -12,7 +12,6 @@ from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
 from ..basics.material import Material
-from ..basics.ramps import forces_at_points
 from ..basics.temperature import kinetic_temperature
 from ..basics.units import MELTED, format_quantity, text_past
 from ..contact.law import contact_constants, ringing_energy
@@ -71,9 +70,7 @@ def limit_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
 
 def _strong_field(field: Field) -> str:
     """Warning if a field is stronger than that of magnets of laboratories at any time, else ""."""
-    points = [[at.flux_density, at.amplitude, at.final] for at in forces_at_points(field)]
-    largest = max(sum(math.hypot(*b) for b in at[:2] if b is not None) for at in points)
-    largest = max(largest, *(math.hypot(*(at[2] or (0.0,))) for at in points))
+    largest = field.flux_density_size()
     if not largest > STRONGEST_FIELD:
         return ""
     return (

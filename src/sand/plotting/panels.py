@@ -263,21 +263,12 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
     ]
     if notes:  # below all curves
         low, high = axes.get_ylim()
-        lines = textwrap.wrap(
-            "; ".join(notes), int(72.0 * axes.get_window_extent().width / axes.figure.dpi / points(3.8))
-        )
+        width = 72.0 * axes.get_window_extent().width / axes.figure.dpi
+        lines = textwrap.wrap("; ".join(notes), int(width / points(3.8)))
         share = NOTE_SHARE * len(lines)
         axes.set_ylim(low * (low / high) ** (share / (1.0 - share)), high)
-        axes.text(
-            0.995,
-            0.03,
-            "\n".join(lines),
-            transform=axes.transAxes,
-            ha="right",
-            va="bottom",
-            size=points(7.0),
-            color=MUTED,
-        )
+        look: dict[str, Any] = {"size": points(7.0), "color": MUTED, "ha": "right", "va": "bottom"}
+        axes.text(0.995, 0.03, "\n".join(lines), transform=axes.transAxes, **look)
     log_ticks(axes)
     legend_above(axes)
 

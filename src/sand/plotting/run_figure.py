@@ -237,14 +237,7 @@ def _draw_grains(
     axes = figure.add_axes((left, bottom + above, right - left, height - above))
     draw_scene(axes, scene, layout.pixels(height - above), fields)
     panel_letter(axes, letters[0], 0.0)
-    caption: dict[str, Any] = {
-        "transform": axes.transAxes,
-        "size": points(7.5),
-        "color": MUTED,
-        "va": "bottom",
-        "ha": "left",
-    }
-    axes.text(0.04, 1.004, _caption(scene, lost), **caption)
+    axes.text(0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=points(7.5), color=MUTED, va="bottom")
     if enlarge:
         axes = figure.add_axes((left, bottom, right - left, strip))
         draw_largest(axes, scene, layout.pixels(strip), fields)

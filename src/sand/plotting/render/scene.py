@@ -241,14 +241,8 @@ def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int], fields: Sequen
 def _draw_image(
     axes: Axes, spheres: Spheres, window: tuple[float, float, float, float], pixels: tuple[int, int]
 ) -> None:
-    axes.imshow(
-        render_spheres(spheres, window, *pixels),
-        extent=window,
-        origin="lower",
-        aspect="auto",
-        interpolation="antialiased",
-        zorder=2,
-    )
+    picture = render_spheres(spheres, window, *pixels)
+    axes.imshow(picture, extent=window, origin="lower", aspect="auto", interpolation="antialiased", zorder=2)
     axes.set(xlim=window[:2], ylim=window[2:])
     axes.set_axis_off()
 
@@ -276,19 +270,10 @@ def draw_scale_bar(
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     length = round_length(share * (right - left))
     x, y = right - margin * (right - left), bottom + 4.0 / 3.0 * margin * (top - bottom)
-    axes.plot(
-        [x - length, x], [y, y], color=colour, linewidth=2.0 * scale, solid_capstyle="butt", zorder=4, gid="scale"
-    )
-    centre, offset = (x - length / 2, y), (0, 3 * scale)
-    axes.annotate(
-        format_si(length, "m"),
-        centre,
-        offset,
-        textcoords="offset points",
-        ha="center",
-        color=colour,
-        size=points(7.5 * scale),
-    )
+    bar: dict[str, Any] = {"linewidth": 2.0 * scale, "solid_capstyle": "butt", "zorder": 4, "gid": "scale"}
+    axes.plot([x - length, x], [y, y], color=colour, **bar)
+    look: dict[str, Any] = {"ha": "center", "color": colour, "size": points(7.5 * scale)}
+    axes.annotate(format_si(length, "m"), (x - length / 2, y), (0, 3 * scale), textcoords="offset points", **look)
 
 
 def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[int], list[np.ndarray]]:
