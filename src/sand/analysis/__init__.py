@@ -5,10 +5,7 @@ Submodules are imported on first use: `sand.analysis.fits.power_law(...)` needs 
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
-
-from ..basics.errors import NoSuchAttribute, did_you_mean
+from ..basics.lazy import lazily
 
 MODULES = (
     "body_motion", "clusters", "collision_model", "fits", "fractal", "frame_statistics", "internal_motion",
@@ -16,8 +13,4 @@ MODULES = (
 )  # fmt: skip
 """Public submodules."""
 
-
-def __getattr__(name: str) -> Any:
-    if name in MODULES:
-        return importlib.import_module(f".{name}", __name__)
-    raise NoSuchAttribute(f"module 'sand.analysis' has no '{name}'; {did_you_mean(name, MODULES)}")
+__getattr__, __dir__ = lazily(__name__, dict.fromkeys(MODULES, ""))

@@ -14,6 +14,7 @@ import functools
 import inspect
 import numbers
 import os
+import re
 import types
 import typing
 from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from .descriptions import described, documented_units
-from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, shown
+from .errors import BadInput, ErrorCollector, NoSuchAttribute, did_you_mean, its_own, shown
 from .paths import checked_name
 
 MOST_GRAINS = 100_000_000
@@ -286,6 +287,10 @@ def _read(
     if "a path" in words:  # paths may also be given as text
         words = [word for word in words if word != "text"]
     wanted = f" must be {' or '.join(words)}" if words else f"; give {' or '.join(constructors)}"
+    checks = [check for check in allowed if check.constructor]
+    owned = dict.fromkeys([name, *(re.findall(r"\w+", check.constructor)[-1].lower() for check in checks)])
+    if own := its_own(value, owned, lambda one: any(check.fits(one) for check in checks)):
+        wanted = f"; {own}"
     raise BadInput(f"{name} = {shown(value)}{wanted}")
 
 

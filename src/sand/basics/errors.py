@@ -14,6 +14,8 @@ from typing import Any
 
 LONGEST = 80
 """Characters of a value that a message shows."""
+CLOSING = ")]}>'\""
+"""Last characters of values, which are kept where the rest is cut."""
 MOST_ERRORS = 100
 """Errors of one input that are described; the others are counted."""
 MOST_NAMED = 5
@@ -147,7 +149,7 @@ def did_you_mean(word: str, allowed: Sequence[str], most: int = 1) -> str:
 
 
 def shown(value: Any) -> str:
-    """Short text for a value in a message; arrays are shown by shape, classes by name."""
+    """Short text for a value in a message; arrays are shown by shape, classes by name; cut text keeps its bracket."""
     if isinstance(value, type):
         return f"sand.{value.__name__}" if value.__module__.startswith("sand.") else value.__name__
     shape = getattr(value, "shape", None)
@@ -158,13 +160,35 @@ def shown(value: Any) -> str:
         text = repr(value)
     except Exception:  # integers of thousands of digits, lists that contain themselves
         return f"<{type(value).__name__}>"
-    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
+    end = text[-1:] if text[-1:] in CLOSING else ""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1 - len(end)]}…{end}"
+
+
+def its_own(value: Any, names: Iterable[str], fits: Callable[[Any], bool]) -> str:
+    """Advice where an object is given in place of one that it has: "give its .grains"; empty if it has none.
+
+    Parameters
+    ----------
+    names : Iterable[str]
+        Attributes that are looked at.
+    fits : callable
+        Whether the value of an attribute is what is wanted.
+    """
+    for name in () if isinstance(value, type) else names:
+        try:
+            found = fits(getattr(value, name))
+        except Exception:  # objects without it, and errors of the user's objects
+            continue
+        if found:
+            return f"give its .{name}"
+    return ""
 
 
 def refuse_other(frame: Any, *names: str, called: str = "frame") -> None:
     """Raise BadInput if `frame`, the argument of this name, is a class or lacks one of these attributes."""
     if isinstance(frame, type) or not all(hasattr(frame, name) for name in names):
-        raise BadInput(f"{called} = {shown(frame)}; give a frame, such as sand.open(DIR).frames[-1]")
+        own = its_own(frame, ("grains",), lambda one: all(hasattr(one, name) for name in names))
+        raise BadInput(f"{called} = {shown(frame)}; {own or 'give a frame, such as sand.open(DIR).frames[-1]'}")
 
 
 def import_optional(package: str, purpose: str) -> Any:

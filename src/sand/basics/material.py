@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
 from .arguments import checked
@@ -192,7 +193,28 @@ PAPERS = (
     _paper("silicate (Tatsuuma et al. 2023)", 2650.0, (0.02, 54.0e9, 0.17), 20e-10, _T23, _ABSTRACT),
 )
 """Materials of papers; the table with E_roll and E_break is `sand.theory.paper_table`."""
-PRESETS = COMMON | {p.material.name: p.material for p in PAPERS}
+
+
+class Library(dict[str, Any]):
+    """Presets and further materials by name; case is ignored where no name has the same."""
+
+    def __init__(self, own: Mapping[str, Any] = MappingProxyType({})):
+        super().__init__(COMMON | {p.material.name: p.material for p in PAPERS} | dict(own))
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or (isinstance(name, str) and name.lower() in self._lower())
+
+    def __missing__(self, name: str) -> Any:
+        """Raises BadInput that shows the nearest names."""
+        if name not in self:
+            raise BadInput(f"unknown material '{name}'; {did_you_mean(name, list(self), NEAREST)}")
+        return self._lower()[name.lower()]
+
+    def _lower(self) -> dict[str, Any]:
+        return {name.lower(): one for name, one in self.items()}
+
+
+PRESETS = Library()
 NEAREST = 3
 """Names that a message about an unknown preset shows."""
 
@@ -205,10 +227,7 @@ LIKE = (
 
 def material_named(name: str) -> Material:
     """Look up a preset by name (case ignored). Raises BadInput that shows the nearest names."""
-    found = {known.lower(): material for known, material in PRESETS.items()}.get(name.lower())
-    if found is None:
-        raise BadInput(f"unknown material '{name}'; {did_you_mean(name, list(PRESETS), NEAREST)}")
-    return found
+    return PRESETS[name]
 
 
 def contact_settings(preset: str) -> dict[str, Any]:

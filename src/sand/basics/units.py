@@ -150,12 +150,23 @@ def seed_given(value: Any, bits: int = 64) -> int:
     return int(value)
 
 
-def format_quantity(value: float, unit: str) -> str:
-    """Format a number with an SI prefix: 1.2e-6 m → '1.2 um'."""
+def format_quantity(value: float, unit: str, past: float = math.nan) -> str:
+    """Format a number with an SI prefix: 1.2e-6 m → '1.2 um'; `past` is a limit, as for `digits_past`."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g} {unit}"
     exponent = _prefix_exponent(value)
-    return f"{value / 10.0**exponent:.4g} {_SI_PREFIXES[exponent]}{unit}"
+    return f"{value / 10.0**exponent:.{digits_past(value, past, 4)}g} {_SI_PREFIXES[exponent]}{unit}"
+
+
+def digits_past(value: float, limit: float, least: int = 3) -> int:
+    """How many digits show that a number is past a limit of up to four digits: 4 for 0.1004 and 0.1."""
+    shown_limit = float(f"{limit:.4g}")
+    return next((n for n in range(least, 17) if float(f"{value:.{n}g}") != shown_limit), 17)
+
+
+def text_past(value: float, limit: float, least: int = 3) -> str:
+    """A number that is past a limit, with three digits, or as many as show it."""
+    return f"{value:.{digits_past(value, limit, least)}g}"
 
 
 def exact_quantity(value: float, unit: str) -> str:

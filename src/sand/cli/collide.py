@@ -59,7 +59,7 @@ def _collision(r: dict[str, Any]) -> str:
     bodies = len(r["fragments"])
     pieces = f"{bodies} bod{'ies' if bodies > 1 else 'y'}, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
-    events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
+    events = f"contacts {r['made']} formed, {r['broken']} broken, {r['moved']} slips"
     unfinished = "" if r["quiet"] else " (stopped before it was decided)"
     if "kind" in r:  # results of earlier versions lack it
         energy = r["impact_energy"] / sum(r["grains_before"])

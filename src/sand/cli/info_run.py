@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
-from ..basics.errors import BadInput, naming
+from ..basics.errors import BadInput, SandError, naming
 from ..basics.units import format_quantity
 from ..io import run_folder as files
 from ..io.checkpoint_files import checkpoint_files
 from ..io.ledger_table import read_ledger
 from . import report
 from .info_jobs import Description
+
+MOST_WARNINGS = 5
+"""Warnings of a run that are shown."""
 
 
 def describe_run(path: Path, listed: tuple[str, str]) -> Description:
@@ -25,8 +29,13 @@ def describe_run(path: Path, listed: tuple[str, str]) -> Description:
     rows: report.Rows = []
     if summary is not None:
         named = report.named(summary["grains_concerned"])
-        rows += [("outcome", summary["outcome_text"] + named), ("grains", str(summary["grains"]))]
-        rows += [*summary["choices"].items(), *report.results(summary)]
+        rows.append(("outcome", summary["outcome_text"] + named))
+    described, warnings = summary or _in_words(path), (summary or {}).get("warnings", [])
+    rows += [("grains", text)] if (text := described.get("grains_in_words") or str(described.get("grains", ""))) else []
+    rows += (summary or {}).get("choices", {}).items()
+    rows += [("forces", text)] if (text := described.get("forces_in_words")) else []
+    rows += [] if summary is None else report.results(summary)
+    rows += report.first_of([("warning", text) for text in warnings], MOST_WARNINGS)
     if beyond is not None:
         rows += [
             ("state" if summary is None else "since then", "running, or killed"),
@@ -43,6 +52,22 @@ def describe_run(path: Path, listed: tuple[str, str]) -> Description:
         rows.append(("continue with", report.resume_line(path)))
     content = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
     return "a run", rows, content | {"planned_end": until, "files": report.files_of(path)}
+
+
+def _in_words(folder: Path) -> dict[str, str]:
+    """Grains and forces of a run without a summary, of its first frame and its case, as far as these can be read."""
+    from ..basics.temperature import kinetic_temperature
+    from ..config.case import read_case
+    from ..io.trajectory import Frames
+    from ..simulation.in_words import forces_in_words, grains_in_words
+
+    found: dict[str, str] = {}
+    with contextlib.suppress(SandError), contextlib.closing(Frames(folder / files.TRAJECTORY)) as frames:
+        start: Any = frames[0] if len(frames) else None
+        found |= {} if start is None else {"grains_in_words": grains_in_words(start, kinetic_temperature(start))}
+    with contextlib.suppress(SandError):  # forces of the user that are not imported
+        found["forces_in_words"] = forces_in_words(read_case(folder / files.CASE).forces.build())
+    return found
 
 
 def _planned_end(case: Path) -> tuple[float | None, str | None]:

@@ -120,9 +120,9 @@ def _names(given: Any) -> list[str]:
 
 def _library(case: Any) -> dict[str, Any]:
     """Presets and the materials of a case, by name."""
-    from ..basics.material import PRESETS
+    from ..config.case import library_of
 
-    return {**PRESETS, **{name: table.build(name) for name, table in case.materials.items()}}
+    return library_of(case.materials)
 
 
 def _names_none(body: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -389,17 +390,21 @@ def _draw_several(
 def _draw_many(source: Source, names: list[str]) -> list[Any]:
     """Draw columns of a sweep, or packings."""
     from ..experiments.laboratory_figure import laboratory_figure
+    from ..experiments.sweep_cases import units_of
+    from ..io.run_folder import CASE, read_toml
     from ..plotting.collisions import growth_figure
     from ..plotting.sweeps import sweep_figure
 
-    sweep = source.run
+    sweep, units = source.run, dict[str, str]()
+    with contextlib.suppress(BadInput, KeyError):  # a folder without the case of its sweep
+        units = {} if sweep is None else units_of(read_toml(source.path / CASE), sweep.done)
 
     def draw(name: str) -> Any:
         if sweep is None or name == LABORATORY:
             runs = _loaded(source.path) if sweep is None else sweep.loaded
             return laboratory_figure(runs, None if name == LABORATORY else name)
         if name != GROWTH:
-            return sweep_figure(sweep.done, sweep.keys, name)
+            return sweep_figure(sweep.done, sweep.keys, name, units, source.path.resolve().name)
         columns = {name: sweep.done[name].tolist() for name in OF_GROWTH}
         columns["speed"] = sweep.done["impact.speed" if "impact.speed" in sweep.keys else "speed"].tolist()
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

@@ -9,7 +9,7 @@ import shlex
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
@@ -246,6 +246,7 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
     """
     from ..basics.units import format_quantity
     from ..simulation.cadence import chosen_cadence, read_cadence
+    from ..simulation.in_words import forces_in_words, grains_in_words
 
     every = simulation.frame_every
     if every is None:
@@ -265,42 +266,13 @@ def opening(simulation: Any, end: float, last_step: float, condition: str | None
     ends += [condition] if condition else []
     start = f"from {format_quantity(simulation.time, 's')} " if simulation.time > 0.0 else ""
     return [
-        ("grains", _grains(simulation.grains, simulation.temperature)),
+        ("grains", grains_in_words(simulation.grains, simulation.temperature)),
         *simulation.choices.items(),
-        ("forces", ", ".join(_force(f) for f in simulation.forces) or "none: grains move on straight lines"),
+        ("forces", forces_in_words(simulation.forces)),
         ("time", f"{start}to {' or '.join(ends)}, {frames}"),
         ("seed", str(simulation.seed)),
         ("folder", str(folder)),
     ]
-
-
-def _grains(grains: Any, temperature: float) -> str:
-    from ..basics.units import MELTED, format_quantity
-
-    def span(values: Any, text: Callable[[float], str]) -> str:
-        least, most = text(float(values.min())), text(float(values.max()))
-        return least if least == most else f"{least} to {most}"
-
-    parts = [
-        f"{len(grains)} of {', '.join(m.name for m in grains.materials)}",
-        f"radius {span(grains.radius, lambda v: format_quantity(v, 'm'))}",
-    ]
-    if grains.body_moment.any():
-        size = (grains.body_moment**2).sum(axis=1) ** 0.5
-        parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
-    motion = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "at rest"
-    if temperature > MELTED:  # bodies that fly, not thermal motion
-        speed = float((grains.mass @ (grains.velocity**2).sum(axis=1) / grains.mass.sum()) ** 0.5)
-        motion = f"rms speed {format_quantity(speed, 'm/s')}"
-    return ", ".join([*parts, motion])
-
-
-def _force(force: Any) -> str:
-    """Name and non-default settings of a force; case.toml lists all settings."""
-    from ..basics.descriptions import as_text, changed_arguments
-
-    texts = [f"{key} = {as_text(value)}" for key, value in changed_arguments(force).items()]
-    return f"{force.name} ({', '.join(texts)})" if texts else force.name
 
 
 def results(summary: dict[str, Any]) -> Rows:

@@ -119,15 +119,16 @@ def _of_gas(case: Case) -> Start:
 
 def _of_file(case: Case) -> Start:
     section, path = case.grains, Path(case.grains.file or "")
+    library = case.materials_by_name()
     with naming("grains"):
         if not is_own_trajectory(path):
             return _of_other(case, path)
         if extra := [name for name in ("radius", "length") if getattr(section, name) is not None]:
             raise BadInput(f"{extra[0]}: the trajectory {path} has it; leave {extra[0]} out")
-        start = from_trajectory(path, section.frame, case.materials_by_name())
+        start = from_trajectory(path, section.frame, library)
     given = section.material if isinstance(section.material, list) else [section.material]
     there = [m.name for m in start.grains.materials]
-    if "material" in section.model_fields_set and set(given) != set(there):
+    if "material" in section.model_fields_set and {library[name].name for name in given} != set(there):
         raise BadInput(f"grains.material: the file has {', '.join(there)}, not {', '.join(given)}; leave material out")
     if case.box.space is not None and not same_box(case.box.space, start.box):
         raise BadInput(

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, creat
 from ..basics.arguments import MOST_GRAINS, MOST_STEPS
 from ..basics.box import Box, as_box
 from ..basics.errors import BadInput, ErrorCollector, did_you_mean, naming
-from ..basics.material import NEAREST, PRESETS, Material, like_preset
+from ..basics.material import NEAREST, Library, Material, like_preset
 from ..basics.settings import Flag, For, Number, Reading, Whole, Word
 from ..components.deformation import Deformation, DeformedBox, box_columns
 from ..components.driven import Driven
@@ -128,13 +128,19 @@ class MaterialSection(Section):
         return Material(name, **({"surface_energy": None} | given))
 
 
+def library_of(materials: dict[str, MaterialSection]) -> Library:
+    """Presets and the materials of a case.  Raises BadInput for missing or impossible numbers."""
+    return Library({name: section.build(name) for name, section in materials.items()})
+
+
 class GrainsSection(Section):
     """[grains]: a gas of grains, or grains of a `file`: a frame, free grains or bodies; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
     number: Annotated[int | None, Whole(1, MOST_GRAINS), For("kind", "gas", "given")] = None
-    """Number of grains; with `classes` of grains and aggregates."""
+    """Number of grains. With `classes` the number of their members, grains and aggregates, of which each class has its
+    `share`; where classes have a `number` each, this is the sum, and may be left out."""
     radius: Radii = None
     """Radius [m]: a length, `lognormal(MEDIAN, SIGMA, LEAST, MOST)`, `power law(EXPONENT, LEAST, MOST)`, or a list with
     one length for each grain; for a body from a file one length, only if the file has none."""
@@ -275,9 +281,9 @@ class Case(Section):
         walls = [wall.build(self.materials_by_name()) for wall in self.walls]
         return {"walls": walls, "driven": self.driven, "deformation": self.deformation}
 
-    def materials_by_name(self) -> dict[str, Material]:
+    def materials_by_name(self) -> Library:
         """Presets and the materials of the case, by name."""
-        return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        return library_of(self.materials)
 
 
 def material_errors(content: dict[str, Any], tables: Iterable[str], default: str | None = None) -> list[str]:
@@ -302,7 +308,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
             continue  # reported by the validation of the whole file
         except BadInput as error:
             problems += error.at("materials").problems
-    known = [*PRESETS, *own]
+    known = Library(own)
     for table in tables:
         section = content.get(table)
         if not isinstance(section, dict):
@@ -315,7 +321,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
             for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
                 if isinstance(name, str) and name not in known:
                     problems.append(
-                        f"{place}.material: unknown material '{name}'; {did_you_mean(name, known, NEAREST)}"
+                        f"{place}.material: unknown material '{name}'; {did_you_mean(name, list(known), NEAREST)}"
                     )
     forces, errors = content.get("forces"), ErrorCollector()
     contact: Any = FORCES["contact"]

@@ -91,7 +91,7 @@ def run_tables() -> list[Table]:
         Table("[[grains.classes]]", summary(GrainClass), keys_of(GrainClass)),
         material_table(),
         *force_tables(),
-        *stepping_tables(),
+        stepping_table(),
         Table("[neighbours]", summary(Neighbours), keys_of(Neighbours)),
         *(Table(_head(name), _purpose(name, own), keys_of(own)) for name, own in COMPONENTS.items()),
     ]
@@ -113,13 +113,15 @@ def force_tables() -> list[Table]:
     return [Table(f"[forces.{force}]", summary(kind), keys_of(kind)) for force, kind in FORCES.items()]
 
 
-def stepping_tables() -> list[Table]:
-    """The table [stepping], once for each integrator."""
+def stepping_table() -> Table:
+    """The table [stepping] with the keys of all integrators, each after its method."""
     meaning = f'Integrator; allowed: {", ".join(INTEGRATORS)}. clusters = "rigid" stands for "rigid-clusters".'
-    return [
-        Table("[stepping]", summary(kind), [Key("method", meaning, method), *keys_of(kind)])
-        for method, kind in INTEGRATORS.items()
-    ]
+    keys = {"method": Key("method", meaning, next(iter(INTEGRATORS)))}
+    for method, kind in INTEGRATORS.items():
+        for key in keys_of(kind):
+            keys.setdefault(key.name, key._replace(meaning=f'With "{method}": {key.meaning}'))
+    note = "How the grains are moved. " + " ".join(f'"{name}": {summary(kind)}' for name, kind in INTEGRATORS.items())
+    return Table("[stepping]", note, list(keys.values()))
 
 
 def template(name: str, command: str = "run", tables: list[Table] | None = None, used: Values = EXAMPLES) -> str:
@@ -134,7 +136,7 @@ def template(name: str, command: str = "run", tables: list[Table] | None = None,
     tables : list of Table, optional
         Its tables; those of `sand run` by default.
     used : dict of str to dict or list, optional
-        Values of the keys in use, by table; of a table that is there once for each method, with the method.
+        Values of the keys in use, by table.
     """
     chosen = run_tables() if tables is None else tables
     parts = ("\n" + "\n".join(_lines(table, _used_of(table, used))) + "\n" for table in chosen)
@@ -144,9 +146,6 @@ def template(name: str, command: str = "run", tables: list[Table] | None = None,
 def _used_of(table: Table, used: Values) -> list[dict[str, Any]]:
     """Values of the keys in use of a table, of each one of a list."""
     given = used.get(table.head.strip("[]"), {})
-    method = next((key.default for key in table.keys if key.name == "method" and table.head == "[stepping]"), None)
-    if method is not None and given.get("method") != method:
-        return [{}]
     return given if isinstance(given, list) else [given]
 
 

@@ -23,7 +23,7 @@ class WallSection(Section):
     def build(self, materials: dict[str, Material]) -> Wall:
         """Build the wall.  Raises BadInput."""
         given = self.model_dump(exclude_none=True, exclude={"material"})
-        return Wall(material=materials.get(self.material, self.material), **given)
+        return Wall(material=materials[name] if (name := self.material) in materials else name, **given)
 
 
 def wall_errors(walls: Any, known: Collection[str]) -> list[str]:

@@ -14,6 +14,7 @@ Rolling stiffness and limits are those of JKR theory, for want of a derivation f
 import math
 from typing import NamedTuple
 
+from ..basics.units import text_past
 from ..compiler.jit import formula
 from .jkr import HERTZ_CONTACT_RADIUS
 from .law import ContactLaw, NormalMode, register
@@ -95,7 +96,7 @@ def _warning(surface_energy: float, modulus: float, reduced: float) -> str:
     if tabor <= DMT_BELOW:
         return ""
     better = "JKR is the better law" if tabor >= JKR_ABOVE else f"neither DMT nor JKR (above {JKR_ABOVE:g}) is exact"
-    return f"Tabor parameter {tabor:.2g}; DMT assumes below {DMT_BELOW}: {better}"
+    return f"Tabor parameter {text_past(tabor, DMT_BELOW, 2)}; DMT assumes below {DMT_BELOW}: {better}"
 
 
 LAW = register(

@@ -15,6 +15,7 @@ Without adhesion (γ = 0) a contact is Hertzian, F = (4/3) E* √R δ^(3/2), and
 import math
 from typing import NamedTuple
 
+from ..basics.units import text_past
 from ..compiler.jit import formula
 from .law import ContactLaw, NormalMode, register
 
@@ -242,7 +243,8 @@ def _warning(surface_energy: float, modulus: float, reduced: float) -> str:
     ratio = rest_radius(surface_energy, reduced, modulus) / reduced
     if ratio <= LARGEST_RATIO:
         return ""
-    return f"a0/R = {ratio:.2f}; JKR assumes a0/R below {LARGEST_RATIO}: take forces and energies as estimates"
+    shown = text_past(ratio, LARGEST_RATIO, 2)
+    return f"a0/R = {shown}; JKR assumes a0/R below {LARGEST_RATIO}: take forces and energies as estimates"
 
 
 LAW = register(

@@ -5,18 +5,9 @@ Submodules are imported on first use: `sand.experiments.scattering.cross_section
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
-
-from ..basics.errors import NoSuchAttribute, did_you_mean
+from ..basics.lazy import lazily
 
 MODULES = ("chain_impact", "collision", "kernel_table", "laboratory", "scattering", "sequential")
 """Public submodules; the others are used by these and by the command line."""
 
-
-def __getattr__(name: str) -> Any:
-    if name == "sweep":
-        return importlib.import_module(".sweep_job", __name__).sweep
-    if name in MODULES:
-        return importlib.import_module(f".{name}", __name__)
-    raise NoSuchAttribute(f"module 'sand.experiments' has no '{name}'; {did_you_mean(name, (*MODULES, 'sweep'))}")
+__getattr__, __dir__ = lazily(__name__, {**dict.fromkeys(MODULES, ""), "sweep": "sweep_job"})

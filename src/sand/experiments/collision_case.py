@@ -11,18 +11,17 @@ from pydantic import Field
 
 from ..basics.arguments import MOST_GRAINS
 from ..basics.grains import Grains
-from ..basics.material import PRESETS, Material
+from ..basics.material import Library, Material
 from ..basics.settings import For, List, Number, Reading, Whole, Word, declared
-from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
+from ..config.case import ForcesSection, MaterialSection, library_of, material_errors, read_content
 from ..config.key_errors import validate
 from ..config.sections import Moment, PathName, Section, Seeds, Stepping, with_integrator
 from ..integrate.verlet import Verlet
 from ..setup.aggregates import KINDS, build
 from ..setup.encounters import offset_of
 from ..setup.from_file import body_from_file
-from ..setup.grain_classes import BODY_FILE
+from ..setup.grain_classes import BODY_FILE, Radii
 from ..setup.moments import MOMENT_MODES
-from ..setup.population import radii_of
 from ..simulation.cadence import FRAMES
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, Ending, approach, prepare, run_to_end
@@ -45,7 +44,7 @@ class BodySection(Section):
     """Number of grains; required except for a grain, a lattice or a file."""
     shape: Annotated[list[int] | None, List(Whole(1, MOST_GRAINS))] = None
     """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
-    radius: Annotated[Any, Reading(lambda value, name: radii_of(value))] = None
+    radius: Radii = None
     """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; one length for a file without
     radii."""
     material: str = "silica"
@@ -124,9 +123,9 @@ class CollisionCase(Section):
     forces: ForcesSection = ForcesSection()
     stepping: Stepping = Verlet()
 
-    def materials_by_name(self) -> dict[str, Material]:
+    def materials_by_name(self) -> Library:
         """Presets and the materials of the case, by name."""
-        return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        return library_of(self.materials)
 
     def approach(self, seed: int) -> Approach:
         """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""

@@ -101,8 +101,10 @@ class Collision:
         "undecided" (none formed until the end, but one still may), or "fragment" (all else).
     kind : str
         One of `analysis.collision_kinds.KINDS`, by the masses of the fragments.
-    speed, impact_parameter : float
-        Initial values [m/s], [m].
+    speed : float
+        Initial relative speed [m/s].
+    impact_parameter : float
+        Initial distance of the lines of flight [m].
     seed : int or None
         Seed of the orientations; None: as given.
     fragments : tuple of int

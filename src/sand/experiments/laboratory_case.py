@@ -12,9 +12,9 @@ from pydantic import Field
 
 from ..basics.errors import BadInput, ErrorCollector
 from ..basics.grains import Grains
-from ..basics.material import PRESETS, Material
+from ..basics.material import Material
 from ..basics.settings import For, Number, Whole, Word
-from ..config.case import ForcesSection, MaterialSection, material_errors, read_content
+from ..config.case import ForcesSection, MaterialSection, library_of, material_errors, read_content
 from ..config.commands import command_for
 from ..config.folders import without_run
 from ..config.key_errors import validate
@@ -181,8 +181,7 @@ class PackingCase(Section):
 
     def packing(self, seed: int) -> Grains | Start:
         """The packing of a seed.  Raises BadInput."""
-        materials = {**PRESETS, **{name: table.build(name) for name, table in self.materials.items()}}
-        return self.aggregate.packing(materials, seed)
+        return self.aggregate.packing(library_of(self.materials), seed)
 
     def first_plan(self) -> Any:
         """The plan of the first seed; files of all others are read, too, to find errors.  Raises BadInput."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..basics.descriptions import documented_units
 from ..basics.errors import BadInput, warn
 from ..config.build import resume, simulation_of
 from ..config.case import Case, check_case, material_errors
 from ..config.commands import command_for
-from ..config.key_errors import validate
+from ..config.key_errors import setting_at, validate
 from ..config.sections import with_integrator
 from ..io.checkpoint_files import checkpoint_files
 from ..io.run_folder import FLIGHTS
@@ -22,6 +23,7 @@ from ..simulation.outcome import Outcome
 from ..simulation.run_writer import summary_of
 from .collision import approach, expected_end, prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase
+from .collision_outcome import Collision
 from .dilute_case import is_dilute
 from .elastic_job import measured
 from .growth_case import GrowSection
@@ -45,6 +47,7 @@ class SweptRun(SweptCase):
     NAME, GIVEN = "sand run", ("run.seed", "run.out", "grow")
     NO_RESULTS = (
         *("outcome_text", "condition", "grains_concerned", "notes", "warnings", "seed", "choices"),
+        *("grains_in_words", "forces_in_words"),
         *("ns_per_grain_step", "versions", "source_digest", "sand"),
     )
     """Entries of the summary that are not results of the simulation; nor are those whose names begin with "wall_"."""
@@ -290,3 +293,13 @@ def case_kind(content: dict[str, Any]) -> str:
         return ENCOUNTERS
     found = command_for(content)
     return found if found in CASES else ""
+
+
+def units_of(content: dict[str, Any], columns: Iterable[str]) -> dict[str, str]:
+    """Units of columns of the table of a sweep: of keys of its case, and of results; those without one are missing."""
+    content = {table: value for table, value in content.items() if table != "sweep"}
+    model = CASES[case_kind(content)].model(content)
+    results = documented_units(Collision)  # whose names results of other kinds share
+    found = {name: "J" if name.startswith("lost_") else results.get(name, "") for name in columns}
+    found |= {key: getattr(setting_at(model, tuple(key.split("."))), "unit", "") for key in found if "." in key}
+    return {name: unit for name, unit in found.items() if unit not in ("", "1")}

@@ -18,7 +18,7 @@ from ..config.template import (
     keys_of,
     material_table,
     run_tables,
-    stepping_tables,
+    stepping_table,
     summary,
     template,
 )
@@ -122,7 +122,7 @@ def _collision_tables() -> list[Table]:
         ),
         material_table(),
         *force_tables(),
-        *stepping_tables(),
+        stepping_table(),
     ]
 
 
@@ -146,7 +146,7 @@ def _loading(name: str, command: str) -> str:
         Table(f"[{table}]", note, keys_of(section)),
         material_table(),
         *force_tables(),
-        *stepping_tables(),
+        stepping_table(),
     ]
     return template(name, command, tables, LOADINGS[command])
 

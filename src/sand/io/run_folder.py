@@ -378,13 +378,31 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path} is not TOML: {error}") from None
+        raise BadInput(f"{path} is not TOML: {error}{_line_with(text, str(error))}") from None
     except RecursionError:
         raise BadInput(f"{path}: tables and lists are nested more than {DEEPEST} deep") from None
     except ValueError as error:  # integers of more than 4300 digits, invalid dates
         raise BadInput(f"{path} is not TOML: {str(error).split(':')[0]}") from None
     _refuse_extremes(path, content)
     return content
+
+
+_QUANTITY = re.compile(r"(?:^|[=\[,])\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE][-+\d])[^\W\d_][^,\]}'=]*)(?=[,\]}]|$)")
+_WORD = re.compile(r"[=\[,]\s*(?!(?:true|false|inf|nan)\b)([^\W\d][^,\]}'=]*)(?=[,\]}]|$)")
+"""A number with a unit, and a word, without quotation marks."""
+
+
+def _line_with(text: str, error: str) -> str:
+    """The line that a syntax error names, with advice on a value without the quotation marks that it needs."""
+    place = re.search(r"line (\d+)", error)
+    lines = text.split("\n")
+    if place is None or int(place[1]) > len(lines):
+        return ""
+    line = lines[int(place[1]) - 1].strip()
+    bare = re.sub(r"\"[^\"]*\"|'[^']*'", "''", line).partition("#")[0]
+    unit, word = _QUANTITY.search(bare), _WORD.search(bare)
+    found, what = (unit, "a value with a unit") if unit else (word, "text")
+    return f": {shown(line)}" + (f'; {what} needs quotation marks: "{found[1].strip()}"' if found else "")
 
 
 def _refuse_extremes(path: str | Path, content: dict[str, Any]) -> None:

@@ -13,10 +13,11 @@ from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
 from ..basics.material import Material
 from ..basics.temperature import kinetic_temperature
-from ..basics.units import MELTED, format_quantity
+from ..basics.units import MELTED, format_quantity, text_past
 from ..contact.law import contact_constants, ringing_energy
 from ..contact.model import DAMPED_SPEED_GAIN, Contact
 from ..forces.base import Force
+from ..forces.magnetic_field import Field
 from ..forces.pair.dipoles import Dipoles
 from ..theory.magnetic_limits import QUOTED_SIZES, MagneticLimits, contact_field, magnetic_limits
 from .truncation import given_temperature
@@ -25,6 +26,8 @@ CREEP = 10.0
 """Elastic energy at the limit of a mode, in k_B T, below which thermal motion makes contacts creep."""
 REMANENCE = 0.1
 """Largest share of the saturation moment that a grain with several domains keeps (recalled: below 0.05 to 0.1)."""
+STRONGEST_FIELD = 5.0
+"""Flux density [T] above which a field is more probably a mistake of unit than a magnet of a laboratory."""
 COLD = 1e-6
 """Temperature [K] for limits that do not depend on it."""
 
@@ -59,9 +62,22 @@ def limit_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
         for contact in _contacts(forces):
             pairs = itertools.combinations_with_replacement(_kinds(grains), 2)
             warnings += [_creep(contact, grains, a, b, kelvin) for a, b in pairs]
+    warnings += [_strong_field(force) for force in forces if isinstance(force, Field)]
     if _has_dipoles(forces):
         warnings += [text for k in _kinds(grains) for text in _moment_warnings(grains, k, kelvin)]
     return [text for text in warnings if text]
+
+
+def _strong_field(field: Field) -> str:
+    """Warning if a field is stronger than that of magnets of laboratories at any time, else ""."""
+    largest = field.flux_density_size()
+    if not largest > STRONGEST_FIELD:
+        return ""
+    return (
+        f"field: a flux density of up to {format_quantity(largest, 'T', STRONGEST_FIELD)} is above {STRONGEST_FIELD:g} "
+        f"T, which only special magnets reach; if it is meant in mT, give '{largest:.4g} mT': a number without a unit "
+        "is in T"
+    )
 
 
 def _contacts(forces: Sequence[Force]) -> list[Contact]:
@@ -113,7 +129,7 @@ def _creep(contact: Contact, grains: Grains, a: int, b: int, kelvin: float) -> s
         return ""
     names = first.name if a == b else f"{first.name} and {second.name}"
     sizes = " and ".join(format_quantity(r, "m") for r in dict.fromkeys((r1, r2)))
-    limits = ", ".join(f"{mode} {stored[mode]:.2g} kT" for mode in weak)
+    limits = ", ".join(f"{mode} {text_past(stored[mode], CREEP, 2)} kT" for mode in weak)
     return (
         f"contacts of {names} grains of radius {sizes} creep at {kelvin:.4g} K: up to their limits they store only "
         f"{limits} (below {CREEP:g}), and as friction has no noise they take heat from the motion of the grains; use "
@@ -187,8 +203,9 @@ def _moment_warnings(grains: Grains, kind: int, kelvin: float) -> list[str]:
     if (several & (share > REMANENCE)).any():
         worst = int(np.argmax(np.where(several, share, 0.0)))
         warnings.append(
-            f"moments of {name} grains of radius {format_quantity(float(radius[worst]), 'm')} are {share[worst]:.0%} "
-            f"of saturation, but grains above {format_quantity(limits.single_domain_radius, 'm')} "
+            f"moments of {name} grains of radius {format_quantity(float(radius[worst]), 'm')} are "
+            f"{text_past(100.0 * float(share[worst]), 100.0 * REMANENCE)}% of saturation, but grains above "
+            f"{format_quantity(limits.single_domain_radius, 'm')} "
             f"({_domain_note(grains.materials[kind])}) have several domains and keep less than {REMANENCE:.0%}; use "
             "smaller grains or a smaller moment"
         )

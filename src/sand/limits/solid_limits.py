@@ -17,7 +17,7 @@ from ..basics.constants import COULOMB
 from ..basics.grains import Grains
 from ..basics.ramps import forces_at_points
 from ..basics.state import IMPACT_SPEED, LARGEST_IMPACT, LARGEST_OVERLAP
-from ..basics.units import format_quantity
+from ..basics.units import format_quantity, text_past
 from ..contact.law import contact_periods, largest_pull
 from ..contact.model import Contact
 from ..forces.base import Force
@@ -49,15 +49,16 @@ def extreme_warnings(clock: np.ndarray) -> dict[str, str]:
     if share > FASTEST_IMPACT:
         about = "impacts are too fast for elastic grains"
         found[about] = (
-            f"{about}: up to {format_quantity(float(clock[IMPACT_SPEED]), 'm/s')} along the normal, {share:.3g} of "
-            f"√(2E*/ρ) (limit {FASTEST_IMPACT:g}), at which every solid yields; the model rebounds, real grains "
-            "deform: use slower grains"
+            f"{about}: up to {format_quantity(float(clock[IMPACT_SPEED]), 'm/s')} along the normal, "
+            f"{text_past(share, FASTEST_IMPACT)} of √(2E*/ρ) (limit {FASTEST_IMPACT:g}), at which every solid yields; "
+            "the model rebounds, real grains deform: use slower grains"
         )
     if overlap > DEEPEST_OVERLAP:
         about = "grains overlap too deeply for a contact law"
         found[about] = (
-            f"{about}: up to {overlap:.3g} radii of the smaller grain (limit {DEEPEST_OVERLAP:g}), at which solids "
-            "yield; take forces as estimates, or use slower impacts, weaker loads or less adhesion"
+            f"{about}: up to {text_past(overlap, DEEPEST_OVERLAP)} radii of the smaller grain (limit "
+            f"{DEEPEST_OVERLAP:g}), at which solids yield; take forces as estimates, or use slower impacts, weaker "
+            "loads or less adhesion"
         )
     return found
 
@@ -95,7 +96,7 @@ def _spins(grains: Grains) -> str:
         return ""
     return (
         f"{SPINS}: grain {worst} spins at {spin[worst]:.3g} rad/s, and its tensile stress ρω²r²/4 = "
-        f"{format_quantity(float(stress[worst]), 'Pa')} exceeds a tenth of Young's modulus, "
+        f"{format_quantity(float(stress[worst]), 'Pa', strength)} exceeds a tenth of Young's modulus, "
         f"{format_quantity(strength, 'Pa')}, which no solid holds; use slower spins"
     )
 
@@ -121,9 +122,9 @@ def _fields(grains: Grains, forces: Sequence[Force]) -> str:
         worst = int(np.argmax(field))
         if field[worst] > limit:
             return (
-                f"{CHARGED}: {format_quantity(float(field[worst]), 'V/m')} at grain {worst}, which emits {emitted} "
-                f"above about {format_quantity(limit, 'V/m')} and so loses its charge, but keeps it in the model; use "
-                "smaller charges, larger grains or a weaker field"
+                f"{CHARGED}: {format_quantity(float(field[worst]), 'V/m', limit)} at grain {worst}, which emits "
+                f"{emitted} above about {format_quantity(limit, 'V/m')} and so loses its charge, but keeps it in the "
+                "model; use smaller charges, larger grains or a weaker field"
             )
     return ""
 
@@ -154,8 +155,8 @@ def torn_clusters(grains: Grains, contact: Contact | None, pairs: np.ndarray, bo
         if force > held:
             return [
                 f"a cluster spins too fast for its contacts: {sizes[k]} grains around grain {own[0]} spin at "
-                f"{spin[k]:.3g} rad/s; one half is pulled by {format_quantity(force, 'N')}, and contacts hold it by "
-                f"{format_quantity(held, 'N')} (sum of pull-off forces): it tears at once; use a slower spin"
+                f"{spin[k]:.3g} rad/s; one half is pulled by {format_quantity(force, 'N', held)}, and contacts hold it "
+                f"by {format_quantity(held, 'N')} (sum of pull-off forces): it tears at once; use a slower spin"
             ]
     return []
 
@@ -188,8 +189,9 @@ def fast_settling(grains: Grains, contact: Contact) -> list[str]:
     normal = max(period for period, mode, *_ in found if mode == "normal")
     rebound = " and grains hardly rebound" if min(times) < normal else ""
     return [
-        f"contact: settling_time = {format_quantity(min(times), 's')} is below the period of {mode} of two grains of "
-        f"radius {' and '.join(format_quantity(float(grains.radius[g]), 'm') for g in dict.fromkeys((i, j)))}, "
+        f"contact: settling_time = {format_quantity(min(times), 's', period)} is below the period of {mode} of two "
+        "grains of radius "
+        f"{' and '.join(format_quantity(float(grains.radius[g]), 'm') for g in dict.fromkeys((i, j)))}, "
         f"{format_quantity(period, 's')}: grains in contact stop within one oscillation, so that aggregates hardly "
         f"restructure{rebound}; use {format_quantity(10.0 * period, 's')} or more"
     ]

@@ -17,7 +17,7 @@ from ..basics.box import Box
 from ..basics.constants import BOLTZMANN
 from ..basics.grains import Grains
 from ..basics.temperature import kinetic_temperature
-from ..basics.units import format_quantity
+from ..basics.units import format_quantity, text_past
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..forces.gas import Gas
@@ -77,8 +77,8 @@ def _warning(force: CutoffForce, radius: float, grains: Grains, kelvin: float, b
     where = "the cut-off" if force.cutoff is not None else "half the box"
     return (
         f"{force.name}: {where}, {format_quantity(radius, 'm')}, ends an interaction that is not small there: |U| of "
-        f"two of the grains is up to {energy:.3g} J, {energy / unit:.3g} {name} (limit {SHARE:g}), and what lies "
-        f"beyond is left out; {_remedy(force, box)}"
+        f"two of the grains is up to {energy:.3g} J, {text_past(energy / unit, SHARE)} {name} (limit {SHARE:g}), and "
+        f"what lies beyond is left out; {_remedy(force, box)}"
     )
 
 

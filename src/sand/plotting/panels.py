@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,8 +76,8 @@ LEAST_BODIES = 10
 
 DECADES = 6
 """Decades shown of a quantity that spans many."""
-NOTE_SHARE = 0.16
-"""Height of a note below the curves, relative to that of the curves."""
+NOTE_SHARE = 0.138
+"""Height of a line of a note below the curves, relative to that of the panel."""
 MIN_BALANCE_RANGE = 1e-3
 """Minimum half range of the balance axis, relative to all losses and the largest kinetic energy."""
 
@@ -265,17 +266,12 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
     ]
     if notes:  # below all curves
         low, high = axes.get_ylim()
-        axes.set_ylim(low * (low / high) ** NOTE_SHARE, high)
-        axes.text(
-            0.995,
-            0.03,
-            "; ".join(notes),
-            transform=axes.transAxes,
-            ha="right",
-            va="bottom",
-            size=points(7.0),
-            color=MUTED,
-        )
+        width = 72.0 * axes.get_window_extent().width / axes.figure.dpi
+        lines = textwrap.wrap("; ".join(notes), int(width / points(3.8)))
+        share = NOTE_SHARE * len(lines)
+        axes.set_ylim(low * (low / high) ** (share / (1.0 - share)), high)
+        look: dict[str, Any] = {"size": points(7.0), "color": MUTED, "ha": "right", "va": "bottom"}
+        axes.text(0.995, 0.03, "\n".join(lines), transform=axes.transAxes, **look)
     log_ticks(axes)
     legend_above(axes)
 

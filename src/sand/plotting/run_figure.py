@@ -33,6 +33,7 @@ from .panels import (
     has_temperatures,
     time_unit,
 )
+from .render.directions import UniformField, uniform_fields
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
 from .run_layout import DPI, Layout, layout_of
 from .style import MUTED, RED, TEXT_COLOUR, format_si, panel_letter, plot_style, points
@@ -44,6 +45,8 @@ FEW_SIZES = 3
 """Radii up to which the title of a run names each with its number of grains."""
 LETTERS = "abcdefgh"
 """Letters of the panels."""
+LEAST_STRIP = 1.05
+"""Least height of the picture of the largest clusters [inches]."""
 MIN_GRAIN_RADIUS = 11.0
 """Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
 _METADATA: dict[str, dict[str, Any]] = {
@@ -111,7 +114,8 @@ def run_figure(simulation: Simulation) -> Figure:
         if simulation.ledger.rows:
             _draw_history(figure, simulation, layout, heights)
         if scene.label.size:
-            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size, layout, LETTERS[len(heights) :])
+            lost, fields = len(simulation.grains) - scene.label.size, uniform_fields(simulation.forces, simulation.time)
+            _draw_grains(figure, scene, lost, layout, LETTERS[len(heights) :], fields)
     return figure
 
 
@@ -133,6 +137,7 @@ def _header(simulation: Simulation) -> list[tuple[str, float]]:
             f"largest of {int(last['largest_cluster'])} grains",
         ]
     facts.append(f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)")
+    facts += [field.text() for field in uniform_fields(simulation.forces, simulation.time)]
     facts += [unit.value.replace(", the kinetic temperature at the start", " at the start")] if unit.value else []
     notes = [(f"Note: {note.split(';')[0]}.", 7.0) for note in simulation.notes()]
     return [(title, 10.5), ("  ·  ".join(facts), 8.5), *notes]
@@ -213,31 +218,29 @@ def _place_panels(figure: Figure, panels: list[Axes], heights: Sequence[float], 
     for axes, share, gap in zip(panels, heights, gaps, strict=True):
         top -= gap + share * height
         axes.set_position((left, top, right - left, share * height))
+        above = axes.yaxis.label.get_window_extent().y1 - axes.bbox.y1
+        if above > -2.0:  # pixels; the letter of the panel is there
+            axes.yaxis.set_label_coords(layout.label, 0.5 - (above + 2.0) / axes.bbox.height)
 
 
-def _draw_grains(figure: Figure, scene: Scene, lost: int, layout: Layout, letters: str) -> None:
+def _draw_grains(
+    figure: Figure, scene: Scene, lost: int, layout: Layout, letters: str, fields: list[UniformField]
+) -> None:
     """All grains in the box, and below it the largest clusters if grains are small; `lost` grains are not drawn."""
     left, right, bottom, height = layout.grains
     pixels = layout.pixels(height)
     window = view_window(scene, pixels[0] / pixels[1])
     grain_radius = float(np.median(scene.radius)) * pixels[0] / (window[1] - window[0])
     enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(largest_clusters(scene.label))
-    strip = 0.276 * height if enlarge else 0.0
+    strip = max(0.276 * height, LEAST_STRIP / layout.size[1]) if enlarge else 0.0
     above = strip + 0.02 * enlarge
     axes = figure.add_axes((left, bottom + above, right - left, height - above))
-    draw_scene(axes, scene, layout.pixels(height - above))
+    draw_scene(axes, scene, layout.pixels(height - above), fields)
     panel_letter(axes, letters[0], 0.0)
-    caption: dict[str, Any] = {
-        "transform": axes.transAxes,
-        "size": points(7.5),
-        "color": MUTED,
-        "va": "bottom",
-        "ha": "left",
-    }
-    axes.text(0.04, 1.004, _caption(scene, lost), **caption)
+    axes.text(0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=points(7.5), color=MUTED, va="bottom")
     if enlarge:
         axes = figure.add_axes((left, bottom, right - left, strip))
-        draw_largest(axes, scene, layout.pixels(strip))
+        draw_largest(axes, scene, layout.pixels(strip), fields)
         panel_letter(axes, letters[1], 0.0)
 
 

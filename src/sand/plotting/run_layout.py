@@ -75,7 +75,7 @@ def layout_of(heights: Sequence[float], header: Sequence[tuple[str, float]]) -> 
         for line in textwrap.wrap(text, int(72.0 * width / (0.55 * points(size))), break_long_words=False)
     ]
     line = points(10.5) * 1.25 / 72.0
-    top, image, left, right = (len(lines) + 0.5) * line, 0.8 * width, 0.78, width - 0.42
+    top, image, left, right = (len(lines) + 0.5) * line, 0.9 * width, 0.78, width - 0.42
     height = top + PANEL_HEIGHT * sum(heights) + 0.5 + image
     return Layout(
         (width, height),

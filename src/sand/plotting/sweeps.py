@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import cycle
+from types import MappingProxyType
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
+from ..basics.units import format_quantity
 from .figure_format import figure_size, panel_grid
 from .run_figure import DPI, RunFigure
 from .style import LARGEST_COLOURS, MARKERS, OTHER_COLOURS, TEXT_COLOUR, log_axis, looks_of, no_line, plot_style, points
@@ -32,7 +34,9 @@ _NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)")
 Table = Mapping[str, np.ndarray]
 
 
-def sweep_figure(table: Table, keys: Sequence[str], what: str) -> Figure:
+def sweep_figure(
+    table: Table, keys: Sequence[str], what: str, units: Mapping[str, str] = MappingProxyType({}), title: str = ""
+) -> Figure:
     """Figure of a column of the table of a sweep.
 
     A column of numbers is drawn as lines over the key with the most values: points are means over all runs with the
@@ -48,45 +52,70 @@ def sweep_figure(table: Table, keys: Sequence[str], what: str) -> Figure:
         Columns of keys that change.
     what : str
         The column.
+    units : mapping of str to str, optional
+        Units of columns of numbers that have one.
+    title : str, optional
+        Name of the sweep, before the numbers of runs and seeds.
     """
     number = {key: len(set(table[key].tolist())) for key in keys}
     ordered = sorted(keys, key=lambda key: -min(number[key], MANY))
     varied = [key for key in ordered if number[key] > 1] or [*keys, "seed"][:1]
     with plot_style():
         if table[what].dtype.kind not in "Ub":
-            return _lines(table, varied[0], _combinations(table, varied[1:]), what)
-        over = varied[: 2 if len(varied) > 1 and number[varied[1]] >= LEAST_ROWS else 1]
-        return _classes(table, over, _combinations(table, varied[len(over) :]), what)
+            figure, left = _lines(
+                _Values(table, varied[0], units), _combinations(table, varied[1:], units), table, what
+            )
+            figure.axes[0].set_ylabel(label(what, units))
+        else:
+            over = varied[: 2 if len(varied) > 1 and number[varied[1]] >= LEAST_ROWS else 1]
+            groups = _combinations(table, varied[len(over) :], units)
+            figure, left = _classes([_Values(table, key, units) for key in over], groups, table, what)
+        runs, seeds = len(table[what]), len(set(table["seed"].tolist()))
+        counts = f"{runs} run{'s' * (runs != 1)}, {seeds} seed{'s' * (seeds != 1)}"
+        lines = [*([f"{title}: {counts}"] if title else []), *left]
+        figure.suptitle("\n".join(lines), fontsize=points(7.5))
+    return figure
 
 
-def _combinations(table: Table, keys: Sequence[str]) -> np.ndarray:
+def label(name: str, units: Mapping[str, str]) -> str:
+    """A column in words, with its unit: 'impact speed (m/s)' for `impact.speed`."""
+    parts = name.split(".")[-2:]
+    words = parts[-1:] if parts[-1].startswith(parts[0]) else parts
+    unit = f" ({units[name]})" if name in units else ""
+    return " ".join(words).replace("_", " ") + unit
+
+
+def _combinations(table: Table, keys: Sequence[str], units: Mapping[str, str]) -> np.ndarray:
     """The values of keys in each row, as text."""
-    short = {key: [f"{v:.4g}" if isinstance(v, float) else str(v) for v in table[key].tolist()] for key in keys}
-    rows = len(next(iter(table.values())))
-    return np.array([", ".join(f"{key.rpartition('.')[2]} = {short[key][k]}" for key in keys) for k in range(rows)])
+
+    def shown(key: str, value: object) -> str:
+        if not isinstance(value, float):
+            return f"{label(key, {})} = {value}"
+        return f"{label(key, {})} = {format_quantity(value, units[key]) if key in units else f'{value:.4g}'}"
+
+    rows = zip(*(table[key].tolist() for key in keys), strict=True) if keys else [()] * len(next(iter(table.values())))
+    return np.array([", ".join(map(shown, keys, row)) for row in rows])
 
 
-def _lines(table: Table, key: str, groups: np.ndarray, what: str) -> Figure:
-    """A line for each combination of the other keys."""
+def _lines(x: _Values, groups: np.ndarray, table: Table, what: str) -> tuple[Figure, list[str]]:
+    """A line for each combination of the other keys, and what is left out."""
     figure = RunFigure(figsize=figure_size(6.5, 4.0), dpi=DPI, layout="constrained")
-    axes, x = figure.subplots(), _Values(table, key)
+    axes = figure.subplots()
     names = list(dict.fromkeys(groups.tolist()))
     for name, colour, marker in zip(
         names[:MOST_LINES], cycle((*LARGEST_COLOURS, *OTHER_COLOURS)), cycle(MARKERS), strict=False
     ):
         of = (groups == name) & np.isfinite(x.numbers)
-        points = _means(x.numbers[of], table[what][of].astype(float))
-        axes.errorbar(*points, fmt=f"{marker}-", color=colour, markersize=4.0, elinewidth=0.8, label=name)
+        means = _means(x.numbers[of], table[what][of].astype(float))
+        axes.errorbar(*means, fmt=f"{marker}-", color=colour, markersize=4.0, elinewidth=0.8, label=name)
     x.describe(axes, "x")
-    axes.set_ylabel(what)
     if len(names) > 1:
         figure.legend(loc="outside right upper")
-    _say_what_is_left(figure, len(names), MOST_LINES)
-    return figure
+    return figure, _left_out(len(names), MOST_LINES)
 
 
-def _classes(table: Table, keys: Sequence[str], groups: np.ndarray, what: str) -> Figure:
-    """A panel for each combination of the other keys: a map of the words of a column, or their shares."""
+def _classes(over: Sequence[_Values], groups: np.ndarray, table: Table, what: str) -> tuple[Figure, list[str]]:
+    """A panel for each combination of the other keys, a map or shares of words; what is left out."""
     looks = looks_of(table[what].tolist())
     names = list(dict.fromkeys(groups.tolist()))
     shown = names[:MOST_PANELS]
@@ -95,9 +124,8 @@ def _classes(table: Table, keys: Sequence[str], groups: np.ndarray, what: str) -
     )
     figure = RunFigure(figsize=size, dpi=DPI, layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    over = [_Values(table, key) for key in keys]
     for axes, name in zip(panels, shown, strict=False):
-        draw = _draw_map if len(keys) > 1 else _draw_shares
+        draw = _draw_map if len(over) > 1 else _draw_shares
         draw(axes, over, groups == name, table[what].astype(str), looks)
         axes.set_title(name, fontsize=points(7.5), loc="left")
         if len(shown) == rows * columns:
@@ -105,9 +133,8 @@ def _classes(table: Table, keys: Sequence[str], groups: np.ndarray, what: str) -
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     marks = [Line2D([], [], **no_line(marker, colour), label=word) for word, (colour, marker) in looks.items()]
-    figure.legend(handles=marks, loc="outside right upper", title=what, alignment="left")
-    _say_what_is_left(figure, len(names), MOST_PANELS)
-    return figure
+    figure.legend(handles=marks, loc="outside right upper", title=label(what, {}), alignment="left")
+    return figure, _left_out(len(names), MOST_PANELS)
 
 
 def _draw_map(
@@ -162,10 +189,9 @@ def _draw_shares(
     axes.set(xlabel=x.label, ylabel="share of the runs", ylim=(0.0, 1.0))
 
 
-def _say_what_is_left(figure: Figure, number: int, drawn: int) -> None:
-    """Say in the title how many combinations of keys are not drawn."""
-    if number > drawn:
-        figure.suptitle(f"the first {drawn} of {number} combinations of the other keys", fontsize=points(7.5))
+def _left_out(number: int, drawn: int) -> list[str]:
+    """How many combinations of keys are drawn, if not all are."""
+    return [f"the first {drawn} of {number} combinations of the other keys"] if number > drawn else []
 
 
 def _means(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -186,19 +212,19 @@ class _Values:
     words : list of str
         What the numbers stand for; empty if they are values.
     label : str
-        The key with its unit.
+        The key in words, with its unit.
     """
 
-    def __init__(self, table: Table, key: str):
-        column, self.words, self.label = table[key], list[str](), key
+    def __init__(self, table: Table, key: str, units: Mapping[str, str]):
+        column, self.words, self.label = table[key], list[str](), label(key, {})
         if column.dtype.kind != "U":
-            self.numbers = column.astype(float)
+            self.numbers, self.label = column.astype(float), label(key, units)
             return
         found = [_NUMBER.fullmatch(text) for text in column.tolist()]
-        units = {match[2] for match in found if match}
-        if None not in found and len(units) == 1:
+        found_units = {match[2] for match in found if match}
+        if None not in found and len(found_units) == 1:
             self.numbers = np.array([float(match[1]) for match in found if match])
-            self.label += f" [{unit}]" if (unit := units.pop()) else ""
+            self.label += f" ({unit})" if (unit := found_units.pop()) else ""
         else:
             words, index = np.unique(column, return_inverse=True)
             self.words, self.numbers = words.tolist(), index.astype(float)

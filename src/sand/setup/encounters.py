@@ -76,6 +76,12 @@ def encounter(
         Direction of flight of the projectile, "x", "y", "z" or a vector. The offset is perpendicular to it, along the
         next axis.
 
+    Returns
+    -------
+    Encounter
+        `grains`, both bodies in one `sand.Grains`, those of the target first: what `sand.Simulation` takes; `target`,
+        the number of grains of the target; `flight`, about the time of the earliest possible contact [s].
+
     Raises
     ------
     BadInput

@@ -16,23 +16,39 @@ from ..basics.initial_pairs import StrainedContacts
 from ..basics.material import PRESETS, Material, as_material
 from ..basics.paths import checked_name
 from ..basics.settings import For, Number, Reading, Settings, Whole, Word
-from ..basics.units import dimensions, si
+from ..basics.units import dimensions, exact_quantity, has_unit_within, si
 from .aggregates import KINDS, build
 from .encounters import combined, turned
 from .from_file import body_from_file, from_trajectory, is_own_trajectory, largest_body
-from .population import divided, drawn, fractions_of, radii_of, refuse_sum
+from .population import Lognormal, PowerLaw, divided, drawn, fractions_of, radii_of, refuse_sum
 
 BUILDERS = tuple(kind for kind in KINDS if kind != "grain")
 """Kinds of aggregates that are built."""
+LARGEST_PLAIN = 1e-3
+"""Radius [m] above which a number needs its unit: grains of dust are smaller, and its unit was probably forgotten."""
 BODY_FILE = "a file that holds the aggregate, such as 'body.xyz'"
 
 
 def radius_as_given(value: Any) -> Any:
-    """Check radii as `radii_of` does; a length becomes a number [m], a law stays as it is. Raises BadInput."""
+    """Check radii as `radii_of` does; a length becomes a number [m], a law stays as it is.
+
+    Raises
+    ------
+    BadInput
+        As `radii_of`, or for a number above `LARGEST_PLAIN`, which text may have: as text it stays text.
+    """
     radii = radii_of(value)
-    if isinstance(radii, np.ndarray):
-        return radii.tolist()
-    return radii if isinstance(radii, float) else value
+    if isinstance(radii, (Lognormal, PowerLaw)):
+        return value
+    if (largest := float(np.max(radii))) <= LARGEST_PLAIN:
+        return np.asarray(radii).tolist()
+    if not (has_unit_within(value) or isinstance(value, np.ndarray)):  # arrays are computed, in SI
+        raise BadInput(
+            f"radius = {shown(value)}: a number without a unit is in m; did you mean '{largest:g} nm' or "
+            f"'{largest:g} um'? Give '{largest:g} m' if it is in m"
+        )
+    texts = [exact_quantity(one, "m") for one in np.atleast_1d(radii).tolist()]
+    return texts if np.ndim(radii) else texts[0]
 
 
 def moment_as_given(value: Any) -> Any:

@@ -28,6 +28,7 @@ from ..io.trajectory import TrajectoryWriter
 from .contact_table import measured_columns
 from .displays import DISPLAYS
 from .grain_quantities import virials_of
+from .in_words import forces_in_words, grains_in_words
 from .ledger import Ledger
 from .outcome import UNFINISHED, Result
 from .serialise import case_of
@@ -306,6 +307,8 @@ def summary_of(simulation: Simulation, result: Result) -> dict[str, Any]:
         "drift": result.drift,
         "drift_per_kT": ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
         "temperature_at_start": simulation.temperature,
+        "grains_in_words": grains_in_words(simulation.grains, simulation.temperature),
+        "forces_in_words": forces_in_words(simulation.forces),
         "notes": simulation.notes(),
         "warnings": simulation.warnings,
         "seed": simulation.seed,

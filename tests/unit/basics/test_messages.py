@@ -26,6 +26,7 @@ import pytest
 import tomli_w
 
 import sand
+import sand.plotting.render.still
 from sand.cli.main import main
 from sand.config.build import simulation_of
 from sand.config.case import check_case

@@ -399,6 +399,23 @@ def test_info_knows_every_file_of_a_run(done, capsys, name, kind, part):
 
 
 @pytest.mark.compiled("dipoles")
+def test_info_describes_grains_and_forces_of_a_folder_as_of_its_case(done, capsys):
+    """The same lines, also without a summary; and the warnings of the run."""
+
+    def lines(*words):
+        assert main(["info", *words]) == 0
+        rows = (line.strip().partition("  ") for line in capsys.readouterr().out.splitlines())
+        return {label: text.strip() for label, _, text in rows}
+
+    case, run = lines(str(done / "case.toml")), lines(str(done))
+    assert "8 of iron, radius 10 nm, moment" in case["grains"] and case["forces"].startswith("contact, dipoles")
+    assert {name: run[name] for name in ("grains", "forces", "boundary")}.items() <= case.items()
+    assert run["warning"].startswith(("contacts of iron grains", "moments of iron grains"))
+    (done / "summary.json").unlink()
+    assert {name: lines(str(done))[name] for name in ("grains", "forces")}.items() <= case.items()
+
+
+@pytest.mark.compiled("dipoles")
 def test_info_of_a_run_that_was_killed(done, capsys):
     """Without a summary the ledger gives the last time."""
     (done / "summary.json").unlink()

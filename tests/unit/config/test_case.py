@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.basics.errors import BadInput
+from sand.basics.errors import BadInput, shown
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.config.key_errors import validate
+from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
 from sand.simulation.serialise import case_of
 
@@ -73,6 +74,34 @@ def test_files_that_are_no_cases(tmp_path, content, part):
     assert len(caught.value.problems) == 1
     assert part in caught.value.problems[0]
     assert str(path) in caught.value.problems[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "advice"),
+    [
+        ("temperature = 50 K", 'a value with a unit needs quotation marks: "50 K"'),
+        ("temperature = 5e1K  # cold", '"5e1K"'),
+        ("moment = 200 A m^2/kg", '"200 A m^2/kg"'),
+        ("periodic = [1.2 um, 1.2 um, 1.2 um]", '"1.2 um"'),
+        ("periodic = [\n  1.2 um,\n]", '"1.2 um"'),
+        ("size = 5 µm", '"5 µm"'),
+        ("material = iron", 'text needs quotation marks: "iron"'),
+        ("material = {silica = 0.5, iron = half}", '"half"'),
+        ("number = 5 # grains\nnumber = 5 # K", None),
+        ('radius = "8 nm" "9 nm"', None),
+        ("radius = 1e-8,", None),
+        ("number = true false", None),
+    ],
+)
+def test_a_syntax_error_shows_its_line(tmp_path, line, advice):
+    """The line as it is in the file, and advice where a value lacks its quotation marks, else none."""
+    path = tmp_path / "some.toml"
+    path.write_text(f"[grains]\nkind = 'gas'\n{line}\n", "utf-8")
+    with pytest.raises(BadInput) as caught:
+        read_case(path)
+    (problem,) = caught.value.problems
+    assert any(shown(one.strip()) in problem for one in line.split("\n")) and "line " in problem
+    assert problem.endswith(advice) if advice else "needs" not in problem
 
 
 def test_an_empty_file_lacks_its_sections():
@@ -189,3 +218,45 @@ def test_the_first_of_many_mistakes_are_described(content):
         check_case(whole | content, "case")
     assert 100 < len(caught.value.problems) < 220
     assert sum("more errors" in problem for problem in caught.value.problems) == 1
+
+
+@pytest.mark.filterwarnings("ignore:grain 0 has a radius of")
+def test_grains_above_a_millimetre_have_their_unit(tmp_path):
+    """The case that a run writes has the unit again; a number without one is refused (messages.txt), up to 1 mm not."""
+    for given, radius in (("8 m", 8.0), (["8 m"] * 8, 8.0), ("1.5 mm", 1.5e-3), (1e-3, 1e-3)):
+        case = check_case(changed(grains__radius=given, box__periodic="100 m"), "case")
+        simulation = simulation_of(case, None)
+        again = check_case(case_of(simulation, 1e-9, 1e9, None), "case")
+        assert (simulation_of(again, None).grains.radius == radius).all()
+    grains = sand.setup.gas(2, "100 m", radius=np.array([0.5, 0.6]), material="ice", seed=1)
+    assert sorted(grains.radius) == [0.5, 0.6]
+
+
+def test_case_is_ignored_in_names_of_materials():
+    """Of presets and own materials, of grains, classes, mixtures, walls and bodies, as in Python; exact names first.
+
+    A case that a run writes with such a name is read again.
+    """
+    own = {"Dust": {"like": "Silica", "density": 2000.0}, "dust": {"like": "ice", "density": 900.0}}
+    wall = {"material": "SILICA", "point": [0, 0, "-90 nm"], "normal": [0, 0, 1]}
+    for given, name, density in (
+        ("Silica", "silica", 2650.0),
+        ("Dust", "Dust", 2000.0),
+        ("dust", "dust", 900.0),
+        ({"SILICA": 0.5, "Iron": 0.5}, "silica", 2650.0),
+    ):
+        content = changed(grains__material=given, box__periodic=["400 nm", "400 nm", "open"], grains__extent="150 nm")
+        case = check_case(content | {"materials": own, "walls": [wall]}, "case")
+        assert case.components()["walls"][0].material.name == "silica"
+        content["forces"].pop("dipoles")
+        content["grains"]["moment"] = 0.0
+        simulation = simulation_of(check_case(content | {"materials": own}, "case"), None)
+        found = {one.name: one.density for one in simulation.grains.materials}
+        assert found[name] == density
+        again = check_case(case_of(simulation, 1e-9, 1e9, None), "case")
+        assert {one.name for one in simulation_of(again, None).grains.materials} == set(found)
+    body = {"kind": "grain", "radius": "0.1 um", "material": "SILICA"}
+    collision = {"target": body, "projectile": body, "impact": {"speed": 1.0}, "forces": {"contact": {}}}
+    assert CollisionCase.model_validate(collision).approach(0).grains.materials[0].name == "silica"
+    with pytest.raises(BadInput, match="did you mean 'silica'"):
+        check_case(changed(grains__material="Silca"), "case")

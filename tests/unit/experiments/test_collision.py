@@ -112,6 +112,9 @@ def test_an_end_before_the_first_contact(capsys):
     assert collision_title([result.to_dict()], "X") == "Collision of X at 1 m/s, head-on: no contact yet"
     (_, text), (_, counts) = collision_rows([result.to_dict()])
     assert text.startswith("undecided: no contact formed; stopped before") and counts == "1 × undecided"
+    made_up = result.to_dict() | {"outcome": "stick", "made": 3, "moved": 7, "broken": 1}
+    (_, text), _ = collision_rows([made_up])
+    assert "; contacts 3 formed, 1 broken, 7 slips; " in text  # the words of `sand run`
     later, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b", end=2.0 * expected_end(start))
     assert (later.outcome, later.kind, later.quiet) == ("miss", "miss", True)
 

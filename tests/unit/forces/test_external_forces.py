@@ -243,7 +243,7 @@ def test_scalars_and_units():
 @pytest.mark.parametrize("force", [*FORCES, sand.Gravity("1 m/s^2"), sand.Field(0, shape="ramp", final=1, end=2)])
 def test_case_file_round_trip(force):
     """Parameters to TOML and back: an equal object and equal numbers; also directly through the class."""
-    case = {"run": {"steps": 1}, "grains": {"number": 1, "radius": 1.0}, "forces": {force.name: force.parameters()}}
+    case = {"run": {"steps": 1}, "grains": {"number": 1, "radius": 1e-8}, "forces": {force.name: force.parameters()}}
     read = check_case(tomllib.loads(tomli_w.dumps(case)), "some.toml").forces.build()
     assert read == [force] == [type(force)(**force.parameters())]
     assert read[0].numbers() == force.numbers()
@@ -277,7 +277,7 @@ def test_all_wrong_settings_are_reported_together():
     assert [sum(f"field: {key}" in line for line in caught.value.problems) for key in keys] == [1] * 6
     assert len(caught.value.problems) == 6
     forces = {"field": field, "gravity": {"acceleration": ["1 m", 0, "2 m"]}, "electric": {"strenght": 1}}
-    case = {"run": {"steps": 1}, "grains": {"number": 1, "radius": 1.0}, "forces": forces}
+    case = {"run": {"steps": 1}, "grains": {"number": 1, "radius": 1e-8}, "forces": forces}
     with pytest.raises(BadInput) as caught:
         check_case(case, "some.toml")
     lines = caught.value.problems

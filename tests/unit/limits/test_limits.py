@@ -58,6 +58,8 @@ def test_contacts_of_cold_iron_do_not_creep():
     (text,) = limit_warnings(grains, [soft], BOX)
     assert "only twisting 9.9 kT (below 10)" in text
     assert limit_warnings(grains, [soft, sand.Gas("90 K", density=1e-6)], BOX) == []
+    (text,) = limit_warnings(grains, [sand.Contact(twist_factor=9.9999 / energy)], BOX)
+    assert "only twisting 9.9999 kT (below 10)" in text
 
 
 def test_velocities_are_thermal_in_a_periodic_box_only():
@@ -158,3 +160,19 @@ forces.contact = {}
     path.write_text(case, encoding="utf-8")
     assert main(["info", str(path), "--json"]) == 0
     assert list(json.loads(capsys.readouterr().out)["limits"]) == ["fresh contact"]
+
+
+def test_a_field_that_is_probably_in_another_unit():
+    """A warning above 5 T, of the largest |B0| + |B1|, the end of a ramp, or a point of a `Ramp`; none at 5 T."""
+    grains = thermal("10 nm", "silica", 0.0)
+    fine = [sand.Field(5.0), sand.Field([3, 0, 4]), sand.Field(2, shape="oscillating", amplitude=3, frequency=1e6)]
+    assert limit_warnings(grains, fine, BOX) == []
+    for field, size in (
+        (sand.Field(10), "10 T"),
+        (sand.Field(5.00001), "5.00001 T"),
+        (sand.Field(3, shape="oscillating", amplitude=3, frequency=1e6), "6 T"),
+        (sand.Field(0, shape="ramp", final=[0, 8, 6], end="1 us"), "10 T"),
+        (sand.Field(sand.Ramp([[0, 0, 0], [0, 0, 7]], ["1 ns", "2 ns"])), "7 T"),
+    ):
+        (text,) = limit_warnings(grains, [field], BOX)
+        assert f"of up to {size} is above 5 T" in text and "a number without a unit is in T" in text

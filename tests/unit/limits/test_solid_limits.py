@@ -106,6 +106,9 @@ def test_warnings_of_the_extremes_say_number_unit_and_limit():
     assert impact.startswith(IMPACT) and "up to 145 m/s" in impact and "0.0321" in impact and "limit 0.03" in impact
     assert overlap.startswith(OVERLAP) and "0.123 radii" in overlap and "limit 0.1" in overlap
     assert all(text.startswith(about) and "\n" not in text for about, text in extreme_warnings(clock).items())
+    clock[LARGEST_OVERLAP], clock[LARGEST_IMPACT] = 0.10004, 0.0300001  # as many digits as show that they are past it
+    impact, overlap = extreme_warnings(clock).values()
+    assert "0.0300001 of" in impact and "0.10004 radii" in overlap
 
 
 def pair(speed, r1=1e-6, r2=1e-6, **options):

@@ -14,7 +14,9 @@ from sand.analysis.clusters import unwrapped
 from sand.analysis.ledger_columns import LedgerColumns
 from sand.basics.box import Box
 from sand.basics.constants import BOLTZMANN
+from sand.plotting.figure_format import figure_format
 from sand.plotting.panels import draw_pressure, energy_unit, time_unit
+from sand.plotting.render.directions import uniform_fields
 from sand.plotting.render.scene import camera_rotation, make_scene, side_by_side, view_window
 from sand.plotting.render.spheres import SUPERSAMPLING, Spheres, render_spheres
 from sand.plotting.run_figure import figure_bytes, run_figure, save, show
@@ -32,7 +34,7 @@ def ledger_of(rows, outside=()):
     return ledger
 
 
-def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.0, outside=(), **more):
+def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.0, outside=(), forces=(), **more):
     """The attributes of a simulation that the figure needs."""
     grains = sand.Grains(position, radius, sand.SILICA, **more)
     ledger = ledger_of(rows, outside)
@@ -42,6 +44,7 @@ def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.
         contacts={"pair": np.array(pairs, dtype=np.uint32).reshape(-1, 2)},
         ledger=ledger,
         temperature=temperature,
+        forces=list(forces),
         notes=list,
         title="",
         time=ledger.rows[-1]["time"] if rows else 0.0,
@@ -62,6 +65,7 @@ def run_with_clusters():
             "field": -2e-20,
             "lost_forming": 3e-18 * k,
             "lost_sliding": 1e-22 * k,
+            "lost_settling": 1e-32 * k,
             "total": 1e-19 + 1e-22 * k,
             "clusters": 4 - k // 5,
             "mean_cluster_size": 1.0 + 0.15 * k,
@@ -295,8 +299,10 @@ def test_largest_clusters_are_moved_as_rigid_bodies(run_with_clusters):
     position = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [9, 9, 9], [9, 9, 11]]
     pairs = np.array([(3, 4), (0, 1), (1, 2)])
     scene = make_scene(sand.Grains(np.array(position, float), 1.0, "ice"), pairs, Box.open())
-    balls, _, sizes = side_by_side(scene, 3)
+    balls, _, sizes, rotations = side_by_side(scene, 3)
     assert sizes == [3, 2]
+    turned = balls.centre[3:] - scene.position[3:] @ rotations[1].T
+    np.testing.assert_allclose(turned[0], turned[1], rtol=0.0, atol=1e-12)
 
     def distance(p):
         return np.linalg.norm(p[:, None] - p[None], axis=-1)
@@ -321,6 +327,57 @@ def test_box_has_twelve_edges(figure):
     assert len(edges) == 12
     alone = run_figure(run_of([[0.0, 0.0, 0.0]]))
     assert not [line for line in alone.axes[-1].get_lines() if line.get_gid() == "box"]
+
+
+@pytest.mark.parametrize(
+    ("force", "time", "text"),
+    [
+        (sand.Field("1 mT"), 0.0, "B = 1 mT along z"),
+        (sand.Field([0, -3e-3, 4e-3]), 0.0, "B = 5 mT along (0, −0.6, 0.8)"),
+        (sand.Field([-2, 0, 0]), 0.0, "B = 2 T along −x"),
+        (sand.Field(0, shape="oscillating", amplitude=1e-3, frequency=1e6), 0.0, "B = 1 mT along z at this time"),
+        (sand.Field(0, shape="oscillating", amplitude=1e-3, frequency=1e6), 0.25e-6, "B = 0 at this time"),
+        (sand.Field(0, shape="ramp", final="2 mT", end="1 us"), 0.5e-6, "B = 1 mT along z at this time"),
+        (sand.Field(sand.Ramp([[0, 0, 0], [0, 0, 1]], ["0 ns", "2 ns"])), 1e-9, "B = 500 mT along z at this time"),
+        (sand.ElectricField("1 kV/m"), 0.0, "E = 1 kV/m along z"),
+        (sand.Gravity("9.81 m/s^2"), 0.0, "g = 9.81 m/s² along −z"),
+        (sand.Field(0), 0.0, ""),
+        (sand.Contact(), 0.0, ""),
+    ],
+)
+def test_uniform_fields_in_words(force, time, text):
+    """The value at the time of the figure and its direction; a field that is always 0 is left out."""
+    assert " ".join(field.text() for field in uniform_fields([force], time)) == text
+
+
+@pytest.mark.parametrize("width", [None, "3.4in"])
+def test_the_field_of_a_run_is_shown(run_with_clusters, width):
+    """The header has the field; its arrow is along the projected field, and below each cluster turned as the cluster.
+
+    No label of an axis reaches the letter of its panel, and no note the numbers of the axis.
+    """
+    run = SimpleNamespace(**vars(run_with_clusters))
+    run.forces = [sand.Field([1e-3, 2e-3, 5e-3])]
+    run.grains = sand.Grains(run.grains.position, 0.2 * run.grains.radius, "silica", moment=run.grains.moment)
+    with figure_format(width):
+        figure = run_figure(run)
+    assert "B = 5.48 mT along (0.18, 0.37, 0.91)" in " ".join(text.get_text() for text in figure.texts).replace(
+        "\n", " "
+    )
+    scene = make_scene(run.grains, run.contacts["pair"], run.box)
+    rotations = [camera_rotation(), *side_by_side(scene, 3)[3]]
+    drawn = [(axes, text) for axes in figure.axes for text in axes.texts if text.get_gid() == "direction of B"]
+    assert len(drawn) == len(rotations) == 2
+    for (axes, arrow), rotation in zip(drawn, rotations, strict=True):
+        seen = np.array(arrow.xy) - arrow.xyann
+        expected = (rotation @ [1, 2, 5])[:2]
+        assert seen @ expected == pytest.approx(np.hypot(*seen) * np.hypot(*expected), rel=1e-6, abs=0.0)
+        assert {"x", "y", "z"} & {text.get_text() for text in axes.texts} and "B" in texts(figure)
+    for axes in figure.axes[:4]:
+        letter = next(text for text in axes.texts if text.get_text() in "abcdefgh")
+        assert not axes.yaxis.label.get_window_extent().overlaps(letter.get_window_extent())
+        notes = [text for text in axes.texts if text.get_text().startswith("none: ")]
+        assert all(note.get_window_extent().x0 > axes.bbox.x0 for note in notes)
 
 
 # --- unusual runs ------------------------------------------------------------------------------------

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from sand.analysis.collision_kinds import KINDS
+from sand.experiments.sweep_cases import units_of
 from sand.plotting.style import LOOKS, looks_of
-from sand.plotting.sweeps import sweep_figure
+from sand.plotting.sweeps import label, sweep_figure
 
 SPEEDS = np.geomspace(10.0, 200.0, 10).round(3).tolist()
 KEYS = ["impact.speed", "impact.impact_parameter", "projectile.grains"]
@@ -59,7 +60,7 @@ def test_a_map_has_a_mark_for_each_run():
     apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 1e9 * np.eye(len(places))
     sizes = [line.get_markersize() for line in axes.lines if line.get_marker() != "None"]
     assert apart.min() >= max(sizes) * figure.dpi / 72.0
-    assert axes.get_xscale() == "log" and axes.get_ylabel() == "impact.impact_parameter [b]"
+    assert axes.get_xscale() == "log" and axes.get_ylabel() == "impact parameter (b)"
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(KINDS)
 
 
@@ -103,3 +104,33 @@ def test_lines_and_panels_that_are_left_out():
         figure = sweep_figure(many, KEYS, what)
         assert figure.get_suptitle() == f"the first {number} combinations of the other keys"
     assert sweep_figure(table(), KEYS, "kind").get_suptitle() == ""
+
+
+@pytest.mark.slow
+def test_axes_and_titles_are_in_words_with_units():
+    """Keys have the units of the case, results those of their description; the title has runs and seeds."""
+    case = {
+        "target": {"kind": "grain", "radius": "0.1 um"},
+        "projectile": {"kind": "grain", "radius": "0.1 um"},
+        "impact": {"speed": "2 m/s"},
+        "sweep": {"vary": {}},
+    }
+    columns = ["impact.speed", "impact.impact_parameter", "target.radius", "target.grains", "seed"]
+    results = ["impact_energy", "lost_rolling", "rebound", "time", "growth_efficiency", "kind", "impact_parameter"]
+    units = units_of(case, [*columns, *results])
+    assert units == {"impact.speed": "m/s", "target.radius": "m", "impact_energy": "J", "lost_rolling": "J"} | {
+        "rebound": "m/s", "time": "s", "impact_parameter": "m",
+    }  # fmt: skip
+    assert units_of({"run": {}, "grains": {}}, ["grains.temperature", "forces.field.flux_density"]) == {
+        "grains.temperature": "K", "forces.field.flux_density": "T",
+    }  # fmt: skip
+    assert label("impact.impact_parameter", units) == "impact parameter"
+    assert label("forces.field.flux_density", {}) == "field flux density"
+    assert label("lost_rolling", units) == "lost rolling (J)"
+    runs = table(offsets=1, grains=(1,)) | {"target.radius": np.array([1e-7, 2e-7] * 15)}
+    figure = sweep_figure(runs, ["impact.speed", "target.radius"], "growth_efficiency", units, "speeds")
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("impact speed (m/s)", "growth efficiency")
+    assert figure.get_suptitle() == "speeds: 30 runs, 3 seeds"
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["target radius = 100 nm", "target radius = 200 nm"]

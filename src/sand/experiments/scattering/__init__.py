@@ -5,10 +5,7 @@ Functions are imported on first use: `sand.experiments.scattering.cross_section(
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
-
-from ...basics.errors import NoSuchAttribute, did_you_mean
+from ...basics.lazy import lazily
 
 _MODULES = {
     "CrossSection": "cross_sections",
@@ -25,8 +22,4 @@ _MODULES = {
 }
 """Public names and the modules that define them."""
 
-
-def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return getattr(importlib.import_module(f".{_MODULES[name]}", __name__), name)
-    raise NoSuchAttribute(f"module 'sand.experiments.scattering' has no '{name}'; {did_you_mean(name, list(_MODULES))}")
+__getattr__, __dir__ = lazily(__name__, _MODULES)

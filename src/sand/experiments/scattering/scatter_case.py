@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field
 
 from ...basics.errors import BadInput, ErrorCollector, naming
-from ...basics.material import PRESETS
 from ...basics.settings import For, Number, Whole
-from ...config.case import MaterialSection, material_errors, read_content
+from ...config.case import MaterialSection, library_of, material_errors, read_content
 from ...config.key_errors import validate
 from ...config.sections import PathName, Section, Seed, with_keys
 from ..collision_case import BodyKind, BodySection
@@ -75,7 +74,7 @@ class ScatterCase(Section):
             All errors of bodies and initial conditions.
         """
         errors, measure = ErrorCollector(), self.measure
-        materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        materials = library_of(self.materials)
         sections = {"projectile": self.projectile, "target": self.target}
         bodies = {
             name: errors.take(section.build, materials, 2 * measure.seed + k)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,10 +24,17 @@ from ..style import (
     rgb,
     round_length,
 )
+from .directions import UniformField, draw_directions
 from .spheres import Spheres, render_spheres
 
 AZIMUTH, ELEVATION = 32.0, 20.0
 """Default direction to the eye [degrees], seen from the centre of the box; z is up."""
+LENGTH, LENGTH_OF_LARGEST = 0.042, 8.0
+"""Length of axes in heights of the picture of all grains, and below the largest clusters in `style.points`."""
+WIDTH_OF_LABEL = 105.0
+"""Width of the number of grains and the directions below a cluster, in `style.points`."""
+BELOW_LARGEST = 38.0
+"""Height of these, and of the scale bar below them, in `style.points`."""
 LARGEST_SHOWN = 3
 """Maximum number of clusters shown side by side."""
 
@@ -219,26 +227,22 @@ def fit_window(
     return x - aspect * height / 2, x + aspect * height / 2, y - height / 2, y + height / 2
 
 
-def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
-    """Draw all grains in the box, with a scale bar and the directions of the axes."""
+def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int], fields: Sequence[UniformField] = ()) -> None:
+    """Draw all grains in the box, with a scale bar and the directions of the axes and of the fields."""
     window = view_window(scene, pixels[0] / pixels[1])
     _draw_image(axes, scene.projected(camera_rotation()), window, pixels)
     _draw_box(axes, scene)
-    _draw_directions(axes)
+    left, _, bottom, top = window
+    size = LENGTH * (top - bottom)
+    draw_directions(axes, camera_rotation(), (left + 1.6 * size, bottom + 0.9 * size), size, fields)
     draw_scale_bar(axes)
 
 
 def _draw_image(
     axes: Axes, spheres: Spheres, window: tuple[float, float, float, float], pixels: tuple[int, int]
 ) -> None:
-    axes.imshow(
-        render_spheres(spheres, window, *pixels),
-        extent=window,
-        origin="lower",
-        aspect="auto",
-        interpolation="antialiased",
-        zorder=2,
-    )
+    picture = render_spheres(spheres, window, *pixels)
+    axes.imshow(picture, extent=window, origin="lower", aspect="auto", interpolation="antialiased", zorder=2)
     axes.set(xlim=window[:2], ylim=window[2:])
     axes.set_axis_off()
 
@@ -259,16 +263,6 @@ def _draw_box(axes: Axes, scene: Scene) -> None:
         )
 
 
-def _draw_directions(axes: Axes) -> None:
-    """Draw the axes x, y and z in the lower left corner."""
-    left, (bottom, top) = axes.get_xlim()[0], axes.get_ylim()
-    size = 0.042 * (top - bottom)
-    x, y = left + 1.6 * size, bottom + 0.9 * size
-    for name, step in zip("xyz", camera_rotation()[:2].T * size, strict=True):
-        axes.plot([x, x + step[0]], [y, y + step[1]], color=MUTED, linewidth=0.9, zorder=4)
-        axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=MUTED, size=points(7.0), ha="center", va="center")
-
-
 def draw_scale_bar(
     axes: Axes, share: float = 0.25, colour: str = TEXT_COLOUR, margin: float = 0.015, scale: float = 1.0
 ) -> None:
@@ -276,34 +270,27 @@ def draw_scale_bar(
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     length = round_length(share * (right - left))
     x, y = right - margin * (right - left), bottom + 4.0 / 3.0 * margin * (top - bottom)
-    axes.plot(
-        [x - length, x], [y, y], color=colour, linewidth=2.0 * scale, solid_capstyle="butt", zorder=4, gid="scale"
-    )
-    centre, offset = (x - length / 2, y), (0, 3 * scale)
-    axes.annotate(
-        format_si(length, "m"),
-        centre,
-        offset,
-        textcoords="offset points",
-        ha="center",
-        color=colour,
-        size=points(7.5 * scale),
-    )
+    bar: dict[str, Any] = {"linewidth": 2.0 * scale, "solid_capstyle": "butt", "zorder": 4, "gid": "scale"}
+    axes.plot([x - length, x], [y, y], color=colour, **bar)
+    look: dict[str, Any] = {"ha": "center", "color": colour, "size": points(7.5 * scale)}
+    axes.annotate(format_si(length, "m"), (x - length / 2, y), (0, 3 * scale), textcoords="offset points", **look)
 
 
-def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[int]]:
+def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[int], list[np.ndarray]]:
     """Arrange the `count` largest clusters in a row, each rotated so that its longest axis is horizontal.
 
     Returns
     -------
-    tuple of (Spheres, ndarray, list of int)
-        Spheres to be drawn; (K, 2) centre of the lower edge of each cluster [m]; number of grains of each cluster.
+    tuple of (Spheres, ndarray, list of int, list of ndarray)
+        Spheres to be drawn; (K, 2) centre of the lower edge of each cluster [m]; number of grains of each cluster; its
+        rotation (3, 3) from the laboratory.
     """
-    parts, lower_edges, sizes, x = [], [], [], 0.0
+    parts, lower_edges, sizes, rotations, x = [], [], [], [], 0.0
     gap = 3.0 * float(scene.radius.max())
     for label in largest_clusters(scene.label)[:count]:
         members = np.flatnonzero(scene.label == label)
-        spheres = scene.projected(_principal_axes(scene.position[members]), members)
+        rotations.append(_principal_axes(scene.position[members]))
+        spheres = scene.projected(rotations[-1], members)
         left, right, bottom, top = spheres.bounds
         shift = np.array([x - left, -(bottom + top) / 2, -spheres.centre[:, 2].mean()])
         parts.append(Spheres(spheres.centre + shift, spheres.radius, spheres.colour, spheres.arrow))
@@ -311,7 +298,7 @@ def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[in
         sizes.append(members.size)
         x += right - left + gap
     fields = zip(*((p.centre, p.radius, p.colour, p.arrow) for p in parts), strict=True)
-    return Spheres(*(np.concatenate(each) for each in fields)), np.array(lower_edges), sizes
+    return Spheres(*(np.concatenate(each) for each in fields)), np.array(lower_edges), sizes, rotations
 
 
 def _principal_axes(position: np.ndarray) -> np.ndarray:
@@ -321,20 +308,30 @@ def _principal_axes(position: np.ndarray) -> np.ndarray:
     return axes
 
 
-def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
-    """Draw the largest clusters side by side, enlarged so that grains and moments are distinguishable."""
+def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int], fields: Sequence[UniformField] = ()) -> None:
+    """Draw the largest clusters side by side, enlarged so that grains and moments are distinguishable.
+
+    Each is turned so that it lies flat, and has its own directions of the axes and of the fields below it.
+    """
     aspect = pixels[0] / pixels[1]
     min_height = 2.0 * float(np.median(scene.radius)) * pixels[1] / 76.0  # at most 76 pixels per grain
-    for count in range(min(LARGEST_SHOWN, len(largest_clusters(scene.label))), 0, -1):
-        spheres, lower_edges, sizes = side_by_side(scene, count)
+    extent = axes.get_window_extent()
+    width, height = (72.0 * size / axes.figure.dpi / points(1.0) for size in (extent.width, extent.height))
+    most = max(1, min(LARGEST_SHOWN, len(largest_clusters(scene.label)), int(width / WIDTH_OF_LABEL)))
+    for count in range(most, 0, -1):
+        spheres, lower_edges, sizes, rotations = side_by_side(scene, count)
         left, right, bottom, top = spheres.bounds
         # Further clusters only if they do not make all of them small.
         if right - left < 1.5 * aspect * max(top - bottom, min_height):
             break
-    window = fit_window((left, right, bottom - 0.22 * (top - bottom), top), aspect, 0.02, min_height)
+    below = BELOW_LARGEST / (height - BELOW_LARGEST)
+    window = fit_window((left, right, bottom - below * (top - bottom), top), aspect, 0.02, min_height)
     _draw_image(axes, spheres, window, pixels)
-    for edge, size in zip(lower_edges, sizes, strict=True):
-        axes.annotate(
-            f"{size} grains", edge, (0, -3), textcoords="offset points", ha="center", va="top", size=points(7.5)
-        )
+    point = (window[3] - window[2]) / height
+    aside, length = 15.0 + 13.0 * len(fields), LENGTH_OF_LARGEST * point
+    for edge, size, rotation in zip(lower_edges, sizes, rotations, strict=True):
+        x = np.clip(edge[0], window[0] + (aside + 22.0) * point, window[1] - (aside + 22.0) * point) - aside * point
+        y = edge[1] - 1.8 * length
+        axes.annotate(f"{size} grains", (x, y), ha="center", va="center", size=points(7.5))
+        draw_directions(axes, rotation, (x + 36.0 * point, y), length, fields)
     draw_scale_bar(axes, 0.15)
