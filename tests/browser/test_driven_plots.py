@@ -66,7 +66,10 @@ def test_every_colour_is_drawn(view):
     seen = set()
     for name in view.run("app.state.setting('colour').options.map(([name]) => name)"):
         view.control("colour").select_option(name)
-        assert differ(view.picture(), np.zeros_like(view.picture())) > 0
+        whole = view.picture()
+        view.put(size=0.01)
+        assert differ(whole, view.picture(), by=8) > 100, name
+        view.put(size=1.0)
         seen.add(view.text(".gv-legend"))
     assert len(seen) == len(view.run("app.state.setting('colour').options"))
 
@@ -172,7 +175,7 @@ def test_the_sign_of_stretch_is_explained(view):
     view.press("k")
     row = view.tab.locator(".gv-inspector tr", has_text="stretch / limit")
     words = row.get_attribute("title")
-    assert "positive if stretched" in words and "negative if compressed" in words and "−1.21" in words
+    assert "negative if they overlap" in words and "negative if compressed" in words and "−1.21" in words
     shares = view.run("[...app.picture.frame.share].filter((_, k) => k % 4 === 0)")
     assert np.median(shares) == pytest.approx(-2 * 6 ** (1 / 3) / 3, abs=0.1)
 

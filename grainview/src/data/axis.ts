@@ -73,8 +73,9 @@ function logarithmic(values: number[], least: number, room: number): Axis {
   const margin = Math.max(MARGIN * (high - low), 0.05);
   [low, high] = [low - margin, high + margin];
   if (high - low > FEW) {
-    const ticks = exponents(low, high, room).map((n) => ({ place: n, label: powerText(10 ** n) }));
-    return { place, low, high, ticks };
+    let places = exponents(low, high, room);
+    for (let more = room + 1; places.length < 2 && more < room + 4; more++) places = exponents(low, high, more);
+    return { place, low, high, ticks: places.map((n) => ({ place: n, label: powerText(10 ** n) })) };
   }
   const [from, to] = [10 ** low, 10 ** high];
   const sets = FACTORS.map((factors) => (
@@ -87,7 +88,7 @@ function logarithmic(values: number[], least: number, room: number): Axis {
   return { place, low, high, ticks: ticks.map((v, k) => ({ place: Math.log10(v), label: labels[k] })) };
 }
 
-/** Linear from −`least` to `least`, which is as long as two powers of ten, and logarithmic on both sides. */
+/** Linear from −`least` to `least`, a part as long as two powers of ten, and logarithmic on both sides. */
 function symmetric(values: number[], least: number, room: number): Axis {
   const at = (v: number): number => (
     Math.abs(v) <= least ? v / least : Math.sign(v) * (1 + Math.log10(Math.abs(v)) - Math.log10(least))

@@ -87,8 +87,9 @@ function scaleOf(quantity: Quantity, values: Float32Array, settings: ScaleSettin
     return { low: -reach, high: reach, log: false, palette: manifest.palettes.diverging, clipped };
   }
   const range = manifest.ranges[quantity.id];
-  const own = !Number.isNaN(settings.low) || !Number.isNaN(settings.high); // told by the user
-  let [low, high] = (range && range[1] > range[0] ? range : extent(values)) ?? [0, 1];
+  const ofRun = range !== undefined && range[1] > range[0];
+  const given = !Number.isNaN(settings.low) || !Number.isNaN(settings.high); // by the user
+  let [low, high] = (ofRun ? range : extent(values)) ?? [0, 1];
   if (!Number.isNaN(settings.low)) low = settings.low;
   if (!Number.isNaN(settings.high)) high = settings.high;
   if (low > high) [low, high] = [high, low];
@@ -96,7 +97,7 @@ function scaleOf(quantity: Quantity, values: Float32Array, settings: ScaleSettin
   const log = settings.log && high > 0;
   if (log && !(low > 0)) low = high * 1e-4;
   const palette = manifest.palettes[settings.palette] ?? Object.values(manifest.palettes)[0];
-  return { low, high, log, palette, clipped: !own && isClipped(quantity.id, manifest) };
+  return { low, high, log, palette, clipped: ofRun && !given && isClipped(quantity.id, manifest) };
 }
 
 export interface Painted {

@@ -10,7 +10,7 @@ export interface Swatch {
   colour: string | null;
   text: string;
   grain?: number;
-  /** More words, for who asks. */
+  /** A further explanation, shown as a tooltip. */
   hint?: string;
 }
 
@@ -44,8 +44,8 @@ function bar(scale: Scale, label: string, unit: string, limits: [number, number]
   if (!scale.clipped) return { title, ...colours };
   // a scale from −x to x has the magnitudes up to x
   const [low, high] = scale.low === -scale.high ? [0, limits[1]] : limits;
-  const hint = `Of all values of the run that are not zero, ${high - low} % are in this range; those beyond have the `
-    + "colours of its ends.";
+  const hint = `Of the values that are not zero, in frames spread over the run, ${high - low} % are in this range; `
+    + "those beyond have the colours of its ends.";
   return { title: `${title}, ${high - low} % of values`, hint, ...colours };
 }
 

@@ -18,10 +18,10 @@ class SpanningTrees:
     Parameters
     ----------
     count : int
-        Number N of grains.
+        Number N ≥ 1 of grains.
     pairs : ndarray
         Contacts (C, 2).
-    first : ndarray
+    tops : ndarray
         One grain of each body (K,), the top of its tree.
 
     Attributes
@@ -34,11 +34,11 @@ class SpanningTrees:
         Contact of each node with its parent (N + 1,); −1 for the root and the top of each tree.
     """
 
-    def __init__(self, count: int, pairs: np.ndarray, first: np.ndarray):
+    def __init__(self, count: int, pairs: np.ndarray, tops: np.ndarray):
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import breadth_first_order
 
-        ends = np.vstack((np.asarray(pairs, np.int64), np.column_stack((first, np.full(len(first), count)))))
+        ends = np.vstack((np.asarray(pairs, np.int64), np.column_stack((tops, np.full(len(tops), count)))))
         numbers = np.arange(1, len(ends) + 1)  # 0 would be no edge
         graph = coo_array((numbers, (ends[:, 0], ends[:, 1])), shape=(count + 1, count + 1)).tocsr()
         graph = graph + graph.T
@@ -49,14 +49,14 @@ class SpanningTrees:
         self.parent = np.concatenate(([-1], self._node[above]))
         edge = np.asarray(graph[self.grain[1:], above]).ravel() - 1
         self.contact = np.concatenate(([-1], np.where(edge < len(pairs), edge, -1)))
-        oldest = np.flatnonzero(np.diff(self.parent, prepend=-2))  # of all nodes with the same parent
-        self._oldest, begin, end = oldest, 0, 1
-        self._depths = list[tuple[slice, np.ndarray]]()  # nodes, and the oldest ones from the first of them
+        first_child = np.flatnonzero(np.diff(self.parent, prepend=-2))  # of all nodes with the same parent
+        self._first_child, begin, end = first_child, 0, 1
+        self._depths = list[tuple[slice, np.ndarray]]()  # nodes of a depth, and the first children among them
         while end <= count:
             begin, end = end, int(np.searchsorted(self.parent, end))
-            here = oldest[np.searchsorted(oldest, begin) : np.searchsorted(oldest, end)]
+            here = first_child[np.searchsorted(first_child, begin) : np.searchsorted(first_child, end)]
             self._depths.append((slice(begin, end), here))
-        self._others = self._node[ends[np.setdiff1d(np.arange(len(pairs)), self.contact)]]
+        self._outside_trees = self._node[ends[np.setdiff1d(np.arange(len(pairs)), self.contact)]]
 
     def over_subtrees(self, combine: np.ufunc, values: np.ndarray) -> np.ndarray:
         """Combine the values of all grains below and at each node, with `np.add`, `np.minimum` or `np.maximum`.
@@ -69,24 +69,24 @@ class SpanningTrees:
             Values of the nodes (N + 1, …).
         """
         found = np.array(values)
-        for depth, oldest in reversed(self._depths):
-            at = self.parent[oldest]
-            found[at] = combine(found[at], combine.reduceat(found[depth], oldest - depth.start, axis=0))
+        for depth, first_child in reversed(self._depths):
+            at = self.parent[first_child]
+            found[at] = combine(found[at], combine.reduceat(found[depth], first_child - depth.start, axis=0))
         return found
 
     def bridges(self) -> np.ndarray:
         """Nodes whose contact with the parent alone joins the grains below it to the rest of the body.
 
-        Nodes are numbered in preorder, so that those of a subtree of s nodes are p … p + s − 1: its contact is a bridge
-        if no other contact leads from them to a number outside of these (Tarjan 1974).
+        Nodes get a second number, in preorder, so that those of a subtree of s nodes are p … p + s − 1: its contact is
+        a bridge if no other contact leads from them to a number outside of these (Tarjan 1974).
         """
         size = self.over_subtrees(np.add, np.ones(len(self.grain), np.int64))
         before = np.cumsum(size) - size  # nodes below and at all nodes before
-        families = np.diff(self._oldest, append=len(size))
-        number = 1 + before - np.repeat(before[self._oldest], families)
+        children = np.diff(self._first_child, append=len(size))
+        number = 1 + before - np.repeat(before[self._first_child], children)
         for depth, _ in self._depths:
             number[depth] += number[self.parent[depth]]
-        low, high, (one, other) = number.copy(), number.copy(), self._others.T
+        low, high, (one, other) = number.copy(), number.copy(), self._outside_trees.T
         for here, there in ((one, other), (other, one)):
             np.minimum.at(low, here, number[there])
             np.maximum.at(high, here, number[there])

@@ -24,7 +24,7 @@ LOSS_TEXTS = {name: f"dissipated by {name} beyond the limit" for name in ("slidi
     "cutoff_changed": "energy removed by longer cut-offs of dipoles",
     "quieting": "removed from vibrations of clusters that came to rest",
 }
-"""What each loss of LOST is, as docs/reference/ledger.md begins to say it."""
+"""What each loss of LOST is: the beginnings of the descriptions in docs/reference/ledger.md."""
 DAMPED = tuple(f"lost_{name}" for name in DAMPING)
 ALWAYS_LOST = (
     *("lost_forming", "lost_breaking", "lost_sliding", "lost_rolling", "lost_twisting"),

@@ -196,22 +196,28 @@ PAPERS = (
 
 
 class Library(dict[str, Any]):
-    """Presets and further materials by name; case is ignored where no name has the same."""
+    """Presets and further materials by names that users give: case is ignored where no name has the same.
+
+    A name that SAND has written into a file is exact, and looked up in `dict(library)`.
+    """
 
     def __init__(self, own: Mapping[str, Any] = MappingProxyType({})):
         super().__init__(COMMON | {p.material.name: p.material for p in PAPERS} | dict(own))
+        self._similar = dict[str, list[str]]()
+        for name in self:
+            self._similar.setdefault(name.lower(), []).append(name)
 
     def __contains__(self, name: object) -> bool:
-        return super().__contains__(name) or (isinstance(name, str) and name.lower() in self._lower())
+        return super().__contains__(name) or (isinstance(name, str) and name.lower() in self._similar)
 
     def __missing__(self, name: str) -> Any:
-        """Raises BadInput that shows the nearest names."""
-        if name not in self:
-            raise BadInput(f"unknown material '{name}'; {did_you_mean(name, list(self), NEAREST)}")
-        return self._lower()[name.lower()]
-
-    def _lower(self) -> dict[str, Any]:
-        return {name.lower(): one for name, one in self.items()}
+        """Raises BadInput for an unknown name, with the nearest ones, and where several differ from it in case only."""
+        similar = self._similar.get(str(name).lower(), [])
+        if not similar:
+            raise BadInput(f"unknown material '{name}'; {did_you_mean(str(name), list(self), NEAREST)}")
+        if len(similar) > 1:
+            raise BadInput(f"material '{name}' is not unique; give {' or '.join(map(repr, similar))}")
+        return self[similar[0]]
 
 
 PRESETS = Library()

@@ -231,7 +231,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
         arrays, meta = newest_checkpoint(place, components.groups())
     case = _case_of_checkpoint(place, meta)
     names = list(meta["case"]["materials"])  # in the order of the indices in the checkpoint
-    library = case.materials_by_name()
+    library = dict(case.materials_by_name())  # exact names, of the checkpoint
     try:
         index = arrays["grains/material"]
         grains = grains_from_arrays(arrays, [library[names[i]] for i in index], meta.get("own", {}))

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from ..basics.errors import BadInput, did_you_mean
 from ..basics.material import Material
 from ..components.walls import Wall, Walls, read_walls
+from ..setup.grain_classes import in_library
 from .sections import Section, with_keys
 
 
@@ -23,7 +24,7 @@ class WallSection(Section):
     def build(self, materials: dict[str, Material]) -> Wall:
         """Build the wall.  Raises BadInput."""
         given = self.model_dump(exclude_none=True, exclude={"material"})
-        return Wall(material=materials[name] if (name := self.material) in materials else name, **given)
+        return Wall(material=in_library(self.material, materials), **given)
 
 
 def wall_errors(walls: Any, known: Collection[str]) -> list[str]:

@@ -92,8 +92,8 @@ CONTACT_ROWS = (
     (
         "stretch_share",
         "1",
-        "−δ/δ_c, the overlap in units of the separation at which the contact breaks: positive if stretched, 1 where it "
-        "breaks, negative if compressed, −1.21 in a JKR contact without load; −δ/R if it breaks at δ = 0",
+        "−δ/δ_c, how far the surfaces are apart over the distance at which the contact breaks: 1 where it breaks, "
+        "negative if they overlap, −1.21 in a JKR contact without load; −δ/R if it breaks at δ = 0",
     ),
     ("slide_share", "1", "|ζ|/ζ_c: sliding displacement over its limit, 1 where the contact slips"),
     ("roll_share", "1", "|ξ|/ξ_c: rolling displacement over its limit, 1 where the contact slips"),

@@ -213,4 +213,4 @@ def strength_of(simulation: Simulation, pairs: np.ndarray) -> Strength:
     for ends in zip(*np.divmod(both, kinds), strict=True):
         pairing = model.pairing(*(grains.materials[one // sizes] for one in ends))
         found.append(contact_strength(model.contact_law, pairing, *(float(radii[one % sizes]) for one in ends)))
-    return Strength(*np.array(found)[row].T)
+    return Strength(*np.reshape(found, (-1, len(Strength._fields)))[row].T)

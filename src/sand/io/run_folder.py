@@ -388,8 +388,10 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 _QUANTITY = re.compile(r"(?:^|[=\[,])\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE][-+\d])[^\W\d_][^,\]}'=]*)(?=[,\]}]|$)")
-_WORD = re.compile(r"[=\[,]\s*(?!(?:true|false|inf|nan)\b)([^\W\d][^,\]}'=]*)(?=[,\]}]|$)")
+_WORD = re.compile(r"[=\[,]\s*(?!(?i:true|false|inf|nan)\b)([^\W\d][^,\]}'=]*)(?=[,\]}]|$)")
 """A number with a unit, and a word, without quotation marks."""
+_OF_VALUES = ("Invalid value", "Expected newline", "Unclosed array")
+"""Beginnings of errors of tomllib where a value may lack its quotation marks."""
 
 
 def _line_with(text: str, error: str) -> str:
@@ -399,10 +401,15 @@ def _line_with(text: str, error: str) -> str:
     if place is None or int(place[1]) > len(lines):
         return ""
     line = lines[int(place[1]) - 1].strip()
+    if not error.startswith(_OF_VALUES):
+        return f": {shown(line)}"
     bare = re.sub(r"\"[^\"]*\"|'[^']*'", "''", line).partition("#")[0]
     unit, word = _QUANTITY.search(bare), _WORD.search(bare)
     found, what = (unit, "a value with a unit") if unit else (word, "text")
-    return f": {shown(line)}" + (f'; {what} needs quotation marks: "{found[1].strip()}"' if found else "")
+    advice = f'; {what} needs quotation marks: "{found[1].strip()}"' if found else ""
+    if not found and (logical := re.search(r"[=\[,]\s*(True|False|TRUE|FALSE)\b", bare)):
+        advice = f"; write {logical[1].lower()}"
+    return f": {shown(line)}{advice}"
 
 
 def _refuse_extremes(path: str | Path, content: dict[str, Any]) -> None:

@@ -27,7 +27,7 @@ CREEP = 10.0
 REMANENCE = 0.1
 """Largest share of the saturation moment that a grain with several domains keeps (recalled: below 0.05 to 0.1)."""
 STRONGEST_FIELD = 5.0
-"""Flux density [T] above which a field is more probably a mistake of unit than a magnet of a laboratory."""
+"""Flux density [T] above which a field is more probably a mistake of unit than a superconducting magnet."""
 COLD = 1e-6
 """Temperature [K] for limits that do not depend on it."""
 
@@ -69,14 +69,13 @@ def limit_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
 
 
 def _strong_field(field: Field) -> str:
-    """Warning if a field is stronger than that of magnets of laboratories at any time, else ""."""
+    """Warning if a field is stronger than that of most magnets at any time, else ""."""
     largest = field.flux_density_size()
     if not largest > STRONGEST_FIELD:
         return ""
     return (
         f"field: a flux density of up to {format_quantity(largest, 'T', STRONGEST_FIELD)} is above {STRONGEST_FIELD:g} "
-        f"T, which only special magnets reach; if it is meant in mT, give '{largest:.4g} mT': a number without a unit "
-        "is in T"
+        "T, which only superconducting magnets reach; check its unit: a number without one is in T"
     )
 
 

@@ -79,7 +79,7 @@ def sweep_figure(
 
 def label(name: str, units: Mapping[str, str]) -> str:
     """A column in words, with its unit: 'impact speed (m/s)' for `impact.speed`."""
-    parts = name.split(".")[-2:]
+    parts = [part for part in name.split(".") if not part.isdigit()][-2:]
     words = parts[-1:] if parts[-1].startswith(parts[0]) else parts
     unit = f" ({units[name]})" if name in units else ""
     return " ".join(words).replace("_", " ") + unit

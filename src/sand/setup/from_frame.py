@@ -53,6 +53,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
         If a material is unknown, or the overlaps do not fit the positions.
     """
     refuse_other(frame, "materials", "pair", "overlap", "position")
+    materials = dict(materials)  # exact names: case counts in what SAND has written
     if unknown := [name for name in frame.materials if name not in materials]:
         raise BadInput(
             f"the frame has grains of the unknown material '{unknown[0]}'; define it in "

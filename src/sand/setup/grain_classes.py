@@ -25,7 +25,9 @@ from .population import Lognormal, PowerLaw, divided, drawn, fractions_of, radii
 BUILDERS = tuple(kind for kind in KINDS if kind != "grain")
 """Kinds of aggregates that are built."""
 LARGEST_PLAIN = 1e-3
-"""Radius [m] above which a number needs its unit: grains of dust are smaller, and its unit was probably forgotten."""
+"""Radius [m] above which a number needs its unit: grains of dust are smaller, so that a length in nm was meant."""
+LEAST_PLAIN_NM = 0.1
+"""Least number that may be a radius in nm or µm."""
 BODY_FILE = "a file that holds the aggregate, such as 'body.xyz'"
 
 
@@ -42,10 +44,13 @@ def radius_as_given(value: Any) -> Any:
         return value
     if (largest := float(np.max(radii))) <= LARGEST_PLAIN:
         return np.asarray(radii).tolist()
-    if not (has_unit_within(value) or isinstance(value, np.ndarray)):  # arrays are computed, in SI
+    if not (has_unit_within(value) or isinstance(value, (np.ndarray, np.generic))):  # computed, in SI
+        other = "" if largest < LEAST_PLAIN_NM else f"did you mean '{largest:g} nm' or '{largest:g} um'? "
+        metres = f"{largest:g} m" if largest >= 1.0 else f"{1e3 * largest:g} mm"
         raise BadInput(
-            f"radius = {shown(value)}: a number without a unit is in m; did you mean '{largest:g} nm' or "
-            f"'{largest:g} um'? Give '{largest:g} m' if it is in m"
+            f"radius = {shown(value)}: a number without a unit is in m; {other}Give '{metres}' if it is in m".replace(
+                "; Give", "; give"
+            )
         )
     texts = [exact_quantity(one, "m") for one in np.atleast_1d(radii).tolist()]
     return texts if np.ndim(radii) else texts[0]

@@ -24,10 +24,10 @@ def grains_in_words(grains: Any, temperature: float) -> str:
     if grains.moment.any():
         size = (grains.moment.astype(float) ** 2).sum(axis=1) ** 0.5
         parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
-    motion = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "at rest"
+    motion = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "no relative motion"
     if temperature > MELTED:  # bodies that fly, not thermal motion; in the frame of the centre of mass
         square = 3.0 * max(len(grains) - 1, 1) * BOLTZMANN * temperature / float(grains.mass.sum())
-        motion = f"rms speed {format_quantity(square**0.5, 'm/s')}"
+        motion = f"rms speed {format_quantity(square**0.5, 'm/s')} about the centre of mass"
     return ", ".join([*parts, motion])
 
 
@@ -37,5 +37,6 @@ def forces_in_words(forces: Iterable[Any]) -> str:
 
 
 def _force(force: Any) -> str:
-    texts = [f"{key} = {as_text(value)}" for key, value in changed_arguments(force).items()]
+    changed = changed_arguments(force).items()
+    texts = [f"{key} = {'none' if value is None else as_text(value)}" for key, value in changed]
     return f"{force.name} ({', '.join(texts)})" if texts else force.name

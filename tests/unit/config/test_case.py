@@ -2,17 +2,20 @@
 
 import copy
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sand
 from sand.basics.errors import BadInput, shown
+from sand.basics.material import Library
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.config.key_errors import validate
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowSection
+from sand.setup.from_frame import from_frame
 from sand.simulation.serialise import case_of
 
 GOOD = tomllib.loads("""
@@ -91,6 +94,9 @@ def test_files_that_are_no_cases(tmp_path, content, part):
         ('radius = "8 nm" "9 nm"', None),
         ("radius = 1e-8,", None),
         ("number = true false", None),
+        ("exact_temperature = True", "write true"),
+        ("number = 5\n[grains]", None),
+        ("number = 5\n[[grains.classes]", None),
     ],
 )
 def test_a_syntax_error_shows_its_line(tmp_path, line, advice):
@@ -260,3 +266,14 @@ def test_case_is_ignored_in_names_of_materials():
     assert CollisionCase.model_validate(collision).approach(0).grains.materials[0].name == "silica"
     with pytest.raises(BadInput, match="did you mean 'silica'"):
         check_case(changed(grains__material="Silca"), "case")
+
+
+def test_names_of_materials_that_are_not_unique():
+    """A name that two others have but for their case is refused; in files that SAND has written case counts."""
+    library = Library({"Dust": sand.ICE, "dust": sand.IRON})
+    assert library["Dust"] is sand.ICE and library["dust"] is sand.IRON and library["ICE"] is sand.ICE
+    with pytest.raises(BadInput, match="'DUST' is not unique; give 'Dust' or 'dust'"):
+        library["DUST"]
+    frame = SimpleNamespace(materials=("Ice",), pair=None, overlap=None, position=None)
+    with pytest.raises(BadInput, match="unknown material 'Ice'"):
+        from_frame(frame, library)

@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import sand
+from sand.analysis.bridges import SpanningTrees
 from sand.analysis.clusters import cluster_labels
 from sand.basics.state import BROKEN, CHANGED, MADE, SLID
 from sand.contact.jkr import LAW
@@ -142,6 +143,38 @@ def test_motion_of_the_parts_on_both_sides_of_a_bridge():
     assert 0 < len(expected) < len(pairs) and sorted(found.contact.tolist()) == sorted(expected)
     for c, inertia, energy in zip(found.contact, found.inertia, found.energy, strict=True):
         assert (inertia, energy) == pytest.approx(expected[int(c)], rel=1e-9, abs=0.0)
+
+
+def test_bridges_of_random_bodies():
+    """Removing a bridge, and no other contact, parts its body; sums below a node are those of the part without its top.
+
+    200 graphs of up to 13 grains in several bodies, by removing each contact in turn.
+    """
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        count = int(rng.integers(1, 14))
+        every = np.array([(i, j) for i in range(count) for j in range(i + 1, count)]).reshape(-1, 2)
+        pairs = every[rng.permutation(len(every))[: rng.integers(0, count + 3)]]
+
+        def labels(pairs, count=count):
+            graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+            return connected_components(graph, directed=False)
+
+        bodies, label = labels(pairs)
+        tops = np.array([rng.choice(np.flatnonzero(label == k)) for k in range(bodies)])
+        trees = SpanningTrees(count, pairs, tops)
+        masses, expected = rng.random(count), {}
+        below = trees.over_subtrees(np.add, trees.at_nodes(masses))
+        for c in range(len(pairs)):
+            parts, apart = labels(np.delete(pairs, c, axis=0))
+            if parts > bodies:
+                top = tops[label[pairs[c, 0]]]
+                end = next(g for g in pairs[c] if apart[g] != apart[top])
+                expected[c] = masses[apart == apart[end]].sum()
+        found = trees.bridges()
+        assert sorted(trees.contact[found].tolist()) == sorted(expected)
+        for node in found:
+            assert below[node] == pytest.approx(expected[int(trees.contact[node])], rel=1e-12, abs=0.0)
 
 
 @pytest.mark.compiled("contacts")

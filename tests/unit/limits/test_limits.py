@@ -175,4 +175,4 @@ def test_a_field_that_is_probably_in_another_unit():
         (sand.Field(sand.Ramp([[0, 0, 0], [0, 0, 7]], ["1 ns", "2 ns"])), "7 T"),
     ):
         (text,) = limit_warnings(grains, [field], BOX)
-        assert f"of up to {size} is above 5 T" in text and "a number without a unit is in T" in text
+        assert f"of up to {size} is above 5 T" in text and "a number without one is in T" in text
