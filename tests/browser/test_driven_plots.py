@@ -175,7 +175,7 @@ def test_the_sign_of_stretch_is_explained(view):
     view.press("k")
     row = view.tab.locator(".gv-inspector tr", has_text="stretch / limit")
     words = row.get_attribute("title")
-    assert "negative if they overlap" in words and "negative if compressed" in words and "−1.21" in words
+    assert "1 where it breaks" in words and "negative if they overlap" in words and "−1.21" in words
     shares = view.run("[...app.picture.frame.share].filter((_, k) => k % 4 === 0)")
     assert np.median(shares) == pytest.approx(-2 * 6 ** (1 / 3) / 3, abs=0.1)
 
