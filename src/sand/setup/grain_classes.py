@@ -45,13 +45,9 @@ def radius_as_given(value: Any) -> Any:
     if (largest := float(np.max(radii))) <= LARGEST_PLAIN:
         return np.asarray(radii).tolist()
     if not (has_unit_within(value) or isinstance(value, (np.ndarray, np.generic))):  # computed, in SI
-        other = "" if largest < LEAST_PLAIN_NM else f"did you mean '{largest:g} nm' or '{largest:g} um'? "
-        metres = f"{largest:g} m" if largest >= 1.0 else f"{1e3 * largest:g} mm"
-        raise BadInput(
-            f"radius = {shown(value)}: a number without a unit is in m; {other}Give '{metres}' if it is in m".replace(
-                "; Give", "; give"
-            )
-        )
+        metres = f"'{largest:g} m'" if largest >= 1.0 else f"'{1e3 * largest:g} mm'"
+        others = "" if largest < LEAST_PLAIN_NM else f", or did you mean '{largest:g} nm' or '{largest:g} um'?"
+        raise BadInput(f"radius = {shown(value)}: a number without a unit is in m; give {metres} if it is in m{others}")
     texts = [exact_quantity(one, "m") for one in np.atleast_1d(radii).tolist()]
     return texts if np.ndim(radii) else texts[0]
 

@@ -42,7 +42,7 @@ class UniformField(NamedTuple):
 
 
 def uniform_fields(forces: Iterable[Any], time: float) -> list[UniformField]:
-    """The uniform fields among forces at a time [s], without those that are always 0."""
+    """Uniform fields at a time [s]; a field that is 0 at all times is left out."""
     found = []
     for force in forces:
         if force.name in SYMBOLS:
