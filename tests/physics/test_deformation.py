@@ -388,6 +388,19 @@ def test_a_fixed_step_that_strains_the_box_too_much_is_refused():
     packing("-1e7 1/s", number=12, stepping=sand.Verlet(step=2e-11))
 
 
+def test_a_fixed_step_ends_where_the_strain_of_a_step_becomes_too_large():
+    """Linear law: a step of h strains a side L by r h L₀/L, 8e-4 at first, and 1e-3 where L = 0.8 L₀, t = 0.2/r.
+
+    The step at L = 0.8 L₀ (1 + x), |x| ≤ 8e-4, is the last.
+    """
+    rate, h = 4e7, 2e-11
+    sim = packing(sand.Deformation(f"-{rate} 1/s", law="linear"), number=12, stepping=sand.Verlet(step=h))
+    side = sim.box.lengths[0]
+    result = sim.run(until=0.5 / rate)
+    assert result.outcome is sand.Outcome.STRAINED_TOO_FAST
+    assert sim.box.lengths[0] / side == pytest.approx(0.8, abs=8e-4)
+
+
 def test_copies_have_boxes_of_their_own():
     """A deep copy and the original, each run further, are independent and equal to the last bit."""
     sim = packing("-1e6 1/s", number=12, side=2.4e-6)

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import sand
+from sand.analysis.body_motion import internal_kinetic_energy
 from sand.analysis.clusters import cluster_labels
-from sand.analysis.internal_motion import internal_kinetic_energy
 from sand.basics.constants import BOLTZMANN, MAGNETIC
 from sand.basics.state import BODIES, CONTACT_STEPS, LATE, MADE, QUIETING, RESTED, SLIPPED, SOME_AWAKE, WOKEN
 from sand.cli.main import main

@@ -55,7 +55,10 @@ CAPABILITIES = {
     "advice in messages on quotation marks, units and objects with grains, materials in any case; fields and "
     "directions in the figure of a run, units in figures of sweeps; grains and forces of folders in words": 185,
     "bridges of bodies and strengths of contacts from arrays, in looks whether a collision has ended": 26,
+    "cells of neighbour lists that share places, for grains in clumps far apart": 24,
+    "fixed steps that come to strain a box too much": 5,
     "words on each loss, axes and ranges of colours of the page as in figures, without outliers": 30,
+    "the rigid motion of clusters, in one place (less)": -35,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

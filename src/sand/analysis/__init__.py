@@ -8,8 +8,8 @@ from __future__ import annotations
 from ..basics.lazy import lazily
 
 MODULES = (
-    "body_motion", "clusters", "collision_model", "fits", "fractal", "frame_statistics", "internal_motion",
-    "ledger_columns", "network", "quantities", "shape", "tracking",
+    "body_motion", "clusters", "collision_model", "fits", "fractal", "frame_statistics", "ledger_columns",
+    "network", "quantities", "shape", "tracking",
 )  # fmt: skip
 """Public submodules."""
 

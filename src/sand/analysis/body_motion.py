@@ -16,7 +16,14 @@ from ..basics.constants import BOLTZMANN
 from ..basics.errors import refuse_other
 from .clusters import cluster_labels
 
-__all__ = ["MEDIAN_ENERGY", "BodyMotion", "BodyTemperatures", "body_motion", "body_temperatures"]
+__all__ = [
+    "MEDIAN_ENERGY",
+    "BodyMotion",
+    "BodyTemperatures",
+    "body_motion",
+    "body_temperatures",
+    "internal_kinetic_energy",
+]
 
 MEDIAN_ENERGY = 1.1829869421876689
 """Median of the energy of three degrees of freedom in equilibrium [k_B T]: of the gamma distribution of shape 3/2."""
@@ -30,6 +37,18 @@ class BodyMotion(NamedTuple):
     translation: np.ndarray  # ½ P²/M [J]
     rotation: np.ndarray  # ½ L·J⁻¹L about the centre of mass, spins included [J]
     internal: np.ndarray  # kinetic energy of the grains beyond the rigid motion [J]; 0 for single grains
+
+
+class RigidMotion(NamedTuple):
+    """The rigid motion of K clusters of n grains."""
+
+    label: np.ndarray  # (n,) cluster of each grain
+    velocity: np.ndarray  # (3, K) of the centre of mass [m/s]
+    angular: np.ndarray  # (3, K) angular momentum L about the centre of mass, spins included [J s]
+    spin: np.ndarray  # (3, K) Ω = J⁻¹ L [rad/s]
+    offset: np.ndarray  # (3, n) s, of each grain from the centre of mass of its cluster [m]
+    relative: np.ndarray  # (3, n) velocity beyond the rigid motion, v − V − Ω × s [m/s]
+    relative_spin: np.ndarray  # (3, n) ω − Ω [rad/s]
 
 
 class BodyTemperatures(NamedTuple):
@@ -62,32 +81,36 @@ def body_motion(grains: Any, pairs: np.ndarray, box: Box) -> BodyMotion:
         Of each body, (K,).
     """
     refuse_other(grains, "position", "velocity", "spin", "mass", called="grains")
-    return motion_of(grains, pairs, box, cluster_labels(len(grains.position), pairs))
+    return motion_of(grains, rigid_motion(grains, pairs, box, cluster_labels(len(grains.position), pairs)))
 
 
-def motion_of(grains: Any, pairs: np.ndarray, box: Box, labels: np.ndarray) -> BodyMotion:
-    """As `body_motion`, with the cluster of each grain (N,), which is known."""
-    mass, inertia = np.asarray(grains.mass, float), _inertia(grains)
-    velocity, spin = np.asarray(grains.velocity, float), np.asarray(grains.spin, float)
-    count = np.bincount(labels)
-    moving = 0.5 * mass * np.einsum("ij,ij->i", velocity, velocity)
-    turning = 0.5 * inertia * np.einsum("ij,ij->i", spin, spin)
-    motion = BodyMotion(
-        count,
-        np.bincount(labels, mass),
-        np.bincount(labels, moving),
-        np.bincount(labels, turning),
-        np.zeros(len(count)),
-    )
-    joined = np.flatnonzero(count[labels] > 1)
-    if joined.size:
-        members = joined[np.argsort(labels[joined], kind="stable")]
-        bonds = np.asarray(pairs, np.int64).reshape(-1, 2)
-        position = in_one_piece(np.array(grains.position), bonds, box, labels)[members]
-        of_members = (values[members] for values in (velocity, spin, mass, inertia, labels))
-        for own, values in zip(motion[2:], _of_clusters(position, *of_members), strict=True):
-            own[count > 1] = values
-    return motion
+def motion_of(grains: Any, rigid: RigidMotion) -> BodyMotion:
+    """As `body_motion`, from the rigid motion of the clusters."""
+    mass, count = np.asarray(grains.mass, float), np.bincount(rigid.label)
+    moving = mass * (rigid.relative**2).sum(axis=0) + _inertia(grains) * (rigid.relative_spin**2).sum(axis=0)
+    total, internal = np.bincount(rigid.label, mass), np.where(count > 1, np.bincount(rigid.label, 0.5 * moving), 0.0)
+    translation = 0.5 * total * (rigid.velocity**2).sum(axis=0)
+    return BodyMotion(count, total, translation, 0.5 * (rigid.angular * rigid.spin).sum(axis=0), internal)
+
+
+def rigid_motion(grains: Any, pairs: np.ndarray, box: Box, label: np.ndarray) -> RigidMotion:
+    """The rigid motion of each cluster; arguments as for `body_motion`, and the cluster of each grain (N,)."""
+    mass, inertia, count = np.asarray(grains.mass, float), _inertia(grains), int(label.max(initial=-1)) + 1
+
+    def summed(values: np.ndarray) -> np.ndarray:
+        """Sums over the grains of each cluster, of values (…, n): (…, K)."""
+        flat = values.reshape(-1, len(label))
+        return np.array([np.bincount(label, each, count) for each in flat]).reshape(*values.shape[:-1], count)
+
+    bonds, total = np.asarray(pairs, np.int64).reshape(-1, 2), summed(mass)
+    x, v = in_one_piece(np.array(grains.position), bonds, box, label).T, np.asarray(grains.velocity, float).T
+    w, mean = np.asarray(grains.spin, float).T, summed(mass * v) / total
+    s, u = x - (summed(mass * x) / total)[:, label], v - mean[:, label]
+    angular = summed(mass * np.cross(s, u, axis=0) + inertia * w)
+    tensor = summed(mass * (s * s).sum(axis=0) + inertia) * np.eye(3)[:, :, None] - summed(mass * s[:, None] * s[None])
+    spin = np.linalg.solve(tensor.T, angular.T[:, :, None])[:, :, 0].T
+    turning = spin[:, label]
+    return RigidMotion(label, mean, angular, spin, s, u - np.cross(turning, s, axis=0), w - turning)
 
 
 def _inertia(grains: Any) -> np.ndarray:
@@ -98,29 +121,31 @@ def _inertia(grains: Any) -> np.ndarray:
     return 0.4 * np.asarray(grains.mass, float) * np.asarray(grains.radius, float) ** 2
 
 
-def _of_clusters(
-    x: np.ndarray, v: np.ndarray, w: np.ndarray, mass: np.ndarray, inertia: np.ndarray, labels: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Energies (K,) of translation, rotation and internal motion of clusters, whose grains stand one after another."""
-    new = np.append(True, labels[1:] != labels[:-1])
-    starts, own = np.flatnonzero(new), np.cumsum(new) - 1
+@checked
+def internal_kinetic_energy(grains: Any, pairs: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray]:
+    """Kinetic energy of each cluster beyond its rigid motion: the vibration of its contacts.
 
-    def summed(values: np.ndarray) -> np.ndarray:
-        return np.add.reduceat(values, starts, axis=0)
+    As of `body_motion`. A cluster of n > 1 grains has 6n − 6 internal degrees of freedom, each with a mean kinetic
+    energy of ½ k_B T in equilibrium; a single grain has none.
 
-    m, i = mass[:, None], inertia[:, None]
-    means = summed(m * np.hstack((x, v))) / summed(m)
-    s, u = np.hsplit(np.hstack((x, v)) - means[own], 2)
-    square = np.einsum("ij,ij->i", s, s)[:, None]
-    products = (s[:, :, None] * s[:, None, :]).reshape(-1, 9)
-    sums = summed(np.hstack((m, m * np.cross(s, u) + i * w, m * square + i, m * products)))
-    angular, tensor = sums[:, 1:4], sums[:, 4, None, None] * np.eye(3) - sums[:, 5:].reshape(-1, 3, 3)
-    turning = np.linalg.solve(tensor, angular[:, :, None])[:, :, 0]
-    # velocities relative to the rigid motion, so that no energies of almost equal size are subtracted
-    du, dw = u - np.cross(turning[own], s), w - turning[own]
-    internal = 0.5 * summed(mass * np.einsum("ij,ij->i", du, du) + inertia * np.einsum("ij,ij->i", dw, dw))
-    translation = 0.5 * sums[:, 0] * np.einsum("ij,ij->i", means[:, 3:], means[:, 3:])
-    return translation, 0.5 * np.einsum("ij,ij->i", angular, turning), internal
+    Parameters
+    ----------
+    grains : Grains
+        Grains of a simulation or a frame.
+    pairs : ndarray
+        Contacts (C, 2).
+    box : Box
+        Boundary conditions.
+
+    Returns
+    -------
+    energy : ndarray
+        Internal kinetic energy of each cluster [J], (K,).
+    degrees : ndarray
+        Internal degrees of freedom of each cluster, (K,).
+    """
+    motion = body_motion(grains, pairs, box)
+    return motion.internal, np.where(motion.grains > 1, 6 * motion.grains - 6, 0)
 
 
 @checked

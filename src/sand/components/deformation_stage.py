@@ -48,18 +48,22 @@ class DeformationNumbers(NamedTuple):
     shortest: float  # least length of an axis [m], so that no two grains touch through two images
     long_range: bool  # whether long-range forces act
     sheared: bool  # whether the box is tilted, or is ever sheared
+    fixed: bool  # whether the user has set the step
 
 
 @stage("the time step of a box that is deformed")
 def limit_strain(cell, scratch, parameters):
     """Lower `scratch[LIMIT]` to a power of two of a second.
 
-    Returns `Stop.BOX_TOO_SMALL` where a side is too short, or may become so in a step of this length.
+    Returns `Stop.STRAINED_TOO_FAST` where a fixed step would have to be lowered, `Stop.BOX_TOO_SMALL` where a side is
+    too short, or may become so in a step of this length.
     """
     fastest = abs(cell.span[SHEAR])
     for a in range(3):
         fastest = max(fastest, abs(cell.span[RATE + a]))
     if fastest * scratch[LIMIT] > LARGEST_STRAIN:
+        if parameters.fixed:
+            return Stop.STRAINED_TOO_FAST.value
         scratch[LIMIT] = quantise_step(1.0, LARGEST_STRAIN / fastest, True)
     for a in range(3):
         if cell.span[a] * (1.0 + min(cell.span[RATE + a], 0.0) * scratch[LIMIT]) < parameters.shortest:
@@ -191,7 +195,7 @@ def work_of_box(grains, contacts, long_range, cell, count, scratch, span, parame
 
 def stages_of_part(long_range: bool) -> HookStages:
     """Stages of awake clusters in a step of rigid bodies, in which the box changes linearly."""
-    work = work_of_box, DeformationNumbers(LAWS.index(LINEAR), 0.0, 0.0, long_range, False)
+    work = work_of_box, DeformationNumbers(LAWS.index(LINEAR), 0.0, 0.0, long_range, False, False)
     return {Hook.AFTER_DRIFT: [(deform, ())], Hook.AFTER_KICK: [work], Hook.END_OF_BODIES: [work]}
 
 

@@ -86,7 +86,7 @@ def follow_box(engine: Engine, cell: CellArrays, fixed: float, fastest: float) -
     """Choose the parameters anew if sides may soon have changed by MOST_STRAIN, at rates up to `fastest` [1/s].
 
     They last for the time t = (MOST_STRAIN − ε − change)/fastest.  The step that passes t, of a strain x of at most
-    LARGEST_STRAIN or that of a fixed step, changes ln L by up to ε = x + x² > −ln(1 − x).
+    LARGEST_STRAIN, changes ln L by up to ε = x + x² > −ln(1 − x).
     """
     state = engine.stored_state
     forces = [force for force, _, _ in engine.long_range]
@@ -94,8 +94,7 @@ def follow_box(engine: Engine, cell: CellArrays, fixed: float, fastest: float) -
     if not sums or state.time < cell.lasts[0]:
         return
     change = float(np.abs(np.log(cell.span[:3] / cell.chosen)).max())
-    strain = max(LARGEST_STRAIN, fastest * engine.parameters.criteria.fixed)
-    lasting = MOST_STRAIN - strain * (1.0 + strain)
+    lasting = MOST_STRAIN - LARGEST_STRAIN * (1.0 + LARGEST_STRAIN)
     if change > 0.5 * lasting:
         before, change = math.fsum(pair_energy(engine, k) for k in sums), 0.0
         cell.chosen[:] = cell.span[:3]

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.body_motion import motion_of
+from ..analysis.body_motion import RigidMotion, motion_of, rigid_motion
 from ..analysis.bridges import SpanningTrees
-from ..analysis.internal_motion import rigid_motion
 from ..basics.arguments import checked
 from ..basics.state import CHANGED
 from ..contact.constants_table import FASTEST_MODE
@@ -92,7 +91,7 @@ class Swings(NamedTuple):
 
 
 @checked
-def swings(grains: Any, pairs: np.ndarray, box: Any) -> Swings:
+def swings(grains: Any, pairs: np.ndarray, motion: RigidMotion) -> Swings:
     """Relative motion of the parts of bodies on both sides of their bridges.
 
     Parameters
@@ -101,19 +100,12 @@ def swings(grains: Any, pairs: np.ndarray, box: Any) -> Swings:
         Grains of a simulation.
     pairs : ndarray
         Contacts (C, 2).
-    box : Box
-        An open box.
+    motion : RigidMotion
+        Of the bodies, in an open box.
     """
-    motion = rigid_motion(grains, pairs, box)
-    label, x = motion.label, motion.offset.T
-    mass, inertia, radius = (
-        np.asarray(grains.mass)[:, None],
-        np.asarray(grains.inertia)[:, None],
-        grains.radius[:, None],
-    )
-    first, spin = np.unique(label, return_index=True)[1], motion.spin.T[label]
-    total = np.column_stack([np.bincount(label, each) for each in np.hstack((mass, mass * grains.velocity)).T])
-    u, w = grains.velocity - (total[:, 1:] / total[:, :1])[label] - np.cross(spin, x), grains.spin - spin
+    label, first = motion.label, np.unique(motion.label, return_index=True)[1]
+    x, u, w = motion.offset.T, motion.relative.T, motion.relative_spin.T
+    mass, inertia, radius = (np.asarray(each)[:, None] for each in (grains.mass, grains.inertia, grains.radius))
     second = (x[:, :, None] * x[:, None, :]).reshape(-1, 9)
     rows = np.hstack((mass, mass * x, mass * u, mass * np.cross(x, u) + inertia * w, mass * second, inertia))
     trees = SpanningTrees(len(label), pairs, first)
@@ -160,7 +152,8 @@ def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
     strength: Any = strength_of(simulation, pairs)
     of_contact, count = labels[pairs[:, 0]], int(labels.max()) + 1
     stored = np.sum([table[f"energy_{mode}"] for mode in ENERGIES], axis=0) - strength.rest
-    motion = motion_of(grains, pairs, simulation.box, labels)
+    rigid = rigid_motion(grains, pairs, simulation.box, labels)
+    motion = motion_of(grains, rigid)
     weakest, softest = np.full(count, np.inf), np.full(count, np.inf)
     np.minimum.at(weakest, of_contact, strength.breaking)
     np.minimum.at(softest, of_contact, strength.turning)
@@ -173,8 +166,7 @@ def are_settled(simulation: Simulation, labels: np.ndarray) -> bool:
     modes = modes_of(motion.grains, contacts, springs_of(contact_model(simulation)))
     if expected_breaks(energy, weakest, modes, attempts).sum() > MOST_BREAKS:
         return False
-    found = swings(grains, pairs, simulation.box)
-    turns = np.sqrt((rigid_motion(grains, pairs, simulation.box).spin ** 2).sum(axis=0))
+    found, turns = swings(grains, pairs, rigid), np.linalg.norm(rigid.spin, axis=0)
     fast = (motion.rotation > np.minimum(weakest, softest)) & (turns > 0.0)
     times = [*(1.0 / turns[fast]), *swing_time(found.inertia, found.energy, strength.turning[found.contact])]
     return simulation.time - float(state.clock[CHANGED]) >= max(times, default=0.0)

@@ -204,10 +204,13 @@ def close_cycle(s):
 
 @caller
 def limit_step(s):
-    """Set the longest step that components allow; returns the value of a `Stop` that refuses any."""
+    """Set the longest step that components allow; returns the value of a `Stop` that refuses any.
+
+    Components start from the fixed step, if one is given, which they can refuse, but not shorten.
+    """
     if not has_stage(s, Hook.LIMIT_STEP):
         return Stop.NONE.value
-    s.scratch[LIMIT] = s.criteria.longest
+    s.scratch[LIMIT] = s.criteria.fixed if s.criteria.fixed > 0.0 else s.criteria.longest
     stop = call_hook(s, Hook.LIMIT_STEP)
     hold_step(s.clock, s.count, s.scratch[LIMIT])
     return stop

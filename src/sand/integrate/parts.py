@@ -57,6 +57,7 @@ class Stop(IntEnum):
     AWAKE_LOADS = 14  # a step has ended: awake clusters need the loads of other bodies, and may fall asleep
     SUBSTEPS = 15  # some bodies have to take substeps within the step of all bodies
     BOX_TOO_SMALL = 16  # two grains could touch through two images
+    STRAINED_TOO_FAST = 17  # a fixed step strains the box by more than deformation_stage.LARGEST_STRAIN
 
 
 class ContactParameters(NamedTuple):

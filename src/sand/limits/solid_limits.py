@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..analysis.internal_motion import rigid_motion
+from ..analysis.body_motion import rigid_motion
+from ..analysis.clusters import cluster_labels
 from ..basics.box import Box
 from ..basics.constants import COULOMB
 from ..basics.grains import Grains
@@ -142,7 +143,7 @@ def torn_clusters(grains: Grains, contact: Contact | None, pairs: np.ndarray, bo
     """
     if contact is None or not len(pairs):
         return []
-    motion, mass = rigid_motion(grains, pairs, box), grains.mass
+    motion, mass = rigid_motion(grains, pairs, box, cluster_labels(len(grains), pairs)), grains.mass
     spin, offset = np.linalg.norm(motion.spin, axis=0), motion.offset.T
     sizes = np.bincount(motion.label)
     for k in np.flatnonzero((sizes > 1) & (spin > 0.0)).tolist():

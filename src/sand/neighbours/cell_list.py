@@ -4,6 +4,9 @@ Grains are sorted into cells.  A grain has an index in this order, its sorted in
 s, and the grains of cell c have the sorted indices `cell_start[c]` … `cell_start[c + 1]` − 1.  Cells are subdivided
 along x, so that the candidates of a grain in one row of cells form one contiguous range of sorted indices.
 
+Cells are about as wide as the reach, however far apart the grains are.  Where there would be too many, cells at equal
+distances share one place in the arrays, in which grains are told apart by their separation.
+
 The Verlet list is stored in compressed sparse row form: `neighbour[start[s] : start[s + 1]]` are the sorted indices of
 the neighbours of s.  It is a full list (each pair occurs in the rows of both grains) and a function of the anchors
 alone.
@@ -30,6 +33,9 @@ MAX_SUBDIVISION = 16
 """Most cells along x per cell width along y or z; more would hardly shorten the ranges."""
 MIN_PERIODIC_CELLS = 3
 """Fewest cells on a divided periodic axis, so that the two neighbours of a cell differ; with fewer it is one cell."""
+WIDER = 2.0
+"""Width in units of the reach of cells that share places: grains are few or in clumps, and fewer cells to visit gain
+more than fewer candidates."""
 REACH_TOLERANCE = 1e-6
 """Relative increase of the squared reach when ranges are chosen, so that rounding excludes no pair."""
 CELL_TOLERANCE = 1e-6
@@ -49,6 +55,7 @@ class Grid(NamedTuple):
     """Cells along each axis, with narrower cells along x."""
 
     counts: Any  # number of cells per axis (x, y, z)
+    stored: Any  # places of cells per axis: cell c has place c modulo this number; at least 3 where cells share places
     low: Any  # lower bounds [m]
     per_length: Any  # cells per metre, 0 on an axis along which all grains have the same coordinate
     subdivision: Any  # this many cells along x together are at least as wide as the reach
@@ -94,39 +101,60 @@ def cells_along_x(nx, px, nz, span):
 
 
 @loop
-def choose_grid(anchor, span, reach):
-    """Grid of cells at least `reach` wide, with at most CELLS_PER_GRAIN · N + 27 cells.
+def fewer_places(number):
+    """The next smaller number of places on an axis on which cells share them."""
+    return max(3, int(0.8 * number))
 
-    An open axis extends between the outermost grains.  Along x, cells are subdivided into up to MAX_SUBDIVISION, until
-    there is a cell per grain.
+
+@loop
+def with_equal_shares(number, stored, per_length, length):
+    """Number of cells, on a periodic axis a multiple of the places, and cells per metre."""
+    if length == 0.0 or number == stored:
+        return number, per_length
+    return number // stored * stored, (number // stored * stored) / length
+
+
+@loop
+def choose_grid(anchor, span, reach):
+    """Grid of cells about as wide as `reach`, or WIDER, with at most CELLS_PER_GRAIN · N + 27 places.
+
+    Larger cells instead of shared places would hold whole clumps, such as fragments that fly apart.  An open axis
+    extends between the outermost grains.  Along x, cells are subdivided into up to MAX_SUBDIVISION, until there is a
+    place per grain.
     """
     low, high = load(anchor, 0), load(anchor, 0)
     for i in range(anchor.shape[1]):
         x = load(anchor, i)
         low = (min(low[0], x[0]), min(low[1], x[1]), min(low[2], x[2]))
         high = (max(high[0], x[0]), max(high[1], x[1]), max(high[2], x[2]))
-    x, y, z = reach, reach, reach
+    most, width = CELLS_PER_GRAIN * anchor.shape[1] + 27, reach
     while True:
-        nx, lx, px = cells_on_axis(low[0], high[0], span.x, x)
-        ny, ly, py = cells_on_axis(low[1], high[1], span.y, y)
-        nz, lz, pz = cells_on_axis(low[2], high[2], span.z, z)
+        nx, lx, px = cells_on_axis(low[0], high[0], span.x, width)
+        ny, ly, py = cells_on_axis(low[1], high[1], span.y, width)
+        nz, lz, pz = cells_on_axis(low[2], high[2], span.z, width)
         nx, px = cells_along_x(nx, px, nz, span)
-        if nx * ny * nz <= CELLS_PER_GRAIN * anchor.shape[1] + 27 or max(nx, ny, nz) <= 3:
-            subdivision = max(1, min(anchor.shape[1] // (nx * ny * nz), MAX_SUBDIVISION))
-            width_y, width_z = 1.0 / py if py > 0.0 else 0.0, 1.0 / pz if pz > 0.0 else 0.0
-            spacings = spacing_on_axis(span.x), spacing_on_axis(span.y), spacing_on_axis(span.z)
-            folded = (span.x > 0.0) & (nx == 1) | (span.y > 0.0) & (ny == 1) | (span.z > 0.0) & (nz == 1)
-            return Grid(
-                (nx * subdivision, ny, nz), (lx, ly, lz), (px * subdivision, py, pz), subdivision, width_y, width_z,
-                on_spacings((span.x, span.y, span.z), spacings), spacings, folded,
-            )  # fmt: skip
-        # enlarge the cells on the axis with the most cells
-        if nx >= ny and nx >= nz:
-            x *= 1.25
-        elif ny >= nz:
-            y *= 1.25
+        if nx * ny * nz <= most or width > reach:
+            break
+        width *= WIDER
+    mx, my, mz = nx, ny, nz
+    while mx * my * mz > most and max(mx, my, mz) > 3:
+        if mx >= my and mx >= mz:
+            mx = fewer_places(mx)
+        elif my >= mz:
+            my = fewer_places(my)
         else:
-            z *= 1.25
+            mz = fewer_places(mz)
+    nx, px = with_equal_shares(nx, mx, px, span.x)
+    ny, py = with_equal_shares(ny, my, py, span.y)
+    nz, pz = with_equal_shares(nz, mz, pz, span.z)
+    subdivision = max(1, min(anchor.shape[1] // (mx * my * mz), MAX_SUBDIVISION))
+    width_y, width_z = 1.0 / py if py > 0.0 else 0.0, 1.0 / pz if pz > 0.0 else 0.0
+    spacings = spacing_on_axis(span.x), spacing_on_axis(span.y), spacing_on_axis(span.z)
+    folded = (span.x > 0.0) & (nx == 1) | (span.y > 0.0) & (ny == 1) | (span.z > 0.0) & (nz == 1)
+    return Grid(
+        (nx * subdivision, ny, nz), (mx * subdivision, my, mz), (lx, ly, lz), (px * subdivision, py, pz), subdivision,
+        width_y, width_z, on_spacings((span.x, span.y, span.z), spacings), spacings, folded,
+    )  # fmt: skip
 
 
 @loop
@@ -146,6 +174,12 @@ def cell_index(x, number):
 
 
 @loop
+def place_of(cell, stored):
+    """Place of a cell on an axis."""
+    return cell if cell < stored else cell % stored
+
+
+@loop
 def sort_into_cells(long_range, sorted_position, anchor, span, grid):
     """Sort the grains by cell, and by index within a cell: fill `cell_of`, `cell_start`, `order` and `sorted_position`.
 
@@ -153,12 +187,14 @@ def sort_into_cells(long_range, sorted_position, anchor, span, grid):
     that name here or in `append_range` (the arguments of a kernel must not overlap).
     """
     nx, ny, nz = grid.counts
-    total = nx * ny * nz
+    mx, my, mz = grid.stored
+    total = mx * my * mz
     for c in range(total + 1):
         long_range.cell_start[c] = 0
     for i in range(anchor.shape[1]):
         x = cell_coordinates(grid, nearest_image(load(anchor, i), span))
-        cell = (cell_index(x[2], nz) * ny + cell_index(x[1], ny)) * nx + cell_index(x[0], nx)
+        row = place_of(cell_index(x[2], nz), mz) * my + place_of(cell_index(x[1], ny), my)
+        cell = row * mx + place_of(cell_index(x[0], nx), mx)
         long_range.cell_of[i] = cell
         long_range.cell_start[cell + 1] += 1
     for c in range(total):
@@ -177,17 +213,17 @@ def sort_into_cells(long_range, sorted_position, anchor, span, grid):
 
 
 @loop
-def neighbour_on_axis(c, step, number, period):
-    """Index of the cell at distance `step` and its shift [m], 0 or ±`period`; −1 where no cell is at that distance.
+def neighbour_on_axis(c, step, number, stored, period):
+    """Place of the cell at distance `step` and its shift [m], 0 or ±`period`; −1 where no cell is at that distance.
 
     There is none beyond the end of an open axis, whose period is 0, nor on an undivided one.
     """
     other = c + step
     if 0 <= other < number:
-        return other, 0.0
+        return place_of(other, stored), 0.0
     if period == 0.0 or number == 1:
         return -1, 0.0
-    return (other - number, period) if other >= number else (other + number, -period)
+    return (0, period) if other >= number else (stored - 1, -period)
 
 
 @loop
@@ -258,7 +294,7 @@ class CellRow(NamedTuple):
     """A row of cells along x, in which a grain has neighbours."""
 
     x: float  # coordinate of the grain, in units of cells
-    first: int  # first cell
+    first: int  # place of its first cell
     squared_half_width: float  # largest squared distance of neighbours along x [m²]
 
 
@@ -266,10 +302,11 @@ class CellRow(NamedTuple):
 def append_cell_row(long_range, sorted_position, span, grid, centre, row, used):
     """Append the neighbours of a `Centre` in a row of cells (`CellRow`); returns the new length, or FULL.
 
-    Candidates lie within ±√squared_half_width [m] along x; across a periodic boundary they form a second range.  On a
-    periodic axis shorter than three times the reach all grains are candidates.
+    Candidates lie within ±√squared_half_width [m] along x; across a periodic boundary, or where the places of cells
+    begin anew, they form a second range.  On a periodic axis shorter than three times the reach all grains are
+    candidates.
     """
-    nx, period = grid.counts[0], grid.periods[0]
+    nx, mx, period = grid.counts[0], grid.stored[0], grid.periods[0]
     if period > 0.0 and nx == grid.subdivision:
         return append_range(long_range, sorted_position, span, grid.folded, centre, (row.first, row.first + nx), used)
     half_width, cell = math.sqrt(row.squared_half_width) * grid.per_length[0] + CELL_TOLERANCE, cell_index(row.x, nx)
@@ -277,15 +314,19 @@ def append_cell_row(long_range, sorted_position, span, grid, centre, row, used):
     # at least one cell, even if a coordinate is NaN
     low = min(max(math.floor(row.x - half_width), cell - grid.subdivision), cell)
     high = max(min(math.floor(row.x + half_width), cell + grid.subdivision), cell)
-    first, last = max(low, 0), min(high, nx - 1) + 1
+    if period == 0.0:
+        low, high = max(low, 0), min(high, nx - 1)
+    x, y, z = centre.position
+    turn = cell - place_of(cell, mx)  # the cell with the first place
+    first, last = max(low, turn), min(high, turn + mx - 1)
     for _ in range(2):
-        cells = row.first + first, row.first + last
-        used = append_range(long_range, sorted_position, span, grid.folded, centre, cells, used)
-        if used == FULL or not (period > 0.0 and (low < 0 or high >= nx)):
+        shift = period if first < 0 else -period if first >= nx else 0.0
+        shifted = Centre(centre.s, (x + shift, y, z), centre.limit)
+        cells = row.first + first - turn, row.first + last + 1 - turn
+        used = append_range(long_range, sorted_position, span, grid.folded, shifted, cells, used)
+        if used == FULL or (low >= turn and high < turn + mx):
             break
-        first, last = (low + nx, nx) if low < 0 else (0, high - nx + 1)
-        x, y, z = centre.position
-        centre = Centre(centre.s, (x + period if low < 0 else x - period, y, z), centre.limit)
+        first, last, turn = (low, turn - 1, turn - mx) if low < turn else (turn + mx, high, turn + mx)
     return used
 
 
@@ -325,21 +366,22 @@ def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
     int
         New length of the list, or FULL.
     """
-    nx, ny, nz = grid.counts
+    _, ny, nz = grid.counts
+    mx, my, mz = grid.stored
     squared_reach = (1.0 + REACH_TOLERANCE) * reach * reach
     position = load(sorted_position, s)
     x = cell_coordinates(grid, position)
     cy, cz = cell_index(x[1], ny), cell_index(x[2], nz)
     for dz in range(-1, 2):
-        tz, shift_z = neighbour_on_axis(cz, dz, nz, grid.periods[2])
+        tz, shift_z = neighbour_on_axis(cz, dz, nz, mz, grid.periods[2])
         gap_z = gap_on_axis(x[2], cz, dz, grid.width_z)
         for dy in range(-1, 2):
-            ty, shift_y = neighbour_on_axis(cy, dy, ny, grid.periods[1])
+            ty, shift_y = neighbour_on_axis(cy, dy, ny, my, grid.periods[1])
             gap_y = gap_on_axis(x[1], cy, dy, grid.width_y)
             squared_half_width = squared_reach - gap_y * gap_y - gap_z * gap_z
             if ty >= 0 and tz >= 0 and squared_half_width > 0.0:
                 shifted, along = beside_neighbours(position, x[0], (shift_y, shift_z), grid, span)
-                row = CellRow(along, (tz * ny + ty) * nx, squared_half_width)
+                row = CellRow(along, (tz * my + ty) * mx, squared_half_width)
                 centre = Centre(np.uint64(s), shifted, reach * reach)
                 used = append_cell_row(long_range, sorted_position, span, grid, centre, row, used)
                 if used == FULL:

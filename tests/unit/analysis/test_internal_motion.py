@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.analysis.internal_motion import internal_kinetic_energy
+from sand.analysis.body_motion import internal_kinetic_energy
 from sand.basics.box import Box
 from sand.basics.constants import BOLTZMANN
 from sand.contact.model import DEFAULT_DAMPING_RATIO

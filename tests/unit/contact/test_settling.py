@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.analysis.body_motion import internal_kinetic_energy
 from sand.analysis.clusters import cluster_labels, unwrapped
-from sand.analysis.internal_motion import internal_kinetic_energy
 from sand.basics.arrays import cluster_arrays, empty_contact_arrays
 from sand.basics.box import Box
 from sand.basics.state import CONTACTS, COUNT

@@ -20,13 +20,18 @@ from sand.neighbours.search import Neighbours, share_within
 from ...tables import table_of
 
 
-def rows(position, box, reach):
-    """The list for positions (N, 3) as a matrix: how often each pair occurs in each grain's row."""
-    count = len(position)
-    far = empty_long_range_arrays(count, 8)
+def listed(position, box, reach):
+    """Arrays with the list for positions (N, 3)."""
+    far = empty_long_range_arrays(len(position), 8)
     far.anchor[...] = position.T
     while cells.rebuild_verlet_list(far, box.span, reach) == cells.FULL:
         far = far._replace(neighbour=np.zeros(2 * far.neighbour.size, np.uint32))
+    return far
+
+
+def rows(position, box, reach):
+    """The list for positions (N, 3) as a matrix: how often each pair occurs in each grain's row."""
+    count, far = len(position), listed(position, box, reach)
     found = np.zeros((count, count), int)
     for k in range(count):
         neighbours = far.order[far.neighbour[far.start[k] : far.start[k + 1]]]
@@ -52,6 +57,27 @@ def test_each_pair_within_reach_is_listed_once(seed, count, periodic, shape, rea
     close = (apart**2).sum(axis=-1) < reach**2
     np.fill_diagonal(close, False)
     assert (rows(position, box, reach) == close).all()
+
+
+@pytest.mark.compiled("small")
+@pytest.mark.parametrize("lengths", [(None,) * 3, (1e4,) * 3, (None, 1e4, 1e4)])
+@pytest.mark.parametrize("distance", [30.0, 1e3, 1e5])
+def test_clumps_far_apart_share_places_of_cells(lengths, distance):
+    """All pairs, each once, of 12 clumps of 150 grains, at most 33 of which share a place with a grain, and others.
+
+    A clump has 4 grains per reach³, and a cell of two reaches holds 32 of them.  Others are in its place by chance: N
+    grains in at least 0.8·4N places, below one on average; twice that allows for 12 clumps, no even spread.  In cells
+    that were made larger until there are 4N, a clump would be in one or two: 75 to 150.
+    """
+    rng, side = np.random.default_rng(5), (150 / 4.0) ** (1 / 3)
+    centres = (rng.random((12, 1, 3)) - 0.5) * [min(distance, length or distance) for length in lengths]
+    position = (centres + side * (rng.random((12, 150, 3)) - 0.5)).reshape(-1, 3)
+    box = Box(lengths)
+    close = (box.nearest(position[:, None] - position[None]) ** 2).sum(axis=-1) < 1.0
+    np.fill_diagonal(close, False)
+    assert (rows(position, box, 1.0) == close).all()
+    together = np.bincount(listed(position, box, 1.0).cell_of)
+    assert (together**2).sum() / len(position) < 32.0 + 2.0
 
 
 @pytest.mark.compiled("small")
