@@ -19,6 +19,9 @@ EQUAL_MASSES = (
     "the formula was fitted to many mass ratios"
 )
 
+HARDLY = 0.05
+"""Slope d ln v/d ln x up to which v hardly depends on x: 26 % for a factor of 100."""
+
 
 def averaged(rows: Sequence[Row]) -> SeedTable:
     """Growth efficiency averaged over impact parameters, for each seed and speed that has all of them."""
@@ -107,7 +110,7 @@ def compare_parameter(key: str, symbol: str, unit: str, size: float, rows: Seque
     if len(known) > 2:
         fit = power_law(np.array(list(known)), np.array(list(known.values())))
         slope = Interval(fit.exponent, fit.low, fit.high)
-        verdict = slope.verdict(0.0, "the critical speed depends on it", within=0.1)
+        verdict = slope.verdict(0.0, "the critical speed depends on it", within=HARDLY)
         what, stated = f"d ln v/d ln {symbol} of the critical speed v", "0: it hardly depends on it (abstract)"
         compared.append(Compared(what, stated, slope.text(), verdict))
     return compared

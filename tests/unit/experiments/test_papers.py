@@ -119,7 +119,7 @@ def test_mass_ratios_are_compared():
 
 
 def test_the_exponent_of_a_parameter():
-    """v_crit = 50 ξ^0.3 has the exponent 0.3, beyond the 0.1 that counts as none."""
+    """v_crit = 50 ξ^0.3 has the exponent 0.3, beyond the 0.05 that count as none."""
     rows = [row for xi in (2.0, 8.0, 32.0) for row in growth_rows(50.0 * (xi / 8.0) ** 0.3, xi=xi)]
     *_, slope = compare_parameter("xi", "ξ", "Å", 1.0, rows)
     assert slope.ours.startswith("0.3 (") and slope.verdict.startswith("+0.3:")
