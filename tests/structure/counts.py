@@ -53,7 +53,7 @@ CAPABILITIES = {
     "still pictures of tilted boxes as parallelepipeds with the grains in them; a colour of its own for a loss": 12,
     "differences of SciPy's implicit integrator, which are not initialised there": 3,
     "advice in messages on quotation marks, units and objects with grains, materials in any case; fields and "
-    "directions in the figure of a run, units in figures of sweeps; grains and forces of folders in words": 185,
+    "directions in the figure of a run, units in figures of sweeps; grains and forces of folders in words": 187,
     "bridges of bodies and strengths of contacts from arrays, in looks whether a collision has ended": 26,
     "cells of neighbour lists that share places, for grains in clumps far apart": 24,
     "fixed steps that come to strain a box too much": 5,

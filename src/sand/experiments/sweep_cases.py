@@ -15,8 +15,9 @@ from ..config.commands import command_for
 from ..config.key_errors import setting_at, validate
 from ..config.sections import with_integrator
 from ..io.checkpoint_files import checkpoint_files
+from ..io.ledger_table import TEMPERATURES
 from ..io.run_folder import FLIGHTS
-from ..io.sweep_files import TABLE
+from ..io.sweep_files import COST, TABLE
 from ..io.table import GrowingTable
 from ..setup.aggregates import chain
 from ..simulation.outcome import Outcome
@@ -299,7 +300,9 @@ def units_of(content: dict[str, Any], columns: Iterable[str]) -> dict[str, str]:
     """Units of columns of the table of a sweep: of keys of its case, and of results; those without one are missing."""
     content = {table: value for table, value in content.items() if table != "sweep"}
     model = CASES[case_kind(content)].model(content)
-    results = documented_units(Collision)  # whose names results of other kinds share
+    of_runs = {"dissipated": "J", **dict.fromkeys((*TEMPERATURES, "temperature_at_start"), "K")}
+    # results of other kinds share names of collisions
+    results = documented_units(Collision) | of_runs | dict.fromkeys(COST, "s")
     found = {name: "J" if name.startswith("lost_") else results.get(name, "") for name in columns}
     found |= {key: getattr(setting_at(model, tuple(key.split("."))), "unit", "") for key in found if "." in key}
     return {name: unit for name, unit in found.items() if unit not in ("", "1")}

@@ -124,6 +124,8 @@ def test_axes_and_titles_are_in_words_with_units():
     assert units_of({"run": {}, "grains": {}}, ["grains.temperature", "forces.field.flux_density"]) == {
         "grains.temperature": "K", "forces.field.flux_density": "T",
     }  # fmt: skip
+    of_runs = units_of({"run": {}, "grains": {}}, ["temperature_translation", "dissipated", "cpu_seconds", "drift"])
+    assert of_runs == {"temperature_translation": "K", "dissipated": "J", "cpu_seconds": "s"}
     assert label("impact.impact_parameter", units) == "impact parameter"
     assert label("forces.field.flux_density", {}) == "field flux density"
     assert label("lost_rolling", units) == "lost rolling (J)"
