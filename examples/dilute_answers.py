@@ -60,6 +60,8 @@ ENDS = {"resolve": (30,), "stick": (30, 100)}
 """S at which populations are measured."""
 LEVELS = (1.5, 2, 3, 4, 6, 8, 11, 16, 20, 24, 30, 45, 64, 80, 96)
 """S whose times are in the tables."""
+WINDOWS = ((2, 20), (2, 96), (8, 96))
+"""Ranges of S in which degrees are fitted."""
 KEY = ("case", "hits", "seed", "end")
 LARGE = (30, 150)
 """Range of N of further fits of γ and D_f."""
@@ -104,15 +106,10 @@ def populations(number: int, out: Path, ends: Sequence[float], item: tuple[str, 
 
 
 def growth_of(ledger: Any) -> dict[str, float]:
-    """Times n₀t [s/m³] at sizes S and ratios n/n₀, and degrees λ of fits in S = 2–20 and 2–96; NaN beyond the end."""
+    """Times n₀t [s/m³] at sizes S and ratios n/n₀; NaN beyond the end."""
     size = ledger["mean_cluster_size"]
     row = {f"t_{level:g}": scaled_time(ledger, size >= level) for level in LEVELS}
-    row |= {f"t_ratio_{ratio:g}": scaled_time(ledger, ledger["number_ratio"] <= ratio) for ratio in RATIOS}
-    for largest in (20, 96):
-        sizes = np.geomspace(2.0, largest, POINTS)
-        times = np.array([scaled_time(ledger, size >= each) for each in sizes])
-        row[f"lambda_{largest}"] = degree(sizes, times) if np.isfinite(times).all() else math.nan
-    return row
+    return row | {f"t_ratio_{ratio:g}": scaled_time(ledger, ledger["number_ratio"] <= ratio) for ratio in RATIOS}
 
 
 def shapes_of(grown: Any) -> dict[str, float]:
@@ -189,15 +186,18 @@ def intervals(rows: Sequence[dict[str, Any]]) -> dict[str, tuple[Interval, int]]
     texts = (*KEY, "outcome", "sand")
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in texts]
     values = {name: np.array([row.get(name, math.nan) for row in rows], float) for name in names}
+    for first, last in WINDOWS:
+        levels = np.array([level for level in LEVELS if first <= level <= last], float)
+        times = np.stack([values[f"t_{level:g}"] for level in levels], axis=1)
+        values[f"lambda_{first}_{last}"] = np.array(
+            [degree(levels, each) if np.isfinite(each).all() else math.nan for each in times]
+        )
     known = {name: each[np.isfinite(each)].tolist() for name, each in values.items()}
     found = {name: (mean_of(each), len(each)) for name, each in known.items() if each}
-    for largest in (20, 96):
-        if f"lambda_{largest}" in found:
-            degrees, number = found[f"lambda_{largest}"]
-            found[f"z_{largest}"] = (
-                Interval(*(1.0 / (1.0 - each) if each < 1.0 else math.inf for each in degrees)),
-                number,
-            )
+    for first, last in WINDOWS:
+        if (degrees := found.get(f"lambda_{first}_{last}")) is not None:
+            z = Interval(*(1.0 / (1.0 - each) if each < 1.0 else math.inf for each in degrees[0]))
+            found[f"z_{first}_{last}"] = z, degrees[1]
     # of a class with few hits ratios of single populations are skewed: sums of all are divided
     sums = {name: np.array([np.nan_to_num(values[f"{name}_{k}"]) for k in CLASSES[:-1]]) for name in SUMS}
     if sums["hits"].sum() >= LEAST_HITS:
@@ -220,8 +220,18 @@ def ratio_of(above: np.ndarray, below: np.ndarray) -> Interval:
 SUMS = ("hits", "expected", "larger")
 LEAST_HITS = 30
 """Fewest hits of all populations for c, of a class or of all."""
-SHOWN = ("t_2", "t_8", "t_20", "t_96", "t_ratio_0.5", "t_ratio_0.2", "lambda_20", "lambda_96", "z_20", "z_96", "gamma")
-SHOWN += ("dimension", "gamma_large", "dimension_large", "share_magnetic", "purity", "c", "cpu_seconds")
+SHOWN = ("t_2", "t_8", "t_20", "t_96", "t_ratio_0.5", "t_ratio_0.2", "lambda_2_20", "lambda_2_96", "lambda_8_96")
+SHOWN += (
+    "z_8_96",
+    "gamma",
+    "dimension",
+    "gamma_large",
+    "dimension_large",
+    "share_magnetic",
+    "purity",
+    "c",
+    "cpu_seconds",
+)
 
 
 SUMMARY = {
@@ -232,9 +242,10 @@ SUMMARY = {
         "t_8": "at 8",
         "t_20": "at 20",
         "t_96": "at 96",
-        "lambda_20": "λ, S = 2–20",
-        "lambda_96": "λ, S = 2–96",
-        "z_96": "z, S = 2–96",
+        "lambda_2_20": "λ, S = 2–20",
+        "lambda_2_96": "λ, S = 2–96",
+        "lambda_8_96": "λ, S = 8–96",
+        "z_8_96": "z, S = 8–96",
     },
     "exponents": {
         "gamma": "γ, N = 3–100",

@@ -29,7 +29,7 @@ def test_free_bodies_move_as_in_an_open_box(rates, shear, record_bound):
 
     The velocities u + A x of the laboratory obey Newton's law, and with dH/dt constant images move at constant
     velocities.  Grains pass all faces, and the tilt is wrapped twice.  Positions differ by rounding, which grows in
-    3000 steps, as contacts form, roll, twist and are damped in all modes.
+    5000 steps, as contacts form, roll, twist and are damped in all modes.
     """
     bodies, box, until = colliding_bodies(), Box.periodic("3 um", "2.6 um", "2.8 um"), 4e-8
     motion = bodies.velocity + np.array([5.0, -10.0, 20.0])
@@ -39,7 +39,7 @@ def test_free_bodies_move_as_in_an_open_box(rates, shear, record_bound):
     flow, moved = np.eye(3) + until * rate, 0.49 * lengths
     probe = sand.Simulation(grains, [DAMPED])
     probe.run(steps=1)
-    stepping = sand.Verlet(step=probe.state.clock[STEP])
+    stepping = sand.Verlet(step=0.6 * probe.state.clock[STEP])  # no step strains the box by more than 1e-3
     free = sand.Simulation(grains, [DAMPED], stepping=stepping)
     position = grains.position + moved
     images, velocity = box.image(position), grains.velocity - grains.position @ rate.T

@@ -57,7 +57,7 @@ CAPABILITIES = {
     "bridges of bodies and strengths of contacts from arrays, in looks whether a collision has ended": 26,
     "cells of neighbour lists that share places, for grains in clumps far apart": 24,
     "fixed steps that come to strain a box too much": 5,
-    "what a paper's word hardly means for a slope": 1,
+    "verdicts on slopes and without intervals, degrees with a free start, reach of hash grids": 5,
     "words on each loss, axes and ranges of colours of the page as in figures, without outliers": 30,
     "the rigid motion of clusters, in one place (less)": -35,
 }

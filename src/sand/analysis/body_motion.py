@@ -95,7 +95,7 @@ def motion_of(grains: Any, rigid: RigidMotion) -> BodyMotion:
 
 def rigid_motion(grains: Any, pairs: np.ndarray, box: Box, label: np.ndarray) -> RigidMotion:
     """The rigid motion of each cluster; arguments as for `body_motion`, and the cluster of each grain (N,)."""
-    mass, inertia, count = np.asarray(grains.mass, float), _inertia(grains), int(label.max(initial=-1)) + 1
+    mass, inertia, count = np.asarray(grains.mass, float), _inertia(grains), int(label.max()) + 1
 
     def summed(values: np.ndarray) -> np.ndarray:
         """Sums over the grains of each cluster, of values (…, n): (…, K)."""
@@ -108,7 +108,8 @@ def rigid_motion(grains: Any, pairs: np.ndarray, box: Box, label: np.ndarray) ->
     s, u = x - (summed(mass * x) / total)[:, label], v - mean[:, label]
     angular = summed(mass * np.cross(s, u, axis=0) + inertia * w)
     tensor = summed(mass * (s * s).sum(axis=0) + inertia) * np.eye(3)[:, :, None] - summed(mass * s[:, None] * s[None])
-    spin = np.linalg.solve(tensor.T, angular.T[:, :, None])[:, :, 0].T
+    spin, several = angular / summed(inertia), np.bincount(label, minlength=count) > 1  # that of single grains
+    spin[:, several] = np.linalg.solve(tensor.T[several], angular.T[several, :, None])[:, :, 0].T
     turning = spin[:, label]
     return RigidMotion(label, mean, angular, spin, s, u - np.cross(turning, s, axis=0), w - turning)
 

@@ -218,10 +218,7 @@ class DeformedBox(Component):
             return stages_of_part(bool(setup.forces.long_range))
         shortest = max(least_side(setup.grains.radius), 2.0 * self._cutoff)
         number, time = LAWS.index(self.given.law), self.given.time or 0.0
-        fixed = getattr(setup.stepping, "step", "auto") != "auto"
-        numbers = DeformationNumbers(
-            number, time, shortest, bool(setup.forces.long_range), self.shears(setup.box), fixed
-        )
+        numbers = DeformationNumbers(number, time, shortest, bool(setup.forces.long_range), self.shears(setup.box))
         if getattr(setup.stepping, "moves_bodies", False):
             return stages_with_bodies(numbers)
         return deformation_stages(numbers)

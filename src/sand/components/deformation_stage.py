@@ -48,11 +48,10 @@ class DeformationNumbers(NamedTuple):
     shortest: float  # least length of an axis [m], so that no two grains touch through two images
     long_range: bool  # whether long-range forces act
     sheared: bool  # whether the box is tilted, or is ever sheared
-    fixed: bool  # whether the user has set the step
 
 
 @stage("the time step of a box that is deformed")
-def limit_strain(cell, scratch, parameters):
+def limit_strain(cell, scratch, criteria, parameters):
     """Lower `scratch[LIMIT]` to a power of two of a second.
 
     Returns `Stop.STRAINED_TOO_FAST` where a fixed step would have to be lowered, `Stop.BOX_TOO_SMALL` where a side is
@@ -62,7 +61,7 @@ def limit_strain(cell, scratch, parameters):
     for a in range(3):
         fastest = max(fastest, abs(cell.span[RATE + a]))
     if fastest * scratch[LIMIT] > LARGEST_STRAIN:
-        if parameters.fixed:
+        if criteria.fixed > 0.0:
             return Stop.STRAINED_TOO_FAST.value
         scratch[LIMIT] = quantise_step(1.0, LARGEST_STRAIN / fastest, True)
     for a in range(3):
@@ -195,7 +194,7 @@ def work_of_box(grains, contacts, long_range, cell, count, scratch, span, parame
 
 def stages_of_part(long_range: bool) -> HookStages:
     """Stages of awake clusters in a step of rigid bodies, in which the box changes linearly."""
-    work = work_of_box, DeformationNumbers(LAWS.index(LINEAR), 0.0, 0.0, long_range, False, False)
+    work = work_of_box, DeformationNumbers(LAWS.index(LINEAR), 0.0, 0.0, long_range, False)
     return {Hook.AFTER_DRIFT: [(deform, ())], Hook.AFTER_KICK: [work], Hook.END_OF_BODIES: [work]}
 
 

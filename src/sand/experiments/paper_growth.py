@@ -15,10 +15,9 @@ from .paper_figure import MEMORY, Compared, PaperFigure, Row, grouped
 from .seed_table import Interval, SeedTable, seed_table
 
 EQUAL_MASSES = (
-    "for equal masses about 50 m/s for ice is also what Wada et al. 2009 and Arakawa et al. 2022 find (from memory); "
-    "the formula was fitted to many mass ratios"
+    "equal masses are below the formula in other papers, too: about 50 m/s for ice in Wada et al. 2009 and Arakawa et "
+    "al. 2022 (from memory); it was fitted to many mass ratios"
 )
-
 HARDLY = 0.05
 """Slope d ln v/d ln x up to which v hardly depends on x: 26 % for a factor of 100."""
 

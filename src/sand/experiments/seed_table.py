@@ -29,10 +29,11 @@ class Interval(NamedTuple):
         return f"{self.value:.3g} ({limits}) {unit}".rstrip()
 
     def verdict(self, paper: float, reason: str, within: float = 0.0) -> str:
-        """Text "agrees" if the interval contains a paper's value, "within …" of it; or the difference and why."""
+        """Text "agrees" if the interval or the value has a paper's value, "within …" near it; or why not."""
         low, high = (self.low, self.high) if math.isfinite(self.low) else (self.value, self.value)
         if low - within <= paper <= high + within:
-            near = "" if low <= paper <= high else f" within {within:g} of the interval"
+            near = "" if low <= paper <= high else f" within {within:g}"
+            near += " of the interval" * (bool(near) and math.isfinite(self.low))
             return "not decided: the interval is too wide" if high - low > abs(paper) + 2 * within else "agrees" + near
         if not math.isfinite(self.value):
             return reason

@@ -4,8 +4,9 @@ Grains are sorted into cells.  A grain has an index in this order, its sorted in
 s, and the grains of cell c have the sorted indices `cell_start[c]` … `cell_start[c + 1]` − 1.  Cells are subdivided
 along x, so that the candidates of a grain in one row of cells form one contiguous range of sorted indices.
 
-Cells are about as wide as the reach, however far apart the grains are.  Where there would be too many, cells at equal
-distances share one place in the arrays, in which grains are told apart by their separation.
+Cells are about as wide as the reach, however far apart the grains are (up to MOST_CELLS per axis).  Where there would
+be too many, the arrays are a periodic hash grid: cell c of an axis is stored in place c modulo the number of places,
+and pairs of grains from different cells in one place are rejected by their distance.
 
 The Verlet list is stored in compressed sparse row form: `neighbour[start[s] : start[s + 1]]` are the sorted indices of
 the neighbours of s.  It is a full list (each pair occurs in the rows of both grains) and a function of the anchors
@@ -31,6 +32,8 @@ FULL = -1
 """Returned when the arrays of a list are too short."""
 MAX_SUBDIVISION = 16
 """Most cells along x per cell width along y or z; more would hardly shorten the ranges."""
+MOST_CELLS = 1 << 26
+"""Most cells per axis."""
 MIN_PERIODIC_CELLS = 3
 """Fewest cells on a divided periodic axis, so that the two neighbours of a cell differ; with fewer it is one cell."""
 WIDER = 2.0
@@ -73,7 +76,7 @@ def cells_on_axis(low, high, length, reach):
     A periodic axis with fewer than three cells is not divided: a pair would be found from both sides.
     """
     start, extent = (-0.5 * length, length) if length > 0.0 else (low, high - low)
-    number = max(1, min(int(extent / reach), 1 << 20)) if extent > 0.0 else 1
+    number = max(1, min(int(extent / reach), MOST_CELLS)) if extent > 0.0 else 1
     number = 1 if length > 0.0 and number < MIN_PERIODIC_CELLS else number
     return number, start, number / extent if extent > 0.0 else 0.0
 
@@ -107,16 +110,17 @@ def fewer_places(number):
 
 
 @loop
-def with_equal_shares(number, stored, per_length, length):
-    """Number of cells, on a periodic axis a multiple of the places, and cells per metre."""
+def multiple_of_places(number, stored, per_length, length):
+    """Number of cells, on a periodic axis a multiple of the places, which may become fewer; places; cells per metre."""
     if length == 0.0 or number == stored:
-        return number, per_length
-    return number // stored * stored, (number // stored * stored) / length
+        return number, stored, per_length
+    stored = max(number // ((number + stored - 1) // stored), 3)
+    return number // stored * stored, stored, (number // stored * stored) / length
 
 
 @loop
 def choose_grid(anchor, span, reach):
-    """Grid of cells about as wide as `reach`, or WIDER, with at most CELLS_PER_GRAIN · N + 27 places.
+    """Grid of cells at least as wide as `reach`, or as WIDER times it, with at most CELLS_PER_GRAIN · N + 27 places.
 
     Larger cells instead of shared places would hold whole clumps, such as fragments that fly apart.  An open axis
     extends between the outermost grains.  Along x, cells are subdivided into up to MAX_SUBDIVISION, until there is a
@@ -133,20 +137,20 @@ def choose_grid(anchor, span, reach):
         ny, ly, py = cells_on_axis(low[1], high[1], span.y, width)
         nz, lz, pz = cells_on_axis(low[2], high[2], span.z, width)
         nx, px = cells_along_x(nx, px, nz, span)
-        if nx * ny * nz <= most or width > reach:
+        if float(nx) * ny * nz <= most or width > reach:
             break
         width *= WIDER
     mx, my, mz = nx, ny, nz
-    while mx * my * mz > most and max(mx, my, mz) > 3:
+    while float(mx) * my * mz > most and max(mx, my, mz) > 3:
         if mx >= my and mx >= mz:
             mx = fewer_places(mx)
         elif my >= mz:
             my = fewer_places(my)
         else:
             mz = fewer_places(mz)
-    nx, px = with_equal_shares(nx, mx, px, span.x)
-    ny, py = with_equal_shares(ny, my, py, span.y)
-    nz, pz = with_equal_shares(nz, mz, pz, span.z)
+    nx, mx, px = multiple_of_places(nx, mx, px, span.x)
+    ny, my, py = multiple_of_places(ny, my, py, span.y)
+    nz, mz, pz = multiple_of_places(nz, mz, pz, span.z)
     subdivision = max(1, min(anchor.shape[1] // (mx * my * mz), MAX_SUBDIVISION))
     width_y, width_z = 1.0 / py if py > 0.0 else 0.0, 1.0 / pz if pz > 0.0 else 0.0
     spacings = spacing_on_axis(span.x), spacing_on_axis(span.y), spacing_on_axis(span.z)
@@ -192,7 +196,7 @@ def sort_into_cells(long_range, sorted_position, anchor, span, grid):
     for c in range(total + 1):
         long_range.cell_start[c] = 0
     for i in range(anchor.shape[1]):
-        x = cell_coordinates(grid, nearest_image(load(anchor, i), span))
+        x = cell_coordinates(grid, on_spacings(nearest_image(load(anchor, i), span), grid.spacings))
         row = place_of(cell_index(x[2], nz), mz) * my + place_of(cell_index(x[1], ny), my)
         cell = row * mx + place_of(cell_index(x[0], nx), mx)
         long_range.cell_of[i] = cell
@@ -317,16 +321,16 @@ def append_cell_row(long_range, sorted_position, span, grid, centre, row, used):
     if period == 0.0:
         low, high = max(low, 0), min(high, nx - 1)
     x, y, z = centre.position
-    turn = cell - place_of(cell, mx)  # the cell with the first place
-    first, last = max(low, turn), min(high, turn + mx - 1)
+    start = cell - place_of(cell, mx)  # cells `start` to `start` + mx − 1 have the places 0 to mx − 1
+    first, last = max(low, start), min(high, start + mx - 1)
     for _ in range(2):
         shift = period if first < 0 else -period if first >= nx else 0.0
         shifted = Centre(centre.s, (x + shift, y, z), centre.limit)
-        cells = row.first + first - turn, row.first + last + 1 - turn
+        cells = row.first + first - start, row.first + last + 1 - start
         used = append_range(long_range, sorted_position, span, grid.folded, shifted, cells, used)
-        if used == FULL or (low >= turn and high < turn + mx):
+        if used == FULL or (low >= start and high < start + mx):
             break
-        first, last, turn = (low, turn - 1, turn - mx) if low < turn else (turn + mx, high, turn + mx)
+        first, last, start = (low, start - 1, start - mx) if low < start else (start + mx, high, start + mx)
     return used
 
 

@@ -29,7 +29,9 @@ def in_contact(contacts, i, j):
 
 ROW_FULL = -2
 """Returned by `build_pair_list` when the neighbours of one grain exceed the long-range arrays."""
-NO_GRID = Grid(*(((0, 0, 0),) * 2), *(((0.0, 0.0, 0.0),) * 2), 0, 0.0, 0.0, *(((0.0, 0.0, 0.0),) * 2), False)
+NO_GRID = Grid(
+    (0, 0, 0), (0, 0, 0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False
+)  # fmt: skip
 """Placeholder where no cells are used."""
 
 

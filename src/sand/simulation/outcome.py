@@ -22,7 +22,7 @@ class Outcome(Enum):
     TOO_FAST = "a grain would move by more than half the smallest radius in one step: the step is too long"
     SPINS_TOO_FAST = "a grain would rotate by more than half a radian in one step: the step is too long"
     BOX_TOO_SMALL = "the box is too small for its grains: a side must hold two of the largest and their gap twice"
-    STRAINED_TOO_FAST = "the box would be strained by more than 0.001 in one step: the step is too long"
+    STRAINED_TOO_FAST = "a fixed step would strain the box too much: use a shorter one, or step = 'auto'"
     OVERCOMPRESSED = "two grains, or a grain and a wall, overlap by more than a radius: too fast, or the step too long"
 
     @property

@@ -200,12 +200,13 @@ def test_the_error_of_few_hits():
 
 @pytest.mark.parametrize("value", [-0.5, 0.0, 0.6])
 def test_the_degree_of_growth(value):
-    """dS/dt = S^λ, integrated by the midpoint rule from S = 1 in 10⁵ steps of ln S: λ to 1e-4."""
+    """dS/dt = S^λ, integrated by the midpoint rule from S = 1 in 10⁵ steps of ln S: λ to 1e-4, whatever the start."""
     ends = np.linspace(0.0, math.log(20.0), 100_001)
     steps = np.exp((1.0 - value) * 0.5 * (ends[1:] + ends[:-1])) * ends[1]
     sizes = np.geomspace(2.0, 20.0, 40)
     times = 3e5 * np.interp(np.log(sizes), ends[1:], np.cumsum(steps))
     assert degree(sizes, times) == pytest.approx(value, rel=0.0, abs=1e-4)
+    assert degree(sizes, times + 0.7 * times[0]) == pytest.approx(value, rel=0.0, abs=1e-4)
 
 
 def table_of(grains, moment, gyration):
