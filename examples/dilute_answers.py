@@ -188,7 +188,7 @@ def intervals(rows: Sequence[dict[str, Any]]) -> dict[str, tuple[Interval, int]]
     values = {name: np.array([row.get(name, math.nan) for row in rows], float) for name in names}
     for first, last in WINDOWS:
         levels = np.array([level for level in LEVELS if first <= level <= last], float)
-        times = np.stack([values[f"t_{level:g}"] for level in levels], axis=1)
+        times = np.array([[row.get(f"t_{level:g}", math.nan) for level in levels] for row in rows], float)
         values[f"lambda_{first}_{last}"] = np.array(
             [degree(levels, each) if np.isfinite(each).all() else math.nan for each in times]
         )
