@@ -221,17 +221,8 @@ SUMS = ("hits", "expected", "larger")
 LEAST_HITS = 30
 """Fewest hits of all populations for c, of a class or of all."""
 SHOWN = ("t_2", "t_8", "t_20", "t_96", "t_ratio_0.5", "t_ratio_0.2", "lambda_2_20", "lambda_2_96", "lambda_8_96")
-SHOWN += (
-    "z_8_96",
-    "gamma",
-    "dimension",
-    "gamma_large",
-    "dimension_large",
-    "share_magnetic",
-    "purity",
-    "c",
-    "cpu_seconds",
-)
+SHOWN += ("z_8_96", "gamma", "dimension", "gamma_large", "dimension_large", "share_magnetic", "purity", "c")
+SHOWN += ("cpu_seconds",)
 
 
 SUMMARY = {

@@ -87,6 +87,7 @@ def body_motion(grains: Any, pairs: np.ndarray, box: Box) -> BodyMotion:
 def motion_of(grains: Any, rigid: RigidMotion) -> BodyMotion:
     """As `body_motion`, from the rigid motion of the clusters."""
     mass, count = np.asarray(grains.mass, float), np.bincount(rigid.label)
+    # from relative velocities, so that no energies of almost equal size are subtracted
     moving = mass * (rigid.relative**2).sum(axis=0) + _inertia(grains) * (rigid.relative_spin**2).sum(axis=0)
     total, internal = np.bincount(rigid.label, mass), np.where(count > 1, np.bincount(rigid.label, 0.5 * moving), 0.0)
     translation = 0.5 * total * (rigid.velocity**2).sum(axis=0)
