@@ -12,7 +12,7 @@ from sand.basics.errors import BadInput
 from sand.experiments import dilute_files, dilute_growth
 from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space, momenta_of
 from sand.experiments.dilute_encounters import Encounters
-from sand.experiments.dilute_flight import RigidFlights
+from sand.experiments.dilute_flight import RigidFlights, start_distance
 from sand.experiments.dilute_hits import Hit, Resolve, Stick
 from sand.experiments.dilute_majorant import Majorant
 from sand.experiments.dilute_own import OWN_START, OwnMajorant, thermal_body
@@ -182,7 +182,7 @@ def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, m
         assert np.linalg.norm(orbit) == pytest.approx(phase.orbit, rel=1e-6, abs=0.0)
     there = kinetic - COULOMB * np.prod(charges) * 1.602176634e-19**2 / r / HEAT
     speed = math.sqrt(2.0 * there * HEAT / (0.5 * a.mass))
-    far = (4.0 if moves else 2.0) * majorant.bound(sizes_of(a), sizes_of(b), speed)
+    far = start_distance(a, b, speed, majorant.bound(sizes_of(a), sizes_of(b), speed), 4.0 if moves else 2.0)
     assert far <= r <= 1.5 * far
     assert abs(sum(hit.energies.values())) < 0.2 * HEAT
 

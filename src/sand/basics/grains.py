@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
@@ -365,6 +366,12 @@ def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) ->
     vectors = np.zeros((3, count))
     vectors[2] = moment_size(moment, mass, specific)
     return vectors
+
+
+def net_charge(charge: np.ndarray) -> float:
+    """Σq [C] of charges (n,); 0 where it is below 1e-9 Σ|q|, which counts as rounding."""
+    net = math.fsum(charge)
+    return net if abs(net) > 1e-9 * np.abs(charge).sum() else 0.0
 
 
 def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.0) -> np.ndarray:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ..basics.grains import GrainArrays
 from ..basics.initial_pairs import StrainedContacts
 from .scattering.encounters import principal_frame
-from .scattering.groups import groups_of
+from .scattering.groups import charge_groups_of, groups_of
 from .scattering.initial_conditions import R, U
 from .scattering.rigid_flight import FlyingBody
 from .scattering.two_aggregates import ANGULAR1, ANGULAR2, TURN1, TURN2
@@ -42,8 +42,8 @@ class Body:
         Their contacts, with displacements in the principal frame.
     flying : FlyingBody
         What flights need: groups of grains, moments of inertia, extent.
-    mass, moment_sum, charge : float
-        M [kg], Σ|μ| [A m²] and Σ|q| [C].
+    mass, moment_sum, charge, charge_arm : float
+        M [kg], Σ|μ| [A m²], Σ|q| [C] and Σ|q||x| [C m].
     radii : tuple of float
         Smallest and largest radius of its grains [m].
     number : int
@@ -62,6 +62,7 @@ class Body:
     mass: float
     moment_sum: float
     charge: float
+    charge_arm: float
     radii: tuple[float, float]
     number: int = 0
     born: int = 0
@@ -104,13 +105,15 @@ def body_at_rest(
     x, moment, magnitude = own.position, own.moment, np.linalg.norm(own.moment, axis=0)
     flying = FlyingBody(
         groups_of(x.T, moment.T),
+        charge_groups_of(x.T, own.charge),
         own.radius,
-        own.charge,
         (float(inertia[0]), float(inertia[1]), float(inertia[2])),
         (0.0, 0.0, 0.0, 1.0),
         float((np.linalg.norm(x, axis=0) + own.radius).max()),
     )
-    total = float(own.mass.sum()), float(magnitude.sum()), float(np.abs(own.charge).sum())
+    size = np.abs(own.charge)
+    arm = float((size * np.linalg.norm(x, axis=0)).sum())
+    total = float(own.mass.sum()), float(magnitude.sum()), float(size.sum()), arm
     radii = float(own.radius.min()), float(own.radius.max())
     return Body(own, contacts, flying, *total, radii, *identity)
 

@@ -225,5 +225,5 @@ def _flight_time(population: Population) -> float:
     for body in population.bodies:
         if body.moment_sum > 0.0:
             size, speed = sizes_of(body), math.sqrt(2.0 * majorant.heat / body.mass)
-            found.append(2.0 * start_distance(body, body, float(majorant.bound(size, size, speed))) / speed)
+            found.append(2.0 * start_distance(body, body, speed, float(majorant.bound(size, size, speed))) / speed)
     return max(found)

@@ -12,17 +12,17 @@ import numpy as np
 from ..basics.errors import BadInput
 from ..simulation.contact_phase import CHANGES
 from .dilute_body import Body, Motion, body_of
-from .dilute_flight import FlightResult, RigidFlights, kepler_start, start_distance
+from .dilute_flight import FlightResult, RigidFlights, charge_of, kepler_start, start_distance
 from .dilute_hits import Hit, HitRule
 from .dilute_majorant import Approach
-from .dilute_own import OWN_START, centre_velocity, has_reverse, own_start, parted, repelled, turned_copy
+from .dilute_own import OWN_START, centre_velocity, deflected, has_reverse, own_start, parted, turned_copy
 from .dilute_population import Population, sizes_of
 from .scattering.event_draws import event_uniforms
 from .scattering.flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
 
 ENDS = {HIT: "hit", MISS: "miss", BOUND: "bound", FLIGHT_FAILED: "failed"}
 REPELLED = "repelled"
-"""End of an encounter of charges that turn around before the start of a flight."""
+"""End of an encounter of like net charges that turn around before the start of a flight."""
 HIT_CHANGES = tuple(name for name in CHANGES if name not in ("lost_gas", "lost_outside", "lost_cutoff_changed"))
 """Changes of energies [J] over a hit that can occur."""
 
@@ -88,7 +88,7 @@ class Drawn(NamedTuple):
     j: int
     kernel: float  # K̂ [m³/s]
     approach: Approach
-    flight: FlightResult | None  # None: repelled before its start
+    flight: FlightResult | None  # None: bodies with charges do not come as near as its start
     others: float  # expected encounters of the two with others during the flight
 
 
@@ -109,11 +109,12 @@ def draw_flight(
 def _fly(
     a: Body, b: Body, approach: Approach, rigid_flights: RigidFlights, event: tuple[int, int]
 ) -> FlightResult | None:
-    """The flight of two bodies, thermal or with their own motion; None if charges repel them before its start."""
+    """The flight of two bodies, thermal or with their own motion; None if they do not come as near as its start."""
+    speed, impact, bound = approach
     if a.motion is None:
-        start = kepler_start(a, b, approach[:2], start_distance(a, b, approach.bound))
+        start = kepler_start(a, b, (speed, impact), start_distance(a, b, speed, bound))
         return start and rigid_flights.thermal(a, b, *start, event)
-    state = own_start(a, b, approach, start_distance(a, b, approach.bound, OWN_START), event)
+    state = own_start(a, b, approach, start_distance(a, b, speed, bound, OWN_START), event)
     if state is None:
         return None
     # until they are as far from each other again: their motion afterwards is kept
@@ -170,8 +171,9 @@ class Encounters:
         self.event += 1
         if flight is None:
             if a.motion is not None:
-                population.replace(i, j, repelled(a, b, approach, (self.seed, self.event - 1)))
-            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=REPELLED)
+                population.replace(i, j, deflected(a, b, approach, (self.seed, self.event - 1)))
+            end = REPELLED if charge_of(a) * charge_of(b) > 0.0 else ENDS[MISS]
+            return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=end)
         self.flights += 1
         self.bound += flight.end == BOUND
         own = _of_flight(flight) | {"others": met}

@@ -8,16 +8,26 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.constants import COULOMB, MAGNETIC
+from ..basics.grains import net_charge
 from .dilute_body import Body
 from .dilute_start import start_in_field
 from .scattering.encounters import MOST_FLIGHT_STEPS
 from .scattering.flight_driver import Flights
 from .scattering.initial_conditions import RANDOM, InitialConditions
-from .scattering.rigid_flight import GROUP_SIZE, RESULTS, STEP_FRACTION, FlyingPair, Now, contact_energy, flights_of
+from .scattering.rigid_flight import (
+    CHARGE_GROUP_SIZE,
+    GROUP_SIZE,
+    RESULTS,
+    STEP_FRACTION,
+    FlyingPair,
+    Now,
+    contact_energy,
+    flights_of,
+)
 from .scattering.two_aggregates import AGGREGATES
 
 START = 2.0
-"""Distance at which flights start, in units of b̂."""
+"""Distance at which flights start, in units of b̂, of charges in units of their own, see `start_distance`."""
 STREAMS = 0
 """The stratum of flights; their number is that of the event."""
 
@@ -55,7 +65,7 @@ class RigidFlights:
         Mean energy of rotation in k_BT: 3/2 in equilibrium.
     field : tuple, optional
         External flux density [T].
-    step_fraction, group_size : float, optional
+    step_fraction, group_size, charge_group_size : float, optional
         See `scattering.rigid_flight`.
     """
 
@@ -66,9 +76,10 @@ class RigidFlights:
         field: tuple[float, float, float] = (0.0, 0.0, 0.0),
         step_fraction: float = STEP_FRACTION,
         group_size: float = GROUP_SIZE,
+        charge_group_size: float = CHARGE_GROUP_SIZE,
     ):
         self.heat, self.spin_energy, self.field = heat, spin * heat, field
-        self.step_fraction, self.group_size = step_fraction, group_size
+        self.step_fraction, self.sizes = step_fraction, (group_size, charge_group_size)
         self._now = Now(*(np.zeros((3, 0)) for _ in Now._fields))
         # one flight, whose arrays are used again
         self._flights = Flights(
@@ -101,10 +112,9 @@ class RigidFlights:
         )
 
     def _fly(self, a: Body, b: Body, start: InitialConditions, seed: int, escape: float) -> FlightResult:
-        needed = max(body.flying.groups.point.shape[1] for body in (a, b))
+        needed = max(groups.point.shape[1] for body in (a, b) for groups in (body.flying.groups, body.flying.charges))
         if self._now.position1.shape[1] < needed:
             self._now = Now(*(np.zeros((3, 2 * needed)) for _ in Now._fields))
-        charged = a.charge * b.charge > 0.0
         pair = FlyingPair(
             a.flying,
             b.flying,
@@ -113,15 +123,14 @@ class RigidFlights:
             a.mass * b.mass / (a.mass + b.mass),
             min(a.radii[0], b.radii[0]),
             max(a.radii[1], b.radii[1]),
-            float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC)),
-            COULOMB * a.charge * b.charge,
+            attraction_of(a, b),
             self.field,
             escape,
             self.step_fraction,
-            0.0 if charged else self.group_size,  # a group has no charge
+            *self.sizes,
             MOST_FLIGHT_STEPS,
         )
-        flights_of(charged)(np.uint64(seed), self._flights, start, pair, self._now)
+        flights_of(are_charged(a, b))(np.uint64(seed), self._flights, start, pair, self._now)
         found = self._flights.results[0].tolist()
         values = dict(zip(RESULTS, found, strict=True)) | {"end": int(found[0]), "steps": int(found[3])}
         return FlightResult(**values, state=self._flights.ends[0].copy())
@@ -129,21 +138,45 @@ class RigidFlights:
 
 def charge_of(body: Body) -> float:
     """Net charge [C]."""
-    return float(body.grains.charge.sum())
+    return net_charge(body.grains.charge)
+
+
+def are_charged(a: Body, b: Body) -> bool:
+    """Whether both bodies have charged grains."""
+    return a.charge * b.charge > 0.0
+
+
+def attraction_of(a: Body, b: Body) -> tuple[float, float, float]:
+    """C₁ [J m], C₂ [J m²], C₃ [J m³] of the bound −U ≤ C₁/c + C₂/c² + C₃/c³, c the gap of the bounding spheres.
+
+    With the net charges Q and D = Σ|q||x|, of the grains at x from the centre of mass, and k = 1/4πε₀
+
+        C₁ = max(0, −k Q Q′),  C₂ = k (|Q| D′ + |Q′| D),  C₃ = 2k D D′ + 2 (μ₀/4π) Σ|μ| Σ|μ′|
+
+    The potential 1/d of a charge at x differs by at most |x|/c² from that of one at the centre, with a gradient of at
+    most 2|x|/c³: so charges act as Q and dipole moments of at most D, aligned.  The derivative of the bound is one of
+    the force.
+    """
+    magnetic = float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC))
+    if not are_charged(a, b):
+        return 0.0, 0.0, magnetic
+    one, two = charge_of(a), charge_of(b)
+    mixed = COULOMB * (abs(one) * b.charge_arm + abs(two) * a.charge_arm)
+    return max(0.0, -COULOMB * one * two), mixed, magnetic + 2.0 * COULOMB * a.charge_arm * b.charge_arm
 
 
 def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: float) -> tuple[float, float, float] | None:
     """Speed [m/s], impact parameter [m] and distance of the plane [m] of a start on the orbit of two charges.
 
-    With Q = q q′/4πε₀ of the net charges, v and b at infinity, and r² = distance² + b²: v′² = v² − 2Q/m̄r, b′v′ = b v,
+    With Q = q q′/4πε₀ of the net charges, v and b at infinity, and r of `start_radius`: v′² = v² − 2Q/m̄r, b′v′ = b v,
     and the plane is at √(r² − b′²).  The direction of the orbit does not matter, as orientations are random.  None if
-    the charges repel the bodies before they come so near.
+    bodies with charges never come so near.
     """
     speed, b_far = approach
-    product = COULOMB * charge_of(a) * charge_of(b)
-    if product == 0.0:
+    if not are_charged(a, b):
         return speed, b_far, distance
-    radius, reduced = math.hypot(distance, b_far), a.mass * b.mass / (a.mass + b.mass)
+    product, reduced = COULOMB * charge_of(a) * charge_of(b), a.mass * b.mass / (a.mass + b.mass)
+    radius = start_radius(a, b, distance, b_far)
     square = speed**2 - 2.0 * product / (reduced * radius)
     if not square * radius**2 > (b_far * speed) ** 2:
         return None
@@ -152,6 +185,23 @@ def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: floa
     return near, offset, math.sqrt(radius**2 - offset**2)
 
 
-def start_distance(a: Body, b: Body, bound: float, start: float = START) -> float:
-    """Distance [m] of the plane on which a flight starts: 2 b̂, but at least that at which the bodies are clear."""
-    return max(start * bound, a.extent + b.extent + 4.0 * max(a.radii[1], b.radii[1]))
+def start_distance(a: Body, b: Body, speed: float, bound: float, start: float = START) -> float:
+    """Distance [m] at which a flight starts; at least that at which the bodies are clear.
+
+    Without charges that of a plane, `start` b̂.  b̂ of charges is that of all |q| at the centres, where only the net
+    charges act: their orbit leads to the distance r at which the rest of −U is small.  There C₂/r² is at most ε m̄v²,
+    with ε = 1/(3^(3/2) start³), and r ≥ start √(3 (C₃/m̄v²)^(2/3) + e²), so that C₃/r³ is, too (`attraction_of`): as of
+    magnetic moments at `start` b̂.
+    """
+    clear = a.extent + b.extent + 4.0 * max(a.radii[1], b.radii[1])
+    if not are_charged(a, b):
+        return max(start * bound, clear)
+    _, c2, c3 = attraction_of(a, b)
+    energy = speed * speed * a.mass * b.mass / (a.mass + b.mass)
+    with_dipoles = start * math.sqrt(3.0 * (c3 / energy) ** (2.0 / 3.0) + (a.extent + b.extent) ** 2)
+    return max(with_dipoles, math.sqrt(3.0**1.5 * start**3 * c2 / energy), clear)
+
+
+def start_radius(a: Body, b: Body, distance: float, impact: float) -> float:
+    """Distance of the centres [m] at the start: charges are on a sphere, other bodies on a plane with an offset b."""
+    return distance if are_charged(a, b) else math.hypot(distance, impact)

@@ -164,7 +164,8 @@ class Resolve:
         r, u = state[R : R + 3], state[U : U + 3]
         if velocity_far_away(r, u, repulsion_of(a, b)) is None:
             return math.inf
-        return start_distance(a, b, float(self.majorant.bound(sizes_of(a), sizes_of(b), np.linalg.norm(u))), start)
+        speed = float(np.linalg.norm(u))
+        return start_distance(a, b, speed, float(self.majorant.bound(sizes_of(a), sizes_of(b), speed)), start)
 
 
 def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple[Body, Body, np.ndarray]:

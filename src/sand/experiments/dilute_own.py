@@ -20,7 +20,7 @@ from scipy.special import ellipj, ellipk, ndtri
 
 from ..basics.constants import COULOMB
 from .dilute_body import Body, Motion
-from .dilute_flight import charge_of
+from .dilute_flight import charge_of, start_radius
 from .dilute_majorant import Approach, Majorant, Sizes
 from .dilute_population import sizes_of
 from .dilute_start import direction, rotation_onto
@@ -131,10 +131,10 @@ def own_start(a: Body, b: Body, approach: Approach, distance: float, event: tupl
     """State (20,) of two bodies at a distance [m] before their encounter, of an event (seed, number).
 
     The azimuth of the impact parameter is random; charges have brought the bodies there on their Kepler orbit.  None
-    if these repel them before they come so near.
+    if bodies with charges never come so near.
     """
     (speed, impact, _), repulsion = approach, repulsion_of(a, b)
-    radius = math.hypot(distance, impact)
+    radius = start_radius(a, b, distance, impact)
     angle = angle_from_infinity(speed, impact, radius, repulsion)
     if angle is None:
         return None
@@ -190,8 +190,8 @@ def velocity_far_away(r: np.ndarray, u: np.ndarray, repulsion: float) -> np.ndar
     return speed * (math.cos(angle) * outward + math.sin(angle) / across * aside)
 
 
-def repelled(a: Body, b: Body, approach: Approach, event: tuple[int, int]) -> list[Body]:
-    """Both bodies after their charges have repelled them far from each other: Rutherford's deflection, spins stay."""
+def deflected(a: Body, b: Body, approach: Approach, event: tuple[int, int]) -> list[Body]:
+    """Both bodies after net charges have deflected them far from each other, by Rutherford's angle; spins stay."""
     along, side = directions(a, b, event_uniforms(*event, FLIGHT_BLOCK)[0])
     speed, impact, _ = approach
     angle = 2.0 * math.atan2(impact * speed**2, repulsion_of(a, b))  # between the directions in which r comes and goes

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
 import sand
@@ -12,6 +13,7 @@ from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.basics.initial_pairs import StrainedContacts
 from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
 from sand.experiments.dilute_conditions import check_gas, check_moments
+from sand.experiments.dilute_flight import attraction_of, charge_of, kepler_start, start_distance
 from sand.experiments.dilute_growth import bodies_of
 from sand.experiments.dilute_hits import Stick, moving_pair
 from sand.experiments.dilute_majorant import Majorant, Sizes
@@ -19,10 +21,10 @@ from sand.experiments.dilute_population import Population, sizes_of
 from sand.experiments.dilute_start import orientation_in_field, start_in_field
 from sand.experiments.scattering.event_draws import event_uniforms
 from sand.experiments.scattering.groups import GROUP
-from sand.experiments.scattering.rigid_flight import GROUP_SIZE
+from sand.experiments.scattering.rigid_flight import CHARGE_GROUP_SIZE, GROUP_SIZE
 from sand.forces.gas_drag import rotation_friction, translation_friction
 
-RADIUS, MOMENT, T = 1e-8, 6.6e-18, 100.0
+RADIUS, MOMENT, T, ELEMENTARY = 1e-8, 6.6e-18, 100.0, 1.602176634e-19
 
 
 def aggregate(places, directions, number=0):
@@ -109,6 +111,131 @@ def test_groups_err_by_a_share_of_what_they_do(body):
             error = flux_density(groups.point[:, part], groups.moment[:, part], at) - exact
             net = np.linalg.norm(groups.moment[:, part], axis=0).sum()
             assert np.linalg.norm(error) <= 6.0 * GROUP_SIZE * net / gap**3
+
+
+def charged(body, charges, scale=1.0):
+    """A body whose grains have so many elementary charges, and moments in these units of theirs."""
+    charge = ELEMENTARY * np.resize(np.array(charges, float), len(body))
+    return body_of(body.grains._replace(charge=charge, moment=scale * body.grains.moment), body.contacts)[0]
+
+
+def potential(x, charge, at):
+    """Potential over 1/4πε₀ of charges at x (3, n) at a place [C/m]."""
+    return float((charge / np.linalg.norm(at[:, None] - x, axis=0)).sum())
+
+
+CHARGED_BODIES = [
+    charged(GRAIN, [1]), charged(DIMER, [1, -1]), charged(tree(7, 7), [1, 0, -1, -1, 2]), charged(tree(17, 1), [1]),
+    charged(tree(70, 2), np.random.default_rng(1).choice([-1, 1], 70)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("body", CHARGED_BODIES, ids=len)
+def test_groups_of_charges_are_those_of_one_sign(body):
+    """Each level has all charge of either sign and its dipole moment, to rounding; the last one has a group of each.
+
+    `reach` bounds the distance of each charge from the nearest centre of its sign.
+    """
+    groups, charge, x = body.flying.charges, body.grains.charge, body.grains.position
+    for level, reach in enumerate(groups.reach):
+        part = slice(groups.first[level], groups.first[level + 1])
+        for sign in (1.0, -1.0):
+            own, of_grains = sign * groups.charge[part] > 0.0, sign * charge > 0.0
+            total = groups.charge[part][own].sum(), (groups.charge[part] * groups.point[:, part])[:, own].sum(axis=1)
+            assert total[0] == pytest.approx(charge[of_grains].sum(), rel=1e-13, abs=0.0)
+            dipole = (charge * x)[:, of_grains].sum(axis=1)
+            assert total[1] == pytest.approx(dipole, abs=1e-13 * body.charge * body.extent)
+            if of_grains.any():
+                apart = np.linalg.norm(x[:, of_grains, None] - groups.point[:, part][:, None, own], axis=0).min(axis=1)
+                assert apart.max() <= reach + 1e-12 * RADIUS
+    last = groups.charge[groups.first[-2] :]
+    assert len(last) == len(set(np.sign(last))) == len(set(np.sign(charge)) - {0.0})
+    assert groups.first[1] == np.count_nonzero(charge) and groups.reach[0] == 0.0
+
+
+@pytest.mark.parametrize("body", CHARGED_BODIES, ids=len)
+def test_groups_of_charges_have_no_dipole_error(body):
+    """1/|R − x| about the centre of charge, without its linear term, errs by (a/R)²/(R − a) at most.
+
+    With the gap a/0.1 of the sphere about the body R ≥ 10 a, so that the potential errs by at most Σ|q|/90R.
+    """
+    groups, rng = body.flying.charges, np.random.default_rng(3)
+    for level, reach in enumerate(groups.reach):
+        part = slice(groups.first[level], groups.first[level + 1])
+        for axis in rng.normal(size=(20, 3)):
+            at = (body.extent + reach / CHARGE_GROUP_SIZE) * axis / np.linalg.norm(axis)
+            exact = potential(body.grains.position, body.grains.charge, at)
+            error = potential(groups.point[:, part], groups.charge[part], at) - exact
+            nearest = np.linalg.norm(at[:, None] - groups.point[:, part], axis=0).min()
+            most = body.charge * (reach / nearest) ** 2 / (nearest - reach)
+            assert abs(error) <= most + 1e-13 * body.charge / nearest and most <= body.charge / 90.0 / nearest * (
+                1.0 + 1e-12
+            )
+
+
+def interaction(a, b, r, turn):
+    """Energy [J] of two bodies with the centres r apart, b turned, by sums over all pairs of grains."""
+    x, moment = turn @ b.grains.position, turn @ b.grains.moment
+    energy = 0.0
+    for k in range(len(a)):
+        at = r + a.grains.position[:, k]
+        energy += COULOMB * a.grains.charge[k] * potential(x, b.grains.charge, at)
+        energy -= MAGNETIC * a.grains.moment[:, k] @ flux_density(x, moment, at)
+    return energy
+
+
+@pytest.mark.parametrize("scale", [0.0, 1.0], ids=["charges", "charges and moments"])
+@pytest.mark.parametrize("first", CHARGED_BODIES[:4], ids=len)
+@pytest.mark.parametrize("second", CHARGED_BODIES[:3], ids=len)
+def test_the_bound_of_the_attraction_holds_in_all_poses(first, second, scale):
+    """−U ≤ C₁/c + C₂/c² + C₃/c³, and the inward force is at most its derivative, at gaps c from 0.1 to 100 radii.
+
+    U and its slope by all pairs, in 200 random poses; the slope by central differences, exact to 1e-6.
+    """
+    a, b = (charged(each, each.grains.charge / ELEMENTARY, scale) for each in (first, second))
+    c1, c2, c3 = attraction_of(a, b)
+    rng, extent = np.random.default_rng(4), a.extent + b.extent
+    for turn in Rotation.random(200, random_state=5).as_matrix():
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        clear = RADIUS * 10.0 ** rng.uniform(-1.0, 2.0)
+        step = 1e-4 * (clear + 2.0 * RADIUS)
+        inner, outer = (interaction(a, b, (extent + clear + sign * step) * axis, turn) for sign in (-1.0, 1.0))
+        terms = c1 / clear, c2 / clear**2, c3 / clear**3
+        assert -interaction(a, b, (extent + clear) * axis, turn) <= sum(terms) * (1.0 + 1e-12)
+        inward = (outer - inner) / (2.0 * step)
+        assert inward <= (terms[0] + 2.0 * terms[1] + 3.0 * terms[2]) / clear * (1.0 + 1e-5)
+
+
+def test_charges_start_where_only_their_net_charges_act():
+    """C₂/r² and C₃/r³ are at most m̄v²/(3^(3/2) start³); without charges, and in their limit, r = start b̂.
+
+    A pair whose Kepler orbit stays beyond r has no flight.
+    """
+    a, b, majorant = CHARGED_BODIES[2], CHARGED_BODIES[3], Majorant(T)
+    reduced, (_, c2, c3) = a.mass * b.mass / (a.mass + b.mass), attraction_of(a, b)
+    for start in (2.0, 4.0):
+        for speed in (0.01, 0.1, 1.0, 10.0):
+            r, bound = start_distance(a, b, speed, 1.0, start), reduced * speed**2 / (3.0**1.5 * start**3)
+            assert max(c2 / r**2, c3 / r**3) <= bound * (1.0 + 1e-12)
+            assert c2 / r**2 == pytest.approx(bound, rel=1e-12, abs=0.0) or r >= start * (a.extent + b.extent)
+    plain, tiny = (charged(tree(7, 7), [size]) for size in (0.0, 1e-9))
+    widest = majorant.bound(sizes_of(plain), sizes_of(plain), 1.0)
+    assert start_distance(plain, plain, 1.0, widest) == 2.0 * widest
+    assert start_distance(tiny, tiny, 1.0, widest) == pytest.approx(2.0 * widest, rel=1e-9, abs=0.0)
+    r = start_distance(a, b, 1.0, 1.0)
+    product = COULOMB * charge_of(a) * charge_of(b) / reduced
+    grazing = r * math.sqrt(1.0 - 2.0 * product / r)  # b v = r v′
+    assert kepler_start(a, b, (1.0, 1.001 * grazing), r) is None
+    speed, offset, plane = kepler_start(a, b, (1.0, 0.999 * grazing), r)
+    assert math.hypot(offset, plane) == pytest.approx(r, rel=1e-12, abs=0.0)
+    assert speed**2 == pytest.approx(1.0 - 2.0 * product / r, rel=1e-12, abs=0.0)
+
+
+def test_charges_that_cancel_but_for_rounding_are_none():
+    """3 e − e − e − e is 8e-36 C in floating point, and no net charge."""
+    body = charged(tree(4), [3, -1, -1, -1])
+    assert charge_of(body) == 0.0 and charge_of(charged(tree(4), [3, -1, -1, 0])) == pytest.approx(ELEMENTARY, abs=0.0)
 
 
 def maxwell(v, spread):

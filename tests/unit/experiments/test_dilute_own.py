@@ -18,10 +18,10 @@ from sand.experiments.dilute_majorant import Approach, Majorant
 from sand.experiments.dilute_own import (
     OwnMajorant,
     angular_at,
+    deflected,
     own_start,
     parted,
     pose_of,
-    repelled,
     repulsion_of,
     thermal_body,
     turned_copy,
@@ -262,7 +262,7 @@ def test_flights_start_on_the_orbit_of_their_charges(charges, factor):
     assert k == pytest.approx(COULOMB * charges[0] * charges[1] * CHARGE**2 / (0.5 * a.mass), rel=1e-12, abs=0.0)
     state = own_start(a, b, Approach(speed, impact, 6e-8), 4e-7, (1, 5))
     r, u = state[:3], state[3:6]
-    assert np.linalg.norm(r) == pytest.approx(math.hypot(4e-7, impact), rel=1e-12, abs=0.0)
+    assert np.linalg.norm(r) == pytest.approx(4e-7 if any(charges) else math.hypot(4e-7, impact), rel=1e-12, abs=0.0)
     assert 0.5 * u @ u + k / np.linalg.norm(r) == pytest.approx(0.5 * speed**2, rel=1e-10, abs=0.0)
     assert np.linalg.norm(np.cross(r, u)) == pytest.approx(impact * speed, rel=1e-9, abs=0.0)
     assert np.cross(r, u) @ relative == pytest.approx(0.0, abs=1e-9 * impact * speed**2)
@@ -271,14 +271,18 @@ def test_flights_start_on_the_orbit_of_their_charges(charges, factor):
     assert back == pytest.approx(-relative, abs=1e-8 * speed)
 
 
-def test_charges_that_repel_each_other_far_away_are_deflected_as_rutherford_found():
-    """The deflection of an integrated orbit with k/r², from 1e3 distances to 1e3 away, to 1e-2; energy and P stay."""
-    a, b = charged(20, 0), charged(20, 1)
+@pytest.mark.parametrize("number", [20, -1], ids=["equal", "opposite"])
+def test_charges_that_pass_far_away_are_deflected_as_rutherford_found(number):
+    """The deflection of an integrated orbit with k/r², from 1e3 distances to 1e3 away, to 1e-2; energy and P stay.
+
+    Equal charges turn around before they come to 0.3 µm, opposite ones pass at 16 nm.
+    """
+    a, b = charged(20, 0), charged(number, 1)
     relative = a.motion.velocity - b.motion.velocity
     speed, impact = float(np.linalg.norm(relative)), 2e-7
     approach = Approach(speed, impact, 3e-7)
-    assert own_start(a, b, approach, 3e-7, (1, 5)) is None
-    one, two = repelled(a, b, approach, (1, 5))
+    assert own_start(a, b, approach, 3e-7 if number > 0 else 1e-8, (1, 5)) is None
+    one, two = deflected(a, b, approach, (1, 5))
     found = one.motion.velocity - two.motion.velocity
     assert np.linalg.norm(found) == pytest.approx(speed, rel=1e-12, abs=0.0)
     total = a.mass * (a.motion.velocity + b.motion.velocity)

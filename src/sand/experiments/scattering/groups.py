@@ -1,10 +1,10 @@
-"""Groups of neighbouring grains of a rigid aggregate, which act as one dipole at a distance."""
+"""Groups of neighbouring grains of a rigid aggregate, which act as one dipole or one charge at a distance."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .rigid_flight import Groups
+from .rigid_flight import ChargeGroups, Groups
 
 GROUP = 4
 """Members of a group of the next level."""
@@ -46,6 +46,35 @@ def groups_of(x: np.ndarray, moment: np.ndarray) -> Groups:
         np.array(first),
         np.array(reach),
     )
+
+
+def charge_groups_of(x: np.ndarray, charge: np.ndarray) -> ChargeGroups:
+    """Charges (n,) [C] at x (n, 3) [m] in the frame of a body, those that are not 0, and all levels of groups of them.
+
+    A group of level l has up to 4ˡ neighbouring charges of one sign: their sum at their centre of charge, about which
+    they have no dipole moment; the next term is at most (a/d)² of the potential, for the radius a and the distance d.
+    """
+    signs = [np.flatnonzero(charge > 0.0), np.flatnonzero(charge < 0.0)]
+    orders = [_neighbours_together(x, own) for own in signs if len(own)]
+    points, charges, first, reach = [], [], [0], []
+    size, most = 1, max(map(len, orders), default=0)
+    while True:
+        radius = 0.0
+        for order in orders:
+            begin = np.arange(0, len(order), size)
+            total = np.add.reduceat(charge[order], begin)
+            centre = np.add.reduceat(charge[order, None] * x[order], begin) / total[:, None]
+            apart = x[order] - np.repeat(centre, np.diff([*begin, len(order)]), axis=0)
+            radius = max(radius, float(np.linalg.norm(apart, axis=1).max()) if size > 1 else 0.0)
+            points.append(centre)
+            charges.append(total)
+        first.append(sum(map(len, charges)))
+        reach.append(radius)
+        if size >= most:
+            break
+        size *= GROUP
+    point = np.ascontiguousarray(np.concatenate([np.zeros((0, 3)), *points]).T)
+    return ChargeGroups(point, np.concatenate([np.zeros(0), *charges]), np.array(first), np.array(reach))
 
 
 def _neighbours_together(x: np.ndarray, own: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
 One step is kick, drift, kick of separation, relative velocity, orientations and angular momenta with the symplectic
 free rotor (`numerics.rotor`), so that spin costs no accuracy: bodies that turn a hundred times on their way need one
 sum over pairs of grains in about two radians.  At a distance a body is a few dipoles, sums of those of neighbouring
-grains, unless these cancel.  Flights of `flight_driver`, of high order, are more accurate and ten times as expensive.
+grains, unless these cancel, and a few charges of either sign.  Flights of `flight_driver`, of high order, are more
+accurate and ten times as expensive.
 
 With the smallest gap g of two grains, D = g + 2 r_min, e = max(|x| + r) of both bodies, ω̂ = √(2 E_rot/I_min) ≥ |ω|,
 and W = Σ 2k|μ||μ′|/d³ + max(|Σμ|, |Σμ′|) B, a step is
@@ -49,6 +50,8 @@ TOUCH = 1e-3
 """Gap of a hit, in units of the smallest radius."""
 GROUP_SIZE = 0.25
 """Largest radius of a group times its Σ|μ|/|Σμ|, in units of the gap of the bounding spheres."""
+CHARGE_GROUP_SIZE = 0.1
+"""Largest radius of a group of charges, in units of the gap of the bounding spheres."""
 MOST_REVOLUTIONS = 100.0
 """Revolutions of the line of centres after which a pair is bound."""
 RESULTS = (
@@ -70,6 +73,15 @@ class Groups(NamedTuple):
     reach: np.ndarray  # (levels,) largest radius of a group times its Σ|μ|/|Σμ| [m], ∞ if its moments cancel
 
 
+class ChargeGroups(NamedTuple):
+    """Charges of a body in its frame, then groups of charges of one sign, level by level."""
+
+    point: np.ndarray  # (3, m) centres of charge [m]
+    charge: np.ndarray  # (m,) [C]
+    first: np.ndarray  # (levels + 1,) as of `Groups`
+    reach: np.ndarray  # (levels,) largest radius of a group [m]
+
+
 class Now(NamedTuple):
     """Work arrays of both bodies, (3, capacity): centres and moments of groups in the current orientations."""
 
@@ -83,8 +95,8 @@ class FlyingBody(NamedTuple):
     """One rigid aggregate."""
 
     groups: Groups
+    charges: ChargeGroups
     radius: np.ndarray  # (n,) of the grains [m]
-    charge: np.ndarray  # (n,) of the grains [C]
     inertia: tuple  # principal moments of inertia [kg m²], ascending
     pose: tuple  # as of `two_aggregates.Body`; without effect on orientations at random
     extent: float  # outer radius about the centre of mass [m]
@@ -100,13 +112,13 @@ class FlyingPair(NamedTuple):
     reduced: float  # m̄ [kg]
     smallest: float  # smallest radius [m]
     largest: float  # largest radius [m]
-    attraction: float  # 2k Σ|μ| Σ|μ′| [J m³]
-    attraction_of_charges: float  # Σ|q| Σ|q′|/4πε₀ [J m]
+    attraction: tuple  # (C₁, C₂, C₃): −U ≤ C₁/c + C₂/c² + C₃/c³ at the gap c of the bounding spheres [J m, J m², J m³]
     field: tuple  # external flux density [T]
     # distance beyond which a receding body has escaped [m]; 0: that of the start, or less if it cannot return
     escape: float
     step_fraction: float  # η
-    group_size: float  # `GROUP_SIZE`; 0: all pairs of grains
+    group_size: float  # `GROUP_SIZE`, or 0: all pairs of grains
+    charge_group_size: float  # `CHARGE_GROUP_SIZE`, or 0: all pairs of charges
     most_steps: int
 
 
@@ -122,11 +134,10 @@ class Loads(NamedTuple):
 
 
 @loop
-def place(q, groups, level, position, moment):
-    """Positions and moments of the groups of a level in the orientation q."""
-    for i in range(groups.first[level], groups.first[level + 1]):
-        put(position, i, turned(q, load(groups.point, i)))
-        put(moment, i, turned(q, load(groups.moment, i)))
+def place(q, vectors, begin, end, out):
+    """Vectors in the frame of a body, of the groups `begin` … `end` − 1, in the orientation q."""
+    for i in range(begin, end):
+        put(out, i, turned(q, load(vectors, i)))
 
 
 @formula
@@ -139,47 +150,72 @@ def level_of(groups, clear, group_size):
     return chosen
 
 
-@functools.cache
-def loads_of(charged: bool) -> Callable:
-    """Compile the sum over pairs of groups, with charges or without."""
-
-    @loop
-    def sum_loads(r, pair, now, level1, level2):
-        one, two = pair.first.groups, pair.second.groups
-        pull = torque1 = torque2 = (0.0, 0.0, 0.0)
-        energy = field_energy = 0.0
+@loop
+def sum_dipoles(r, q1, q2, pair, now):
+    """Loads of all pairs of groups of dipoles, and the gap."""
+    one, two, gap = pair.first.groups, pair.second.groups, norm(r) - pair.first.extent - pair.second.extent
+    level1, level2 = level_of(one, gap, pair.group_size), level_of(two, gap, pair.group_size)
+    begin1, end1, begin2, end2 = one.first[level1], one.first[level1 + 1], two.first[level2], two.first[level2 + 1]
+    place(q1, one.point, begin1, end1, now.position1)
+    place(q1, one.moment, begin1, end1, now.moment1)
+    place(q2, two.point, begin2, end2, now.position2)
+    place(q2, two.moment, begin2, end2, now.moment2)
+    pull = torque1 = torque2 = (0.0, 0.0, 0.0)
+    energy = field_energy = 0.0
+    if level1 + level2 == 0:
         gap = math.inf
-        for i in range(one.first[level1], one.first[level1 + 1]):
-            x1, moment1 = load(now.position1, i), load(now.moment1, i)
-            at = add(r, x1)
-            force_i = field_i = turning = (0.0, 0.0, 0.0)
-            energy_i = field_energy_i = 0.0
-            nearest = np.int64(0x7FE0000000000000)
-            for j in range(two.first[level2], two.first[level2 + 1]):
-                x2, moment2 = load(now.position2, j), load(now.moment2, j)
-                apart = sub(at, x2)
-                force, field1, field2, own = pair_load(apart, moment1, moment2, pair.k)
-                distance = norm(apart)
-                if charged:
-                    push, more = inverse_square(apart, pair.coulomb * pair.first.charge[i] * pair.second.charge[j])
-                    force, own = add(force, push), own + more
-                force_i, field_i = add(force_i, force), add(field_i, field1)
-                turning = add(turning, sub(cross(moment2, field2), cross(x2, force)))
-                energy_i += own
-                field_energy_i += contact_energy(1.0, two.moment_sum[j], distance, pair.k)
-                if level1 + level2 == 0:
-                    nearest = min(nearest, float_bits(distance + (pair.largest - pair.second.radius[j])))
-            pull, torque2 = add(pull, force_i), add(torque2, turning)
-            torque1 = add(torque1, add(cross(x1, force_i), cross(moment1, field_i)))
-            energy += energy_i
-            field_energy += one.moment_sum[i] * field_energy_i
+    for i in range(begin1, end1):
+        x1, moment1 = load(now.position1, i), load(now.moment1, i)
+        at = add(r, x1)
+        force_i = field_i = turning = (0.0, 0.0, 0.0)
+        energy_i = field_energy_i = 0.0
+        nearest = np.int64(0x7FE0000000000000)
+        for j in range(begin2, end2):
+            x2, moment2 = load(now.position2, j), load(now.moment2, j)
+            apart = sub(at, x2)
+            force, field1, field2, own = pair_load(apart, moment1, moment2, pair.k)
+            distance = norm(apart)
+            force_i, field_i = add(force_i, force), add(field_i, field1)
+            turning = add(turning, sub(cross(moment2, field2), cross(x2, force)))
+            energy_i += own
+            field_energy_i += contact_energy(1.0, two.moment_sum[j], distance, pair.k)
             if level1 + level2 == 0:
-                gap = min(gap, float_from_bits(nearest) - pair.largest - pair.first.radius[i])
-        if level1 + level2 > 0:
-            gap = norm(r) - pair.first.extent - pair.second.extent
-        return Loads(pull, torque1, torque2, energy, field_energy, gap)
+                nearest = min(nearest, float_bits(distance + (pair.largest - pair.second.radius[j])))
+        pull, torque2 = add(pull, force_i), add(torque2, turning)
+        torque1 = add(torque1, add(cross(x1, force_i), cross(moment1, field_i)))
+        energy += energy_i
+        field_energy += one.moment_sum[i] * field_energy_i
+        if level1 + level2 == 0:
+            gap = min(gap, float_from_bits(nearest) - pair.largest - pair.first.radius[i])
+    return Loads(pull, torque1, torque2, energy, field_energy, gap)
 
-    return sum_loads
+
+@loop
+def with_charges(loads, r, q1, q2, pair, now):
+    """Loads with those of all pairs of groups of charges."""
+    one, two, clear = pair.first.charges, pair.second.charges, norm(r) - pair.first.extent - pair.second.extent
+    level1, level2 = level_of(one, clear, pair.charge_group_size), level_of(two, clear, pair.charge_group_size)
+    begin2, end2 = two.first[level2], two.first[level2 + 1]
+    place(q2, two.point, begin2, end2, now.position2)
+    pull = torque1 = torque2 = (0.0, 0.0, 0.0)
+    energy = 0.0
+    for i in range(one.first[level1], one.first[level1 + 1]):
+        x1 = turned(q1, load(one.point, i))
+        at, charge = add(r, x1), pair.coulomb * one.charge[i]
+        force_i = (0.0, 0.0, 0.0)
+        for j in range(begin2, end2):
+            x2 = load(now.position2, j)
+            force, own = inverse_square(sub(at, x2), charge * two.charge[j])
+            force_i, torque2, energy = add(force_i, force), sub(torque2, cross(x2, force)), energy + own
+        pull, torque1 = add(pull, force_i), add(torque1, cross(x1, force_i))
+    return Loads(
+        add(loads.force, pull),
+        add(loads.torque1, torque1),
+        add(loads.torque2, torque2),
+        loads.energy + energy,
+        loads.field_energy,
+        loads.gap,
+    )
 
 
 @formula
@@ -232,17 +268,14 @@ def longest_step(pair, loads, speed, angular1, angular2):
 @functools.cache
 def flight_of(charged: bool = False) -> Callable:
     """Compile one flight from the state y (20,) of `two_aggregates` to its end; returns `RESULTS` but the second."""
-    sum_loads = loads_of(charged)
 
     @loop
     def loads_at(r, q1, q2, pair, now):
         """Loads in a configuration, those of the field included."""
-        one, two, clear = pair.first.groups, pair.second.groups, norm(r) - pair.first.extent - pair.second.extent
-        level1, level2 = level_of(one, clear, pair.group_size), level_of(two, clear, pair.group_size)
-        place(q1, one, level1, now.position1, now.moment1)
-        place(q2, two, level2, now.position2, now.moment2)
-        found = sum_loads(r, pair, now, level1, level2)
-        moment1, moment2 = turned(q1, net_moment(one)), turned(q2, net_moment(two))
+        found = sum_dipoles(r, q1, q2, pair, now)
+        if charged:
+            found = with_charges(found, r, q1, q2, pair, now)
+        moment1, moment2 = turned(q1, net_moment(pair.first.groups)), turned(q2, net_moment(pair.second.groups))
         return Loads(
             found.force,
             add(found.torque1, cross(moment1, pair.field)),
@@ -257,8 +290,8 @@ def flight_of(charged: bool = False) -> Callable:
         """Whether no attraction at this distance can turn the relative motion around."""
         if clear <= 0.0:
             return False
-        most = pair.attraction / (clear * clear * clear) + pair.attraction_of_charges / clear
-        return 0.5 * pair.reduced * radial * radial > most
+        c1, c2, c3 = pair.attraction
+        return 0.5 * pair.reduced * radial * radial > c3 / (clear * clear * clear) + (c2 / clear + c1) / clear
 
     @loop
     def fly(y, pair, now):
@@ -285,7 +318,8 @@ def flight_of(charged: bool = False) -> Callable:
                 break
             is_far = distance >= escape
             if pair.escape == 0.0:  # what happens after an escape does not matter
-                is_far = is_far or escapes(radial, distance - first.extent - second.extent, pair)
+                stays_apart = 0.5 * pair.reduced * radial * radial * distance > pair.attraction[0]  # of net charges
+                is_far = (is_far and stays_apart) or escapes(radial, distance - first.extent - second.extent, pair)
             if radial > 0.0 and is_far:
                 end = MISS
                 break

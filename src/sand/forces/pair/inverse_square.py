@@ -12,7 +12,7 @@ import numpy as np
 from ...basics.arguments import checked
 from ...basics.box import Box
 from ...basics.constants import COULOMB, GRAVITATION
-from ...basics.grains import Grains
+from ...basics.grains import Grains, net_charge
 from ...basics.ramps import rampable
 from ...basics.settings import Word
 from ...basics.units import format_quantity
@@ -25,9 +25,6 @@ from .ewald_fit import CHARGES, Sources
 from .ewald_force import DEFAULT_ACCURACY, PERIODIC, Accuracy, Boundary, EwaldForce, Reciprocal
 from .long_range_loops import LongRangeSums
 from .pair_force import PairForce
-
-NEUTRAL = 1e-9
-"""Net charge, in units of the sum of all |q|, that counts as rounding."""
 
 
 class InverseSquareConstants(NamedTuple):
@@ -189,8 +186,8 @@ class Charges(EwaldForce, InverseSquare):
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warnings: as for all cut-offs; a net charge in an Ewald sum."""
-        warnings, net = super().check(grains, box), math.fsum(grains.charge)
-        if abs(net) > NEUTRAL * np.abs(grains.charge).sum() and self.uses_ewald(grains, box):
+        warnings, net = super().check(grains, box), net_charge(grains.charge)
+        if net and self.uses_ewald(grains, box):
             energy = 0.5 * mean_field(self.ewald(grains, box).alpha, box.volume, False, CHARGES) * net**2
             warnings.append(
                 f"{self.name}: the net charge of the box is {format_quantity(net, 'C')}; periodic = '{self.periodic}' "
