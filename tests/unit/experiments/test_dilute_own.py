@@ -275,7 +275,8 @@ def test_flights_start_on_the_orbit_of_their_charges(charges, factor):
 def test_charges_that_pass_far_away_are_deflected_as_rutherford_found(number):
     """The deflection of an integrated orbit with k/r², from 1e3 distances to 1e3 away, to 1e-2; energy and P stay.
 
-    Equal charges turn around before they come to 0.3 µm, opposite ones pass at 16 nm.
+    Equal charges turn around before they come to 0.3 µm, opposite ones pass at 16 nm.  Bodies that repel each other are
+    deflected to the side on which they are, others to the opposite one.
     """
     a, b = charged(20, 0), charged(number, 1)
     relative = a.motion.velocity - b.motion.velocity
@@ -284,6 +285,8 @@ def test_charges_that_pass_far_away_are_deflected_as_rutherford_found(number):
     assert own_start(a, b, approach, 3e-7 if number > 0 else 1e-8, (1, 5)) is None
     one, two = deflected(a, b, approach, (1, 5))
     found = one.motion.velocity - two.motion.velocity
+    start = own_start(a, b, approach, 1e-3, (1, 5))[:3]
+    assert (found @ start - (found @ relative) * (start @ relative) / speed**2) * number > 0.0
     assert np.linalg.norm(found) == pytest.approx(speed, rel=1e-12, abs=0.0)
     total = a.mass * (a.motion.velocity + b.motion.velocity)
     assert a.mass * (one.motion.velocity + two.motion.velocity) == pytest.approx(total, rel=1e-9, abs=1e-12 * a.mass)
