@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
-from ..basics.grains import GrainArrays
+from ..basics.grains import GrainArrays, net_charge
 from ..basics.initial_pairs import StrainedContacts
 from .scattering.encounters import principal_frame
 from .scattering.groups import charge_groups_of, groups_of
@@ -42,8 +42,8 @@ class Body:
         Their contacts, with displacements in the principal frame.
     flying : FlyingBody
         What flights need: groups of grains, moments of inertia, extent.
-    mass, moment_sum, charge, charge_arm : float
-        M [kg], Σ|μ| [A m²], Σ|q| [C] and Σ|q||x| [C m].
+    mass, moment_sum, charge, charge_sum, charge_arm : float
+        M [kg], Σ|μ| [A m²], Σq, which is 0 where charges cancel but for rounding, Σ|q| [C] and Σ|q||x| [C m].
     radii : tuple of float
         Smallest and largest radius of its grains [m].
     number : int
@@ -62,6 +62,7 @@ class Body:
     mass: float
     moment_sum: float
     charge: float
+    charge_sum: float
     charge_arm: float
     radii: tuple[float, float]
     number: int = 0
@@ -113,7 +114,7 @@ def body_at_rest(
     )
     size = np.abs(own.charge)
     arm = float((size * np.linalg.norm(x, axis=0)).sum())
-    total = float(own.mass.sum()), float(magnitude.sum()), float(size.sum()), arm
+    total = float(own.mass.sum()), float(magnitude.sum()), net_charge(own.charge), float(size.sum()), arm
     radii = float(own.radius.min()), float(own.radius.max())
     return Body(own, contacts, flying, *total, radii, *identity)
 

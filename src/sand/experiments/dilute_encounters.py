@@ -12,7 +12,7 @@ import numpy as np
 from ..basics.errors import BadInput
 from ..simulation.contact_phase import CHANGES
 from .dilute_body import Body, Motion, body_of
-from .dilute_flight import FlightResult, RigidFlights, charge_of, kepler_start, start_distance
+from .dilute_flight import FlightResult, RigidFlights, kepler_start, start_distance
 from .dilute_hits import Hit, HitRule
 from .dilute_majorant import Approach
 from .dilute_own import OWN_START, centre_velocity, deflected, has_reverse, own_start, parted, turned_copy
@@ -172,7 +172,7 @@ class Encounters:
         if flight is None:
             if a.motion is not None:
                 population.replace(i, j, deflected(a, b, approach, (self.seed, self.event - 1)))
-            end = REPELLED if charge_of(a) * charge_of(b) > 0.0 else ENDS[MISS]
+            end = REPELLED if a.charge * b.charge > 0.0 else ENDS[MISS]
             return Encounter(**drawn, **WITHOUT_FLIGHT, **NO_HIT, end=end)
         self.flights += 1
         self.bound += flight.end == BOUND

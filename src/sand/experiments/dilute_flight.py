@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..basics.constants import COULOMB, MAGNETIC
-from ..basics.grains import net_charge
 from .dilute_body import Body
 from .dilute_start import start_in_field
 from .scattering.encounters import MOST_FLIGHT_STEPS
@@ -136,33 +135,27 @@ class RigidFlights:
         return FlightResult(**values, state=self._flights.ends[0].copy())
 
 
-def charge_of(body: Body) -> float:
-    """Net charge [C]."""
-    return net_charge(body.grains.charge)
-
-
 def are_charged(a: Body, b: Body) -> bool:
     """Whether both bodies have charged grains."""
-    return a.charge * b.charge > 0.0
+    return a.charge_sum * b.charge_sum > 0.0
 
 
 def attraction_of(a: Body, b: Body) -> tuple[float, float, float]:
     """C₁ [J m], C₂ [J m²], C₃ [J m³] of the bound −U ≤ C₁/c + C₂/c² + C₃/c³, c the gap of the bounding spheres.
 
-    With the net charges Q and D = Σ|q||x|, of the grains at x from the centre of mass, and k = 1/4πε₀
+    With the net charges q and D = Σ|q||x|, of the grains at x from the centre of mass, and k = 1/4πε₀
 
-        C₁ = max(0, −k Q Q′),  C₂ = k (|Q| D′ + |Q′| D),  C₃ = 2k D D′ + 2 (μ₀/4π) Σ|μ| Σ|μ′|
+        C₁ = max(0, −k q q′),  C₂ = k (|q| D′ + |q′| D),  C₃ = 2k D D′ + 2 (μ₀/4π) Σ|μ| Σ|μ′|
 
     The potential 1/d of a charge at x differs by at most |x|/c² from that of one at the centre, with a gradient of at
-    most 2|x|/c³: so charges act as Q and dipole moments of at most D, aligned.  The derivative of the bound is one of
+    most 2|x|/c³: so charges act as q and dipole moments of at most D, aligned.  The derivative of the bound is one of
     the force.
     """
     magnetic = float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC))
     if not are_charged(a, b):
         return 0.0, 0.0, magnetic
-    one, two = charge_of(a), charge_of(b)
-    mixed = COULOMB * (abs(one) * b.charge_arm + abs(two) * a.charge_arm)
-    return max(0.0, -COULOMB * one * two), mixed, magnetic + 2.0 * COULOMB * a.charge_arm * b.charge_arm
+    mixed = COULOMB * (abs(a.charge) * b.charge_arm + abs(b.charge) * a.charge_arm)
+    return max(0.0, -COULOMB * a.charge * b.charge), mixed, magnetic + 2.0 * COULOMB * a.charge_arm * b.charge_arm
 
 
 def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: float) -> tuple[float, float, float] | None:
@@ -175,7 +168,7 @@ def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: floa
     speed, b_far = approach
     if not are_charged(a, b):
         return speed, b_far, distance
-    product, reduced = COULOMB * charge_of(a) * charge_of(b), a.mass * b.mass / (a.mass + b.mass)
+    product, reduced = COULOMB * a.charge * b.charge, a.mass * b.mass / (a.mass + b.mass)
     radius = start_radius(a, b, distance, b_far)
     square = speed**2 - 2.0 * product / (reduced * radius)
     if not square * radius**2 > (b_far * speed) ** 2:

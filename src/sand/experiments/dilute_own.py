@@ -20,7 +20,7 @@ from scipy.special import ellipj, ellipk, ndtri
 
 from ..basics.constants import COULOMB
 from .dilute_body import Body, Motion
-from .dilute_flight import charge_of, start_radius
+from .dilute_flight import start_radius
 from .dilute_majorant import Approach, Majorant, Sizes
 from .dilute_population import sizes_of
 from .dilute_start import direction, rotation_onto
@@ -159,7 +159,7 @@ def directions(a: Body, b: Body, uniform: float) -> tuple[np.ndarray, np.ndarray
 
 def repulsion_of(a: Body, b: Body) -> float:
     """q q′/4πε₀m̄ [m³/s²] of the net charges; positive if they repel each other."""
-    return COULOMB * charge_of(a) * charge_of(b) * (a.mass + b.mass) / (a.mass * b.mass)
+    return COULOMB * a.charge * b.charge * (a.mass + b.mass) / (a.mass * b.mass)
 
 
 def angle_from_infinity(speed: float, impact: float, radius: float, repulsion: float) -> float | None:
