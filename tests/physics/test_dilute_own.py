@@ -20,7 +20,7 @@ from sand.experiments.dilute_population import Population, sizes_of
 from sand.simulation.contact_phase import CHANGES, ContactPhase, Settled
 from tests.physics.test_dilute import CONTACT, HEAT, IRON, T
 from tests.physics.test_dilute_runs import FORCES, NUMBERS, Stopped, Stopper, files_of, grains
-from tests.unit.experiments.test_dilute import GRAIN, MOMENT, RADIUS, aggregate
+from tests.unit.experiments.test_dilute import DIMER, GRAIN, MOMENT, RADIUS, aggregate
 
 pytestmark = pytest.mark.compiled("scattering", "dipoles")
 WEAK = 0.2
@@ -118,6 +118,37 @@ def test_flights_that_miss_keep_the_energy_of_a_population():
     assert np.abs(np.array(found) / found[0] - 1.0).max() < 1e-3 and np.ptp(found) > 0.0
 
 
+@pytest.mark.parametrize("charges", [[20.0], [40.0, -40.0]], ids=["equal", "neutral"])
+def test_bodies_that_pass_where_only_net_charges_act_are_deflected(charges):
+    """Without a flight momentum and energy stay to rounding, spins exactly, and velocities turn by Rutherford's angle.
+
+    cos θ = (b²v⁴ − k²)/(b²v⁴ + k²), k = qq′/4πε₀m̄; neutral bodies go on as they are.
+    """
+    shape, bodies = (GRAIN, DIMER)[len(charges) - 1], []
+    for k in range(2):
+        grains = shape.grains._replace(charge=1.602176634e-19 * np.array(charges), moment=0.0 * shape.grains.moment)
+        bodies.append(thermal_body(body_of(grains, shape.contacts, k)[0], HEAT, 1, k))
+    now = Encounters(Population(bodies, 1e-9, OwnMajorant(T), start=1), RigidFlights(HEAT), left_out, 4)
+    seen = 0
+    while seen < 5:
+        a, b = now.population.bodies
+        before, old = energy(now.population), momentum(now.population)
+        row = now.step()
+        if row.flight_steps > 0:
+            continue
+        seen += 1
+        assert row.end == ("repelled" if len(charges) == 1 else "miss")
+        pair = sorted(now.population.bodies, key=lambda body: body.number)
+        a, b = sorted((a, b), key=lambda body: body.number)
+        assert momentum(now.population) == pytest.approx(old, abs=1e-12 * np.linalg.norm(old))
+        assert energy(now.population) == pytest.approx(before, rel=1e-12, abs=0.0)
+        assert all((new.motion.angular == body.motion.angular).all() for new, body in zip(pair, (a, b), strict=True))
+        u, v = (x.motion.velocity - y.motion.velocity for x, y in ((a, b), pair))
+        k = COULOMB * a.charge * b.charge * (a.mass + b.mass) / (a.mass * b.mass)
+        square = (row.impact_parameter * row.speed**2) ** 2
+        assert u @ v == pytest.approx(row.speed**2 * (square - k**2) / (square + k**2), abs=1e-9 * row.speed**2)
+
+
 class Rebounds:
     """A contact phase after which two grains recede at a gap of 0.1 radii, with the energies of a list [k_BT].
 
@@ -180,8 +211,7 @@ def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, m
         assert kinetic == pytest.approx(total, rel=1e-3, abs=0.0)
         assert hit.energies["distant"] == pytest.approx(-phase.pair, rel=1e-3, abs=0.0)
         assert np.linalg.norm(orbit) == pytest.approx(phase.orbit, rel=1e-6, abs=0.0)
-    there = kinetic - COULOMB * np.prod(charges) * 1.602176634e-19**2 / r / HEAT
-    speed = math.sqrt(2.0 * there * HEAT / (0.5 * a.mass))
+    speed = math.sqrt(2.0 * kinetic * HEAT / (0.5 * a.mass))  # of charges that at an infinite distance
     far = start_distance(a, b, speed, majorant.bound(sizes_of(a), sizes_of(b), speed), 4.0 if moves else 2.0)
     assert far <= r <= 1.5 * far
     assert abs(sum(hit.energies.values())) < 0.2 * HEAT

@@ -175,7 +175,7 @@ def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: floa
         return None
     near = math.sqrt(square)
     offset = b_far * speed / near
-    return near, offset, math.sqrt(radius**2 - offset**2)
+    return near, offset, math.sqrt(max(radius**2 - offset**2, 0.0))
 
 
 def start_distance(a: Body, b: Body, speed: float, bound: float, start: float = START) -> float:
@@ -191,6 +191,8 @@ def start_distance(a: Body, b: Body, speed: float, bound: float, start: float = 
         return max(start * bound, clear)
     _, c2, c3 = attraction_of(a, b)
     energy = speed * speed * a.mass * b.mass / (a.mass + b.mass)
+    if energy == 0.0:
+        return math.inf
     with_dipoles = start * math.sqrt(3.0 * (c3 / energy) ** (2.0 / 3.0) + (a.extent + b.extent) ** 2)
     return max(with_dipoles, math.sqrt(3.0**1.5 * start**3 * c2 / energy), clear)
 

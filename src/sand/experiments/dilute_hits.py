@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -136,8 +135,8 @@ class Resolve:
     def flight_apart(self, a: Body, b: Body, state: np.ndarray, start: float) -> FlightResult:
         """Flight from a state (20,) to a touch, or until the bodies are where a flight of their speed would begin.
 
-        That is at `start` in units of b̂, which grows while the bodies lose speed on their way.  Charges are taken to an
-        infinite distance from there; bodies that they bring back touch again.
+        That grows while the bodies lose speed on their way (`dilute_flight.start_distance`).  Charges are taken to an
+        infinite distance from there; bodies that they bring back fly on.
         """
         first = flight = self.rigid_flights.onward(a, b, state, self._distance_apart(a, b, state, start))
         time = flight.time
@@ -160,12 +159,12 @@ class Resolve:
         return whole._replace(kinetic=whole.kinetic + gained, potential=whole.potential - gained)
 
     def _distance_apart(self, a: Body, b: Body, state: np.ndarray, start: float) -> float:
-        """Distance [m] at which a flight of the present speed begins; infinite if charges bring the bodies back."""
-        r, u = state[R : R + 3], state[U : U + 3]
-        if velocity_far_away(r, u, repulsion_of(a, b)) is None:
-            return math.inf
-        speed = float(np.linalg.norm(u))
-        return start_distance(a, b, speed, float(self.majorant.bound(sizes_of(a), sizes_of(b), speed)), start)
+        """Distance [m] at which a flight of the present energy begins; that of charges is |½m̄u² + qq′/4πε₀r|."""
+        r, u, repulsion = state[R : R + 3], state[U : U + 3], repulsion_of(a, b)
+        speed = np.linalg.norm(u)
+        if repulsion != 0.0:
+            speed = np.sqrt(abs(u @ u + 2.0 * repulsion / np.linalg.norm(r)))
+        return start_distance(a, b, float(speed), float(self.majorant.bound(sizes_of(a), sizes_of(b), speed)), start)
 
 
 def moving_pair(pieces: Sequence[tuple[GrainArrays, StrainedContacts]]) -> tuple[Body, Body, np.ndarray]:

@@ -45,7 +45,7 @@ class Sizes(NamedTuple):
     mass: Any
     moment_sum: Any
     extent: Any
-    charge: Any
+    charge_sum: Any
     vx: Any = 0.0  # of bodies that keep their motion
     vy: Any = 0.0
     vz: Any = 0.0
@@ -82,7 +82,7 @@ class Majorant:
         """m̄ [kg], and the factors of v^(p − 1) in b̂² for the powers `POWERS`."""
         reduced, extent, wide = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent, self.widening**2
         root = np.cbrt(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC) / reduced)
-        focusing = 2.0 * wide * COULOMB * a.charge * b.charge / reduced
+        focusing = 2.0 * wide * COULOMB * a.charge_sum * b.charge_sum / reduced
         return reduced, 3.0 * wide * root**2, wide * extent**2, focusing * extent, focusing * root
 
     def kernel(self, a: Sizes, b: Sizes) -> Any:

@@ -31,8 +31,9 @@ from .scattering.two_aggregates import ANGULAR1, TURN1, TURN2
 FLIGHT_BLOCK, START_BLOCK, COPY_BLOCK = 4, 5, 7
 """Blocks of the random numbers of flights, of bodies at the start (two), and of copies, one more for each doubling."""
 OWN_START = 4.0
-"""Distance at which flights start, in units of b̂.  The interaction U there is left out of the energy that bodies keep,
-which heats them by half its variance over k_BT in each encounter: 5e-4 k_BT from 2 b̂, 64 times less from here."""
+"""Distance at which flights start, in units of b̂; of charges see `start_distance`.  The interaction U there is left
+out of the energy that bodies keep, which heats them by half its variance over k_BT in each encounter: 5e-4 k_BT from
+2 b̂, 64 times less from here."""
 MOST_MODULUS = 1.0 - 1e-12
 """Largest modulus m of the elliptic functions; at 1 the period of the free motion is infinite."""
 
@@ -135,15 +136,16 @@ def own_start(a: Body, b: Body, approach: Approach, distance: float, event: tupl
     """
     (speed, impact, _), repulsion = approach, repulsion_of(a, b)
     radius = start_radius(a, b, distance, impact)
+    across = impact * speed / radius
+    square = speed**2 - 2.0 * repulsion / radius - across**2
     angle = angle_from_infinity(speed, impact, radius, repulsion)
-    if angle is None:
+    if square <= 0.0 or angle is None:
         return None
     uniforms = event_uniforms(*event, FLIGHT_BLOCK)
     along, side = directions(a, b, uniforms[0])
     outward = math.sin(angle) * side - math.cos(angle) * along
     onward = math.cos(angle) * side + math.sin(angle) * along
-    across = impact * speed / radius
-    radial = math.sqrt(max(speed**2 - 2.0 * repulsion / radius - across**2, 0.0))
+    radial = math.sqrt(square)
     poses = [pose_of(body, part) for body, part in ((a, uniforms[1:4]), (b, uniforms[4:7]))]
     turns = [Rotation.from_matrix(pose).as_quat() for pose in poses]
     angular = motion_of(a).angular, motion_of(b).angular
@@ -202,7 +204,7 @@ def deflected(a: Body, b: Body, approach: Approach, event: tuple[int, int]) -> l
 def parted(a: Body, b: Body, state: np.ndarray, majorant: Majorant) -> list[Body]:
     """Both bodies after an encounter without a touch, from the state of the pair.
 
-    They are unchanged if charges bring them back, and if the encounter has no reverse (`has_reverse`).
+    They are unchanged if the encounter has no reverse (`has_reverse`).
     """
     r, u, momenta = state[R : R + 3], state[U : U + 3], state[ANGULAR1:].reshape(2, 3).copy()
     velocity = velocity_far_away(r, u, repulsion_of(a, b))

@@ -209,26 +209,35 @@ def test_the_bound_of_the_attraction_holds_in_all_poses(first, second, scale):
 def test_charges_start_where_only_their_net_charges_act():
     """C₂/r² and C₃/r³ are at most m̄v²/(3^(3/2) start³); without charges, and in their limit, r = start b̂.
 
-    A pair whose Kepler orbit stays beyond r has no flight.
+    A pair whose Kepler orbit stays beyond r has no flight, of net charges that repel or attract each other and of none;
+    a body without charges has no part in this.
     """
     a, b, majorant = CHARGED_BODIES[2], CHARGED_BODIES[3], Majorant(T)
     reduced, (_, c2, c3) = a.mass * b.mass / (a.mass + b.mass), attraction_of(a, b)
+    extent = a.extent + b.extent
     for start in (2.0, 4.0):
         for speed in (0.01, 0.1, 1.0, 10.0):
             r, bound = start_distance(a, b, speed, 1.0, start), reduced * speed**2 / (3.0**1.5 * start**3)
             assert max(c2 / r**2, c3 / r**3) <= bound * (1.0 + 1e-12)
-            assert c2 / r**2 == pytest.approx(bound, rel=1e-12, abs=0.0) or r >= start * (a.extent + b.extent)
+            near = (c3 / (reduced * speed**2)) ** (1.0 / 3.0)
+            least = math.sqrt(c2 / bound), start * math.hypot(math.sqrt(3.0) * near, extent), extent + 4.0 * RADIUS
+            assert r == pytest.approx(max(least), rel=1e-12, abs=0.0)
     plain, tiny = (charged(tree(7, 7), [size]) for size in (0.0, 1e-9))
     widest = majorant.bound(sizes_of(plain), sizes_of(plain), 1.0)
     assert start_distance(plain, plain, 1.0, widest) == 2.0 * widest
     assert start_distance(tiny, tiny, 1.0, widest) == pytest.approx(2.0 * widest, rel=1e-9, abs=0.0)
-    r = start_distance(a, b, 1.0, 1.0)
-    product = COULOMB * a.charge * b.charge / reduced
-    grazing = r * math.sqrt(1.0 - 2.0 * product / r)  # b v = r v′
-    assert kepler_start(a, b, (1.0, 1.001 * grazing), r) is None
-    speed, offset, plane = kepler_start(a, b, (1.0, 0.999 * grazing), r)
-    assert math.hypot(offset, plane) == pytest.approx(r, rel=1e-12, abs=0.0)
-    assert speed**2 == pytest.approx(1.0 - 2.0 * product / r, rel=1e-12, abs=0.0)
+    repelling, neutral = charged(tree(7, 7), [1, 1, 0]), charged(tree(4, 4), [1, -1])
+    assert a.charge > 0.0 > repelling.charge * charged(tree(4, 4), [-1]).charge and neutral.charge == 0.0
+    for other in (repelling, neutral, charged(tree(4, 4), [-1])):
+        product = COULOMB * a.charge * other.charge * (a.mass + other.mass) / (a.mass * other.mass)
+        speed = math.sqrt(1.0 + 4.0 * abs(product) / a.extent)
+        r = start_distance(a, other, speed, 1.0)
+        grazing = r * math.sqrt(1.0 - 2.0 * product / (speed**2 * r))  # b v = r v′
+        assert kepler_start(a, other, (speed, 1.001 * grazing), r) is None
+        near, offset, plane = kepler_start(a, other, (speed, 0.999 * grazing), r)
+        assert math.hypot(offset, plane) == pytest.approx(r, rel=1e-12, abs=0.0)
+        assert near**2 == pytest.approx(speed**2 - 2.0 * product / r, rel=1e-12, abs=0.0)
+    assert kepler_start(a, GRAIN, (1.0, 2.0), 3.0) == (1.0, 2.0, 3.0)
 
 
 def test_charges_that_cancel_but_for_rounding_are_none():
@@ -252,7 +261,7 @@ def test_the_bound_of_the_rate_is_the_mean_of_its_cross_section(pair):
     a, b = (each if isinstance(each, Sizes) else sizes_of(each) for each in pair)
     majorant = Majorant(T)
     reduced, extent = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent
-    alpha, product = 2.0 * MAGNETIC * a.moment_sum * b.moment_sum, COULOMB * a.charge * b.charge
+    alpha, product = 2.0 * MAGNETIC * a.moment_sum * b.moment_sum, COULOMB * a.charge_sum * b.charge_sum
     spread = math.sqrt(BOLTZMANN * T / reduced)
 
     def square(v):
@@ -279,7 +288,7 @@ def test_the_bound_is_above_all_paths_that_touch(charges, moments):
     """
     size = Sizes(3.3e-20, moments * MOMENT, 1e-8, charges * 1.6e-19)
     reduced, extent = 0.5 * size.mass, 2.0 * size.extent
-    alpha, product = 2.0 * MAGNETIC * size.moment_sum**2, COULOMB * size.charge**2
+    alpha, product = 2.0 * MAGNETIC * size.moment_sum**2, COULOMB * size.charge_sum**2
     r = extent * np.geomspace(1.0, 1e4, 20_000)
     for v in np.geomspace(0.01, 100.0, 30):
         exact = (r**2 * (1.0 + (product / r + alpha / r**3) / (0.5 * reduced * v * v))).min()

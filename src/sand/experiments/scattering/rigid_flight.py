@@ -29,7 +29,7 @@ from ...forces.pair.inverse_square import inverse_square
 from ...numerics.quaternion import turned, turned_back
 from ...numerics.rotor import LARGEST_PIECE, free_rotation, free_sphere
 from ...numerics.simd import float_bits, float_from_bits
-from ...numerics.vec import add, axpy, cross, dot, load, norm, put, sub
+from ...numerics.vec import add, axpy, cross, dot, load, norm, put, scale, sub
 from .flight_driver import BOUND, FLIGHT_FAILED, HIT, MISS
 from .initial_conditions import R, U, draw_path, set_vector, vector_at
 from .two_aggregates import (
@@ -52,6 +52,8 @@ GROUP_SIZE = 0.25
 """Largest radius of a group times its Σ|μ|/|Σμ|, in units of the gap of the bounding spheres."""
 CHARGE_GROUP_SIZE = 0.1
 """Largest radius of a group of charges, in units of the gap of the bounding spheres."""
+MOST_TURN = 1000.0
+"""Largest rotation of both bodies on an orbit beyond the end of a flight [rad]; more of it only mixes their phases."""
 MOST_REVOLUTIONS = 100.0
 """Revolutions of the line of centres after which a pair is bound."""
 RESULTS = (
@@ -114,7 +116,8 @@ class FlyingPair(NamedTuple):
     largest: float  # largest radius [m]
     attraction: tuple  # (C₁, C₂, C₃): −U ≤ C₁/c + C₂/c² + C₃/c³ at the gap c of the bounding spheres [J m, J m², J m³]
     field: tuple  # external flux density [T]
-    # distance beyond which a receding body has escaped [m]; 0: that of the start, or less if it cannot return
+    # distance beyond which a receding body has escaped [m] unless net charges bring it back; 0: that of the start, or
+    # less if no attraction can turn it around
     escape: float
     step_fraction: float  # η
     group_size: float  # `GROUP_SIZE`, or 0: all pairs of grains
@@ -265,6 +268,32 @@ def longest_step(pair, loads, speed, angular1, angular2):
     return min(h, 0.5 * loads.gap / closing)
 
 
+@formula
+def orbit_back(r, u, attraction):
+    """r and u of a receding pair on a bound Kepler orbit when r is as large again, and the time and angle until then.
+
+    With μ = `attraction` [m³/s²] 1/a = 2/r − u²/μ, e cos ψ = 1 − r/a and e sin ψ = r·u/√(μa), the time is
+    2 √(a³/μ) (π − ψ + e sin ψ).  The angle is 2 (π − f), e cos f = l²/μr − 1, e sin f = l r·u/μr, with l = |r × u|.
+    """
+    distance = norm(r)
+    outward = scale(1.0 / distance, r)
+    radial = dot(u, outward)
+    aside = axpy(-radial, outward, u)
+    across = norm(aside)
+    axis = 1.0 / (2.0 / distance - dot(u, u) / attraction)
+    sine = radial * distance / math.sqrt(attraction * axis)
+    anomaly = math.atan2(sine, 1.0 - distance / axis)
+    time = 2.0 * math.sqrt(axis * axis * axis / attraction) * (math.pi - anomaly + sine)
+    orbit = distance * across / attraction
+    angle = 2.0 * (math.pi - math.atan2(orbit * radial, orbit * across - 1.0))
+    if across == 0.0:
+        return r, scale(-1.0, u), time, 0.0
+    sideways = scale(1.0 / across, aside)
+    outward_then = axpy(math.sin(angle), sideways, scale(math.cos(angle), outward))
+    sideways_then = axpy(-math.sin(angle), outward, scale(math.cos(angle), sideways))
+    return scale(distance, outward_then), axpy(-radial, outward_then, scale(across, sideways_then)), time, angle
+
+
 @functools.cache
 def flight_of(charged: bool = False) -> Callable:
     """Compile one flight from the state y (20,) of `two_aggregates` to its end; returns `RESULTS` but the second."""
@@ -318,13 +347,22 @@ def flight_of(charged: bool = False) -> Callable:
                 break
             is_far = distance >= escape
             if pair.escape == 0.0:  # what happens after an escape does not matter
-                stays_apart = 0.5 * pair.reduced * radial * radial * distance > pair.attraction[0]  # of net charges
-                is_far = (is_far and stays_apart) or escapes(radial, distance - first.extent - second.extent, pair)
-            if radial > 0.0 and is_far:
+                is_far = is_far or escapes(radial, distance - first.extent - second.extent, pair)
+            is_back = charged and kinetic * distance < pair.attraction[0]
+            if radial > 0.0 and is_far and not is_back:
                 end = MISS
                 break
             if steps >= pair.most_steps or swept >= 2.0 * math.pi * MOST_REVOLUTIONS:
                 break
+            if charged and radial > 0.0 and is_far:  # net charges bring it back
+                r, u, h, angle = orbit_back(r, u, pair.attraction[0] / pair.reduced)
+                spins = spin_size(angular1, first.inertia) + spin_size(angular2, second.inertia)
+                turning = min(h, MOST_TURN / spins) if spins > 0.0 else h
+                q1, angular1 = rotate_freely(q1, angular1, first, turning)
+                q2, angular2 = rotate_freely(q2, angular2, second, turning)
+                loads = loads_at(r, q1, q2, pair, now)
+                time, steps, swept = time + h, steps + 1, swept + angle
+                continue
             h = longest_step(pair, loads, norm(u), angular1, angular2)
             u = axpy(0.5 * h / pair.reduced, loads.force, u)
             angular1 = axpy(0.5 * h, turned_back(q1, loads.torque1), angular1)
