@@ -17,10 +17,12 @@ from sand.experiments.dilute_hits import Hit, Resolve, Stick
 from sand.experiments.dilute_majorant import Majorant
 from sand.experiments.dilute_own import OWN_START, OwnMajorant, thermal_body
 from sand.experiments.dilute_population import Population, sizes_of
+from sand.experiments.scattering.flight_driver import MISS
 from sand.simulation.contact_phase import CHANGES, ContactPhase, Settled
 from tests.physics.test_dilute import CONTACT, HEAT, IRON, T
 from tests.physics.test_dilute_runs import FORCES, NUMBERS, Stopped, Stopper, files_of, grains
 from tests.unit.experiments.test_dilute import DIMER, GRAIN, MOMENT, RADIUS, aggregate
+from tests.unit.experiments.test_dilute import charged as with_charges
 
 pytestmark = pytest.mark.compiled("scattering", "dipoles")
 WEAK = 0.2
@@ -215,6 +217,22 @@ def test_pieces_that_part_fly_to_where_a_flight_of_their_speed_begins(charges, m
     far = start_distance(a, b, speed, majorant.bound(sizes_of(a), sizes_of(b), speed), 4.0 if moves else 2.0)
     assert far <= r <= 1.5 * far
     assert abs(sum(hit.energies.values())) < 0.2 * HEAT
+
+
+def test_charged_pieces_part_where_a_flight_of_their_energy_far_away_begins():
+    """Trimers of ± 3 e with 0.5 k_BT left at an infinite distance part at r, where a flight of this speed starts.
+
+    With the speed on their way, 1.4 k_BT there, it would be 0.6 of it.
+    """
+    a, b = (with_charges(BENT, [2 * sign, 2 * sign, -sign], 0.0) for sign in (1, -1))
+    product, reduced, place = -COULOMB * a.charge * b.charge, 0.5 * a.mass, 6e-7
+    speed = math.sqrt(2.0 * (0.5 * HEAT + product / place) / reduced)
+    y = np.array([place, 0, 0, speed, 0, 0, *[0, 0, 0, 1.0] * 2, *[0.0] * 6])
+    flight = Resolve(None, RigidFlights(HEAT), Majorant(T)).flight_apart(a, b, y, 2.0)
+    r, u = (float(np.linalg.norm(flight.state[k : k + 3])) for k in (0, 3))
+    assert flight.end == MISS and u == pytest.approx(math.sqrt(HEAT / reduced), rel=0.1, abs=0.0)
+    local = math.sqrt(u**2 + 2.0 * product / (r * reduced))
+    assert r >= start_distance(a, b, u, math.inf) > 1.5 * start_distance(a, b, local, math.inf)
 
 
 @pytest.mark.parametrize("charges", [(0, 0), (1, -1)], ids=["dipoles", "opposite charges"])
