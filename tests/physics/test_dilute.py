@@ -416,7 +416,6 @@ WIDE = {name: (*pair[:2], {}) for name, pair in AWKWARD.items()} | {
     "charged dimers without moments": (*(with_charges(DIMER, [1, -1], 0.0) for _ in range(2)), {}),
     "charged dimer and grain": (with_charges(DIMER, [1, -1], 0.0), with_charges(GRAIN, [1], 0.0), {}),
     "charged trees": (with_charges(tree(30, 5), [1, 1, -1], 0.1), with_charges(tree(20, 6), [-1, -1, 1], 0.1), {}),
-    "neutral trees": (with_charges(tree(9, 5), [2, -2], 0.0), with_charges(tree(8, 6), [2, -2], 0.0), {}),
     "field": (DIMER, GRAIN, {"field": (0.0, 0.0, 2e-3)}),
 }
 """Pairs, and options of their flights, with which b̂ is tried as a bound."""
