@@ -481,7 +481,8 @@ def charged(number):
 def test_charged_grains_touch_where_their_orbits_do(sign):
     """Kepler's orbit of two charges: a hit if and only if b² < e² (1 − 2Q/m̄v²e), Q = q q′/4πε₀, e = 2r; to 1 % of b.
 
-    So ⟨σv⟩ = π e² ⟨v⟩ (1 + |Q|/k_BT e) = 9.355 π (2r)² ⟨v⟩ of ± e at 100 K, which K̂ is exactly: each draw hits.
+    So ⟨σv⟩ = π e² ⟨v⟩ (1 + |Q|/k_BT e) = 9.355 π (2r)² ⟨v⟩ of ± e at 100 K, which K̂ is exactly: each draw hits.  That
+    of equal charges is less than that of opposite ones.
     """
     a, b, rigid_flights = charged(1), charged(sign), RigidFlights(HEAT)
     reduced, product = 0.5 * a.mass, sign * COULOMB * 1.602176634e-19**2
@@ -493,7 +494,8 @@ def test_charged_grains_touch_where_their_orbits_do(sign):
             hit = start is not None and rigid_flights.thermal(a, b, *start, (1, event)).end == HIT
             assert hit == (factor < 1.0 and square > 0.0)
     unit = math.pi * (2.0 * RADIUS) ** 2 * math.sqrt(8.0 * HEAT / (math.pi * reduced))
-    assert Majorant(T).kernel(sizes_of(a), sizes_of(b)) == pytest.approx(9.355 * unit, rel=1e-3, abs=0.0)
+    bound = float(Majorant(T).kernel(sizes_of(a), sizes_of(b))) / unit
+    assert bound < 9.0 if sign > 0 else bound == pytest.approx(9.355, rel=1e-3, abs=0.0)
 
 
 def test_half_magnetic_grains_stick_and_resolve(phase_of_two):

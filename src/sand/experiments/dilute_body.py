@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ..basics.grains import GrainArrays, net_charge
 from ..basics.initial_pairs import StrainedContacts
+from .dilute_charges import Multipoles, multipoles_of
 from .scattering.encounters import principal_frame
 from .scattering.groups import charge_groups_of, groups_of
 from .scattering.initial_conditions import R, U
@@ -42,8 +43,10 @@ class Body:
         Their contacts, with displacements in the principal frame.
     flying : FlyingBody
         What flights need: groups of grains, moments of inertia, extent.
-    mass, moment_sum, charge, charge_sum, charge_arm : float
-        M [kg], Σ|μ| [A m²], Σq, which is 0 where charges cancel but for rounding, Σ|q| [C] and Σ|q||x| [C m].
+    mass, moment_sum : float
+        M [kg], Σ|μ| [A m²].
+    charges : Multipoles
+        Its charges; the net one is 0 where they cancel but for rounding.
     radii : tuple of float
         Smallest and largest radius of its grains [m].
     number : int
@@ -61,9 +64,7 @@ class Body:
     flying: FlyingBody
     mass: float
     moment_sum: float
-    charge: float
-    charge_sum: float
-    charge_arm: float
+    charges: Multipoles
     radii: tuple[float, float]
     number: int = 0
     born: int = 0
@@ -72,6 +73,11 @@ class Body:
 
     def __len__(self) -> int:
         return self.grains.mass.size
+
+    @property
+    def charge(self) -> float:
+        """Net charge [C]."""
+        return self.charges.charge
 
     @property
     def extent(self) -> float:
@@ -112,9 +118,8 @@ def body_at_rest(
         (0.0, 0.0, 0.0, 1.0),
         float((np.linalg.norm(x, axis=0) + own.radius).max()),
     )
-    size = np.abs(own.charge)
-    arm = float((size * np.linalg.norm(x, axis=0)).sum())
-    total = float(own.mass.sum()), float(magnitude.sum()), net_charge(own.charge), float(size.sum()), arm
+    charges = multipoles_of(x, own.charge, net_charge(own.charge))
+    total = float(own.mass.sum()), float(magnitude.sum()), charges
     radii = float(own.radius.min()), float(own.radius.max())
     return Body(own, contacts, flying, *total, radii, *identity)
 

@@ -154,7 +154,7 @@ def check_gas(gas: Gas | None, grains: Grains, population: Population, between: 
         )
     speed = np.sqrt(3.0 * majorant.heat / size.mass)
     lengths = speed * [float(_stopping_times(body.grains, gas).min()) for body in population.bodies]
-    reaches = majorant.bound(size, size, speed) + 2.0 * size.extent
+    reaches = majorant.bound(size, size._replace(charge=-size.charge), speed) + 2.0 * size.extent
     worst = int(np.argmin(lengths / reaches))
     length, reach = float(lengths[worst]), float(reaches[worst])
     times = _stopping_times(grains.arrays, gas)

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..basics.constants import COULOMB, MAGNETIC
 from .dilute_body import Body
+from .dilute_charges import attraction_of
+from .dilute_population import sizes_of
 from .dilute_start import start_in_field
 from .scattering.encounters import MOST_FLIGHT_STEPS
 from .scattering.flight_driver import Flights
@@ -122,7 +124,7 @@ class RigidFlights:
             a.mass * b.mass / (a.mass + b.mass),
             min(a.radii[0], b.radii[0]),
             max(a.radii[1], b.radii[1]),
-            attraction_of(a, b),
+            (*map(float, attraction_of(sizes_of(a), sizes_of(b))[:3]), _of_moments(a, b)),
             self.field,
             escape,
             self.step_fraction,
@@ -137,25 +139,7 @@ class RigidFlights:
 
 def are_charged(a: Body, b: Body) -> bool:
     """Whether both bodies have charged grains."""
-    return a.charge_sum * b.charge_sum > 0.0
-
-
-def attraction_of(a: Body, b: Body) -> tuple[float, float, float]:
-    """C₁ [J m], C₂ [J m²], C₃ [J m³] of the bound −U ≤ C₁/c + C₂/c² + C₃/c³, c the gap of the bounding spheres.
-
-    With the net charges q and D = Σ|q||x|, of the grains at x from the centre of mass, and k = 1/4πε₀
-
-        C₁ = max(0, −k q q′),  C₂ = k (|q| D′ + |q′| D),  C₃ = 2k D D′ + 2 (μ₀/4π) Σ|μ| Σ|μ′|
-
-    The potential 1/d of a charge at x differs by at most |x|/c² from that of one at the centre, with a gradient of at
-    most 2|x|/c³: so charges act as q and dipole moments of at most D, aligned.  The derivative of the bound is one of
-    the force.
-    """
-    magnetic = float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC))
-    if not are_charged(a, b):
-        return 0.0, 0.0, magnetic
-    mixed = COULOMB * (abs(a.charge) * b.charge_arm + abs(b.charge) * a.charge_arm)
-    return max(0.0, -COULOMB * a.charge * b.charge), mixed, magnetic + 2.0 * COULOMB * a.charge_arm * b.charge_arm
+    return a.charges.charge_sum * b.charges.charge_sum > 0.0
 
 
 def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: float) -> tuple[float, float, float] | None:
@@ -189,12 +173,18 @@ def start_distance(a: Body, b: Body, speed: float, bound: float, start: float = 
     clear = a.extent + b.extent + 4.0 * max(a.radii[1], b.radii[1])
     if not are_charged(a, b):
         return max(start * bound, clear)
-    _, c2, c3 = attraction_of(a, b)
+    _, second, third, _ = attraction_of(sizes_of(a), sizes_of(b))
     energy = speed * speed * a.mass * b.mass / (a.mass + b.mass)
     if energy == 0.0:
         return math.inf
-    with_dipoles = start * math.sqrt(3.0 * (c3 / energy) ** (2.0 / 3.0) + (a.extent + b.extent) ** 2)
-    return max(with_dipoles, math.sqrt(3.0**1.5 * start**3 * c2 / energy), clear)
+    capture = (third + _of_moments(a, b)) / energy
+    outer = start * math.sqrt(3.0 * capture ** (2.0 / 3.0) + (a.extent + b.extent) ** 2)
+    return max(outer, math.sqrt(3.0**1.5 * start**3 * second / energy), clear)
+
+
+def _of_moments(a: Body, b: Body) -> float:
+    """α = 2 (μ₀/4π) Σ|μ| Σ|μ′| [J m³]."""
+    return float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC))
 
 
 def start_radius(a: Body, b: Body, distance: float, impact: float) -> float:

@@ -15,6 +15,8 @@ So each f(r) with r ≥ e bounds b².  Take the larger one of e and r_c: f(r_c) 
 β² v^(−4/3), the capture of Eqs. 12, 13 of Dominik & Nübold 2002; and f(e) = e² + 2Qe/m̄v² + 2 r_c³/e, of which the last
 term is below 2 r_c² if e > r_c.  Both are at most b̂².  Grains that are nearer than the centres of their bodies and
 energy of rotation that becomes one of motion are not in this estimate: flights with a wider bound show that b̂ holds.
+Charges of both signs attract each other far less than Q/r.  As each r ≥ e will do, b̂² also holds with R in place of e
+and C₁ + C₂/R + C₃/R² in place of Q (`dilute_charges`), and of both a pair has the one with the smaller K̂.
 
 Speeds have Maxwell's distribution with s² = k_BT/m̄, so that the rate of encounters in a volume V is K̂/V,
 
@@ -31,6 +33,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from ..basics.constants import BOLTZMANN, COULOMB, MAGNETIC
+from .dilute_charges import attraction_of
 from .scattering.rigid_flight import contact_energy
 
 POWERS = (-1.0 / 3.0, 1.0, -1.0, -5.0 / 3.0)
@@ -40,12 +43,16 @@ MEANS = tuple(2.0 ** (0.5 * p) * math.gamma(0.5 * (3.0 + p)) / math.gamma(1.5) f
 
 
 class Sizes(NamedTuple):
-    """What the bound of a body needs, a number or (N,): m [kg], Σ|μ| [A m²], extent [m], Σ|q| [C], V [m/s]."""
+    """What the bound of a body needs, a number or (N,): m [kg], Σ|μ| [A m²], extent [m], `Multipoles`, V [m/s]."""
 
     mass: Any
     moment_sum: Any
     extent: Any
-    charge_sum: Any
+    charge_sum: Any = 0.0
+    charge: Any = 0.0
+    dipole: Any = 0.0
+    quadrupole: Any = 0.0
+    third: Any = 0.0
     vx: Any = 0.0  # of bodies that keep their motion
     vy: Any = 0.0
     vz: Any = 0.0
@@ -82,8 +89,18 @@ class Majorant:
         """m̄ [kg], and the factors of v^(p − 1) in b̂² for the powers `POWERS`."""
         reduced, extent, wide = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent, self.widening**2
         root = np.cbrt(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC) / reduced)
-        focusing = 2.0 * wide * COULOMB * a.charge_sum * b.charge_sum / reduced
-        return reduced, 3.0 * wide * root**2, wide * extent**2, focusing * extent, focusing * root
+
+        def factors(distance: Any, product: Any) -> tuple[Any, ...]:
+            focusing = 2.0 * wide * product / reduced
+            return reduced, 3.0 * wide * root**2, wide * distance**2, focusing * distance, focusing * root
+
+        centred = factors(extent, COULOMB * a.charge_sum * b.charge_sum)
+        if not np.any(centred[3]):
+            return centred
+        first, second, third, nearest = attraction_of(a, b)
+        other = factors(nearest, first + second / nearest + third / nearest**2)
+        is_smaller = sum(self._parts(*other)) < sum(self._parts(*centred))
+        return tuple(np.where(is_smaller, new, old) for new, old in zip(other, centred, strict=True))
 
     def kernel(self, a: Sizes, b: Sizes) -> Any:
         """K̂ [m³/s]."""

@@ -148,4 +148,4 @@ class Population:
 def sizes_of(body: Body) -> Sizes:
     """Sizes of one body."""
     velocity = () if body.motion is None else body.motion.velocity
-    return Sizes(body.mass, body.moment_sum, body.extent, body.charge_sum, *velocity)
+    return Sizes(body.mass, body.moment_sum, body.extent, *body.charges, *velocity)

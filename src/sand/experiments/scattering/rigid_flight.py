@@ -114,7 +114,9 @@ class FlyingPair(NamedTuple):
     reduced: float  # m̄ [kg]
     smallest: float  # smallest radius [m]
     largest: float  # largest radius [m]
-    attraction: tuple  # (C₁, C₂, C₃): −U ≤ C₁/c + C₂/c² + C₃/c³ at the gap c of the bounding spheres [J m, J m², J m³]
+    # (C₁, C₂, C₃, α): −U ≤ C₁/r + C₂/r² + C₃/r³ of charges at r ≥ 2e, and α/c³ of moments at the gap c = r − e of the
+    # bounding spheres [J m, J m², J m³, J m³]
+    attraction: tuple
     field: tuple  # external flux density [T]
     # distance beyond which a receding body has escaped [m] unless net charges bring it back; 0: that of the start, or
     # less if no attraction can turn it around
@@ -315,12 +317,17 @@ def flight_of(charged: bool = False) -> Callable:
         )
 
     @formula
-    def escapes(radial, clear, pair):
+    def escapes(radial, distance, pair):
         """Whether no attraction at this distance can turn the relative motion around."""
-        if clear <= 0.0:
+        extent = pair.first.extent + pair.second.extent
+        clear = distance - extent
+        if clear <= (extent if charged else 0.0):
             return False
-        c1, c2, c3 = pair.attraction
-        return 0.5 * pair.reduced * radial * radial > c3 / (clear * clear * clear) + (c2 / clear + c1) / clear
+        c1, c2, c3, moments = pair.attraction
+        most = moments / (clear * clear * clear)
+        if charged:
+            most += ((c3 / distance + c2) / distance + c1) / distance
+        return 0.5 * pair.reduced * radial * radial > most
 
     @loop
     def fly(y, pair, now):
@@ -347,7 +354,7 @@ def flight_of(charged: bool = False) -> Callable:
                 break
             is_far = distance >= escape
             if pair.escape == 0.0:  # what happens after an escape does not matter
-                is_far = is_far or escapes(radial, distance - first.extent - second.extent, pair)
+                is_far = is_far or escapes(radial, distance, pair)
             is_back = charged and kinetic * distance < pair.attraction[0]
             if radial > 0.0 and is_far and not is_back:
                 end = MISS
