@@ -219,6 +219,23 @@ def test_the_bound_of_the_attraction_is_nearly_reached_by_aligned_dipoles():
     assert c1 == c2 == 0.0 and exact <= c3 / r**3 < 1.2 * exact
 
 
+@pytest.mark.parametrize("second", [0, 1, 4])
+def test_the_bound_of_the_attraction_is_the_sum_of_its_series(second):
+    """C₃/R³ = k Σ C(n+m, n) WₙW′ₘ/Rⁿ⁺ᵐ⁺¹ over n + m ≥ 2, by its first 80 × 80 terms; Wₙ = A₃ eⁿ⁻³ for n ≥ 3."""
+    a, b = sizes_of(CHARGED_BODIES[2]), sizes_of(CHARGED_BODIES[second])
+    r, weights = 2.0 * (a.extent + b.extent), []
+    for each in (a, b):
+        low = [abs(each.charge), each.dipole / r, each.quadrupole / r**2]
+        weights.append([*low, *(each.third / each.extent**3 * (each.extent / r) ** n for n in range(3, 80))])
+    total = sum(math.comb(n + m, n) * weights[0][n] * weights[1][m] for n in range(80) for m in range(80) if n + m >= 2)
+    found = attraction_of(a, b)
+    assert found.third == pytest.approx(COULOMB * total * r**2, rel=1e-9, abs=0.0)
+    assert found.second == pytest.approx(
+        COULOMB * r * (weights[0][0] * weights[1][1] + weights[0][1] * weights[1][0]), rel=1e-12, abs=0.0
+    )
+    assert attraction_of(b, a) == pytest.approx(found, rel=1e-12, abs=0.0)
+
+
 def test_multipoles_bound_the_potential_of_their_order():
     """|Σ q|x|ⁿPₙ(cos)| ≤ Wₙ for n = 1, 2, and A₃ aⁿ⁻³ for n = 3, 4, in 500 directions; of a line W₁, W₂ are reached."""
     rng = np.random.default_rng(6)
