@@ -415,6 +415,8 @@ WIDE = {name: (*pair[:2], {}) for name, pair in AWKWARD.items()} | {
     "equal charges": (with_moment(1), with_moment(1), {}),
     "charged dimers without moments": (*(with_charges(DIMER, [1, -1], 0.0) for _ in range(2)), {}),
     "charged dimer and grain": (with_charges(DIMER, [1, -1], 0.0), with_charges(GRAIN, [1], 0.0), {}),
+    "charged dimer and grain, 3 e": (with_charges(DIMER, [3, -3], 0.0), with_charges(GRAIN, [3], 0.0), {}),
+    "charged dimer and grain, cold": (with_charges(DIMER, [1, -1], 0.0), with_charges(GRAIN, [1], 0.0), {"spin": 0.0}),
     "charged trees": (with_charges(tree(30, 5), [1, 1, -1], 0.1), with_charges(tree(20, 6), [-1, -1, 1], 0.1), {}),
     "field": (DIMER, GRAIN, {"field": (0.0, 0.0, 2e-3)}),
 }

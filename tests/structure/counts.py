@@ -61,7 +61,7 @@ CAPABILITIES = {
     "words on each loss, axes and ranges of colours of the page as in figures, without outliers": 30,
     "the rigid motion of clusters, in one place (less)": -35,
     "charged bodies of dilute dust: bound of their attraction, groups of charges, starts where net charges act, bound "
-    "orbits": 179,
+    "orbits": 181,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

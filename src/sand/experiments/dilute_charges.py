@@ -1,15 +1,16 @@
 """How much two bodies with charges attract each other at most: multipoles about their centres of mass.
 
 Charges q at x, with |x| ≤ a, are multipoles of all orders n.  Each is a sum of axial ones, n-fold derivatives of 1/r
-along a unit vector over n!, with the weights q|x|ⁿ; of fewer weights W₁ = |Σ q x|, and W₂ = 2/3 (λ₁ − λ₃) with the
-largest and the smallest eigenvalue of Σ q (3 x xᵀ − |x|²)/2.  For n ≥ 3 Wₙ ≤ A₃ aⁿ⁻³, A₃ = Σ|q||x|³.  No derivative of
-1/r of the order l along unit vectors is above l!/rˡ⁺¹ (Banach 1938: the largest one of a symmetric tensor has equal
-vectors, and those are l! Pₗ/rˡ⁺¹).  So in the distance r > a + a′ of the centres
+along a unit vector over n!, with the weights |q||x|ⁿ; for n = 1, 2 smaller weights do, W₁ = |Σ q x| and W₂ = 2/3 (λ₁ −
+λ₃) with the largest and the smallest eigenvalue of Σ q (3 x xᵀ − |x|²)/2.  For n ≥ 3 Wₙ ≤ A₃ aⁿ⁻³, A₃ = Σ|q||x|³.  No
+derivative of 1/r of the order l along unit vectors is above l!/rˡ⁺¹ (Banach 1938: no different vectors give more of a
+symmetric tensor than equal ones, and these give l! Pₗ/rˡ⁺¹).  So at a distance r > a + a′ of the centres
 
     −U ≤ C₁/r + k Σ C(n+m, n) WₙW′ₘ/rⁿ⁺ᵐ⁺¹,   C₁ = max(0, −k q q′) of the net charges, k = 1/4πε₀, n + m ≥ 1,
 
-and the inward force is at most the derivative of this.  From r = R = 2 (e + e′) on, with the extents e ≥ a, the terms
-of n + m = 1 are C₂/r², and all others at most C₃/r³, which is their sum at R.
+and the inward force is at most the derivative of this series, which so bounds its work from r to infinity, too.  From
+r = R = 2 (e + e′) on, with the extents e ≥ a, the terms of n + m = 1 are C₂/r², and all others at most C₃/r³; C₃/R³ is
+their sum at R.
 """
 
 from __future__ import annotations
@@ -82,8 +83,9 @@ def _parts(body: Any, nearest: Any) -> tuple[tuple[Any, ...], Any, Any]:
 
 
 def _from_three(m: int, s: Any) -> Any:
-    """Σ C(n+m, n) sⁿ over n ≥ 3."""
-    return (1.0 - s) ** -(m + 1) - sum(BINOMIAL[n][m] * s**n for n in range(3))
+    """Σ C(n+m, n) sⁿ over n ≥ 3, for m = 0, 1, 2."""
+    first = (1.0, 4.0 - 3.0 * s, 10.0 - 15.0 * s + 6.0 * s * s)[m]
+    return s**3 * first / (1.0 - s) ** (m + 1)
 
 
 def _both(s: Any, z: Any) -> Any:

@@ -165,10 +165,9 @@ def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: floa
 def start_distance(a: Body, b: Body, speed: float, bound: float, start: float = START) -> float:
     """Distance [m] at which a flight starts; at least that at which the bodies are clear.
 
-    Without charges that of a plane, `start` b̂.  b̂ of charges is that of all |q| at the centres, where only the net
-    charges act: their orbit leads to the distance r at which the rest of −U is small.  There C₂/r² is at most ε m̄v²,
-    with ε = 1/(3^(3/2) start³), and r ≥ start √(3 (C₃/m̄v²)^(2/3) + e²), so that C₃/r³ is, too (`attraction_of`): as of
-    magnetic moments at `start` b̂.
+    Without charges that of a plane, `start` b̂.  The orbit of net charges leads to a distance r at which the rest of −U
+    is small: C₂/r² is at most ε m̄v², with ε = 1/(3^(3/2) start³), and so is C/r³, from r ≥ start √(3 (C/m̄v²)^(2/3) +
+    e²), as of moments at `start` b̂.  C is C₃ of charges (`dilute_charges`) and α = 2k Σ|μ| Σ|μ′| of moments.
     """
     clear = a.extent + b.extent + 4.0 * max(a.radii[1], b.radii[1])
     if not are_charged(a, b):

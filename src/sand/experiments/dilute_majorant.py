@@ -16,7 +16,8 @@ So each f(r) with r ≥ e bounds b².  Take the larger one of e and r_c: f(r_c) 
 term is below 2 r_c² if e > r_c.  Both are at most b̂².  Grains that are nearer than the centres of their bodies and
 energy of rotation that becomes one of motion are not in this estimate: flights with a wider bound show that b̂ holds.
 Charges of both signs attract each other far less than Q/r.  As each r ≥ e will do, b̂² also holds with R in place of e
-and C₁ + C₂/R + C₃/R² in place of Q (`dilute_charges`), and of both a pair has the one with the smaller K̂.
+and C₁ + C₂/R + C₃/R² in place of Q (`dilute_charges`); it is made 1.1 times as wide for what rotation gives to the
+motion, up to 0.03 of b̂ of slow bodies without spin.  Of both a pair has the one with the smaller K̂.
 
 Speeds have Maxwell's distribution with s² = k_BT/m̄, so that the rate of encounters in a volume V is K̂/V,
 
@@ -38,6 +39,8 @@ from .scattering.rigid_flight import contact_energy
 
 POWERS = (-1.0 / 3.0, 1.0, -1.0, -5.0 / 3.0)
 """p of the parts of K̂, ⟨v^p⟩; those of b̂² have v^(p − 1)."""
+SPARE = 1.1
+"""Factor of b̂ where it is that of the multipoles of charges."""
 MEANS = tuple(2.0 ** (0.5 * p) * math.gamma(0.5 * (3.0 + p)) / math.gamma(1.5) for p in POWERS)
 """⟨v^p⟩/s^p of Maxwell's distribution."""
 
@@ -90,15 +93,15 @@ class Majorant:
         reduced, extent, wide = a.mass * b.mass / (a.mass + b.mass), a.extent + b.extent, self.widening**2
         root = np.cbrt(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC) / reduced)
 
-        def factors(distance: Any, product: Any) -> tuple[Any, ...]:
+        def factors(distance: Any, product: Any, wide: float) -> tuple[Any, ...]:
             focusing = 2.0 * wide * product / reduced
             return reduced, 3.0 * wide * root**2, wide * distance**2, focusing * distance, focusing * root
 
-        centred = factors(extent, COULOMB * a.charge_sum * b.charge_sum)
+        centred = factors(extent, COULOMB * a.charge_sum * b.charge_sum, wide)
         if not np.any(centred[3]):
             return centred
         first, second, third, nearest = attraction_of(a, b)
-        other = factors(nearest, first + second / nearest + third / nearest**2)
+        other = factors(nearest, first + second / nearest + third / nearest**2, wide * SPARE**2)
         is_smaller = sum(self._parts(*other)) < sum(self._parts(*centred))
         return tuple(np.where(is_smaller, new, old) for new, old in zip(other, centred, strict=True))
 

@@ -114,8 +114,8 @@ class FlyingPair(NamedTuple):
     reduced: float  # m̄ [kg]
     smallest: float  # smallest radius [m]
     largest: float  # largest radius [m]
-    # (C₁, C₂, C₃, α): −U ≤ C₁/r + C₂/r² + C₃/r³ of charges at r ≥ 2e, and α/c³ of moments at the gap c = r − e of the
-    # bounding spheres [J m, J m², J m³, J m³]
+    # (C₁, C₂, C₃, α): −U ≤ C₁/r + C₂/r² + C₃/r³ of charges at twice the sum of the extents and beyond, and α/c³ of
+    # moments at the gap c of the bounding spheres [J m, J m², J m³, J m³]
     attraction: tuple
     field: tuple  # external flux density [T]
     # distance beyond which a receding body has escaped [m] unless net charges bring it back; 0: that of the start, or
