@@ -279,7 +279,7 @@ def test_a_population_in_which_nothing_hits_is_resumed_with_the_same_bits(tmp_pa
     Only `until` ends it.  The checkpoint is that of the draw before.  Files are those of a run that was not killed.
     """
     own = grains(moment=None, charge=np.full(100, 30.0) * 1.602176634e-19)
-    how = {**NUMBERS, "between": between, "hits": "stick", "until": "8000 s", "seed": 3}
+    how = {**NUMBERS, "between": between, "hits": "stick", "until": "1e7 s", "seed": 3}
     forces = [CONTACT, sand.Charges()]
     one = dilute_growth.grow(own, forces, **how, out=tmp_path / "one")
     assert one.ledger["hits"][-1] == 0 and len(one.encounters["end"]) > 400

@@ -180,8 +180,8 @@ def test_charges_that_turn_around_before_their_flight_are_no_misses(tmp_path):
     assert repelled.any() and (found.encounters["flight_steps"][repelled] == 0).all()
     flown = found.encounters["flight_steps"] > 0
     assert found.ledger["flights"][-1] == flown.sum() and not (flown & repelled).any()
-    # some neutral bodies pass each other where their charges do not act
-    assert set(ends[~flown]) == {1.0, 3.0} and set(ends[flown]) == {0.0, 1.0}
+    # bodies without a net charge, or with opposite ones, that pass far away are misses without a flight
+    assert set(ends[~flown]) <= {1.0, 3.0} and set(ends[flown]) == {0.0, 1.0}
 
 
 def test_a_checkpoint_of_an_earlier_version_is_refused(tmp_path, monkeypatch):
