@@ -381,7 +381,7 @@ FAR = {
 @pytest.mark.validate
 @pytest.mark.parametrize("name", FAR)
 def test_charges_may_start_where_only_their_net_charges_act(name, record_bound):
-    """⟨σv⟩ of charged trimers from the start of flights is that from 2 b̂, some twenty times as far.
+    """⟨σv⟩ of charged trimers from the start of flights is that from where all charges at the centres would need it.
 
     Within 3 standard errors of the difference, 12,000 flights each.
     """
@@ -393,7 +393,10 @@ def test_charges_may_start_where_only_their_net_charges_act(name, record_bound):
         hits, number = 0, 12_000
         for event in range(number):
             speed, impact, bound = majorant.draw(sizes_of(a), sizes_of(b), event_uniforms(seed, event)[3:6])
-            distance = 2.0 * bound if is_far else start_distance(a, b, speed, bound)
+            distance = start_distance(a, b, speed, bound)
+            if is_far:  # twice the bound of all charges at the centres
+                square = 2.0 * COULOMB * a.charges.charge_sum * b.charges.charge_sum / (0.5 * a.mass * speed**2)
+                distance = max(2.0 * math.sqrt(square * (a.extent + b.extent)), 2.0 * bound, distance)
             start = kepler_start(a, b, (speed, impact), distance)
             hits += start is not None and rigid_flights.thermal(a, b, *start, (seed, event)).end == HIT
         shares.append(hits / number)
