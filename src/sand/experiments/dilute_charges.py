@@ -60,8 +60,7 @@ def multipoles_of(x: np.ndarray, charge: np.ndarray, net: float) -> Multipoles:
 def attraction_of(a: Any, b: Any) -> Attraction:
     """C₁, C₂, C₃ and R of two bodies, `Sizes` with their extents."""
     nearest = NEAREST * (a.extent + b.extent)
-    parts = [_parts(each, nearest) for each in (a, b)]
-    (low1, rest1, s1), (low2, rest2, s2) = parts
+    (low1, rest1, s1), (low2, rest2, s2) = (_parts(each, nearest) for each in (a, b))
     total = rest1 * rest2 * _both(s1, s2)
     for n in range(3):
         total = total + low1[n] * rest2 * _from_three(n, s2) + low2[n] * rest1 * _from_three(n, s1)
@@ -84,8 +83,7 @@ def _parts(body: Any, nearest: Any) -> tuple[tuple[Any, ...], Any, Any]:
 
 def _from_three(m: int, s: Any) -> Any:
     """Σ C(n+m, n) sⁿ over n ≥ 3, for m = 0, 1, 2."""
-    first = (1.0, 4.0 - 3.0 * s, 10.0 - 15.0 * s + 6.0 * s * s)[m]
-    return s**3 * first / (1.0 - s) ** (m + 1)
+    return s**3 * (1.0, 4.0 - 3.0 * s, 10.0 - 15.0 * s + 6.0 * s * s)[m] / (1.0 - s) ** (m + 1)
 
 
 def _both(s: Any, z: Any) -> Any:

@@ -80,7 +80,7 @@ class RigidFlights:
         charge_group_size: float = CHARGE_GROUP_SIZE,
     ):
         self.heat, self.spin_energy, self.field = heat, spin * heat, field
-        self.step_fraction, self.sizes = step_fraction, (group_size, charge_group_size)
+        self.step_fraction, self.group_sizes = step_fraction, (group_size, charge_group_size)
         self._now = Now(*(np.zeros((3, 0)) for _ in Now._fields))
         # one flight, whose arrays are used again
         self._flights = Flights(
@@ -124,11 +124,11 @@ class RigidFlights:
             a.mass * b.mass / (a.mass + b.mass),
             min(a.radii[0], b.radii[0]),
             max(a.radii[1], b.radii[1]),
-            (*map(float, attraction_of(sizes_of(a), sizes_of(b))[:3]), _of_moments(a, b)),
+            attraction_between(a, b),
             self.field,
             escape,
             self.step_fraction,
-            *self.sizes,
+            *self.group_sizes,
             MOST_FLIGHT_STEPS,
         )
         flights_of(are_charged(a, b))(np.uint64(seed), self._flights, start, pair, self._now)
@@ -140,6 +140,14 @@ class RigidFlights:
 def are_charged(a: Body, b: Body) -> bool:
     """Whether both bodies have charged grains."""
     return a.charges.charge_sum * b.charges.charge_sum > 0.0
+
+
+def attraction_between(a: Body, b: Body) -> tuple[float, ...]:
+    """C₁, C₂, C₃ and R of charges (`dilute_charges`), 0 without, and α = 2 (μ₀/4π) Σ|μ| Σ|μ′| of moments [J m³]."""
+    moments = float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC))
+    if not are_charged(a, b):
+        return 0.0, 0.0, 0.0, 0.0, moments
+    return (*map(float, attraction_of(sizes_of(a), sizes_of(b))), moments)
 
 
 def kepler_start(a: Body, b: Body, approach: tuple[float, float], distance: float) -> tuple[float, float, float] | None:
@@ -172,18 +180,13 @@ def start_distance(a: Body, b: Body, speed: float, bound: float, start: float = 
     clear = a.extent + b.extent + 4.0 * max(a.radii[1], b.radii[1])
     if not are_charged(a, b):
         return max(start * bound, clear)
-    _, second, third, _ = attraction_of(sizes_of(a), sizes_of(b))
+    _, second, third, nearest, moments = attraction_between(a, b)
     energy = speed * speed * a.mass * b.mass / (a.mass + b.mass)
     if energy == 0.0:
         return math.inf
-    capture = (third + _of_moments(a, b)) / energy
+    capture = (third + moments) / energy
     outer = start * math.sqrt(3.0 * capture ** (2.0 / 3.0) + (a.extent + b.extent) ** 2)
-    return max(outer, math.sqrt(3.0**1.5 * start**3 * second / energy), clear)
-
-
-def _of_moments(a: Body, b: Body) -> float:
-    """α = 2 (μ₀/4π) Σ|μ| Σ|μ′| [J m³]."""
-    return float(contact_energy(a.moment_sum, b.moment_sum, 1.0, MAGNETIC))
+    return max(outer, math.sqrt(3.0**1.5 * start**3 * second / energy), nearest, clear)
 
 
 def start_radius(a: Body, b: Body, distance: float, impact: float) -> float:

@@ -39,10 +39,10 @@ from .scattering.rigid_flight import contact_energy
 
 POWERS = (-1.0 / 3.0, 1.0, -1.0, -5.0 / 3.0)
 """p of the parts of K̂, ⟨v^p⟩; those of b̂² have v^(p − 1)."""
-SPARE = 1.1
-"""Factor of b̂ where it is that of the multipoles of charges."""
 MEANS = tuple(2.0 ** (0.5 * p) * math.gamma(0.5 * (3.0 + p)) / math.gamma(1.5) for p in POWERS)
 """⟨v^p⟩/s^p of Maxwell's distribution."""
+SPARE = 1.1
+"""Factor of b̂ where it is that of the multipoles of charges."""
 
 
 class Sizes(NamedTuple):

@@ -259,7 +259,7 @@ def test_multipoles_bound_the_potential_of_their_order():
 
 
 def test_charges_start_where_only_their_net_charges_act():
-    """C₂/r² and C₃/r³ are at most m̄v²/(3^(3/2) start³); without charges, and in their limit, r = start b̂.
+    """C₂/r² and (C₃ + α)/r³ are at most m̄v²/(3^(3/2) start³); without charges, and in their limit, r = start b̂.
 
     A pair whose Kepler orbit stays beyond r has no flight, of net charges that repel or attract each other and of none;
     a body without charges has no part in this.

@@ -49,7 +49,7 @@ def groups_of(x: np.ndarray, moment: np.ndarray) -> Groups:
 
 
 def charge_groups_of(x: np.ndarray, charge: np.ndarray) -> ChargeGroups:
-    """Charges (n,) [C] at x (n, 3) [m] in the frame of a body, those that are not 0, and all levels of groups of them.
+    """Groups of the charges (n,) [C] at x (n, 3) [m] in the frame of a body; level 0 has each charge that is not 0.
 
     A group of level l has up to 4ˡ neighbouring charges of one sign: their sum at their centre of charge, about which
     they have no dipole moment; the next term is at most (a/d)² of the potential, for the radius a and the distance d.

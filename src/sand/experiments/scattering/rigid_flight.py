@@ -114,8 +114,8 @@ class FlyingPair(NamedTuple):
     reduced: float  # m̄ [kg]
     smallest: float  # smallest radius [m]
     largest: float  # largest radius [m]
-    # (C₁, C₂, C₃, α): −U ≤ C₁/r + C₂/r² + C₃/r³ of charges at twice the sum of the extents and beyond, and α/c³ of
-    # moments at the gap c of the bounding spheres [J m, J m², J m³, J m³]
+    # (C₁, C₂, C₃, R, α): −U ≤ C₁/r + C₂/r² + C₃/r³ of charges at r ≥ R, and α/c³ of moments at the gap c of the
+    # bounding spheres [J m, J m², J m³, m, J m³]
     attraction: tuple
     field: tuple  # external flux density [T]
     # distance beyond which a receding body has escaped [m] unless net charges bring it back; 0: that of the start, or
@@ -319,11 +319,10 @@ def flight_of(charged: bool = False) -> Callable:
     @formula
     def escapes(radial, distance, pair):
         """Whether no attraction at this distance can turn the relative motion around."""
-        extent = pair.first.extent + pair.second.extent
-        clear = distance - extent
-        if clear <= (extent if charged else 0.0):
+        c1, c2, c3, nearest, moments = pair.attraction
+        clear = distance - pair.first.extent - pair.second.extent
+        if clear <= 0.0 or distance < nearest:
             return False
-        c1, c2, c3, moments = pair.attraction
         most = moments / (clear * clear * clear)
         if charged:
             most += ((c3 / distance + c2) / distance + c1) / distance
