@@ -40,7 +40,7 @@ from .dilute_conditions import (
     field_of,
 )
 from .dilute_encounters import RECENT, Encounters
-from .dilute_files import PopulationFiles, kept_population, ledger_columns
+from .dilute_files import PopulationFiles, kept_population, ledger_columns, ledger_row
 from .dilute_flight import RigidFlights
 from .dilute_hits import HitRule, Resolve, Stick
 from .dilute_kernel import Kernel, kernel_of
@@ -55,6 +55,8 @@ HITS = ("resolve", "stick")
 """What becomes of two bodies that touch: contacts are computed until at rest, or they join as they are."""
 NOT_BINARY = "not binary"
 """Outcome of a population whose bodies would meet others on their way."""
+SEEN_EVERY = 1000
+"""Draws between two calls of observers where no hit comes."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ def grow(
     overwrite : bool, optional
         Whether files of an earlier run may be replaced.
     observers : sequence, optional
-        Called with each row of the ledger: `observer.see(None, row)`.
+        Called with each row of the ledger, and with the numbers at every thousandth draw: `observer.see(None, row)`.
     case : dict or None, optional
         Settings for case.toml, by default those of these arguments.
 
@@ -235,9 +237,11 @@ def _advance(
             return NOT_BINARY
         encounter = now.step()
         record.add(now, encounter, start)
-        if encounter.end == "hit":
-            for each in observers:
-                each.see(None, record.rows[-1])
+        if encounter.end != "hit" and now.event % SEEN_EVERY:
+            continue
+        row = record.rows[-1] if encounter.end == "hit" else ledger_row(now, start, record.rows[-1], None)
+        for each in observers:
+            each.see(None, row)
 
 
 def _begin(settings: Settings, kept: tuple[dict[str, np.ndarray], dict[str, Any]] | None) -> tuple[Encounters, float]:
