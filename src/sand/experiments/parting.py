@@ -19,6 +19,7 @@ the distance of each pair is at least |x| + u t/2, so that the force between the
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from ..basics.grains import Grains
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..simulation.simulation import Simulation
+from .parting_loops import FreeBodies, recede_for_ever, stay_apart
 
 MARGIN = 0.01
 """Allowance for vibrations of the bodies, in units of R₁ + R₂."""
@@ -67,52 +69,24 @@ def cannot_touch(simulation: Simulation, labels: np.ndarray) -> str:
     if not labels.any():
         return "one body is left"
     grains, forces = simulation.grains, forces_at_distance(simulation)
-    bodies = _Bodies(grains, labels)
-    one, other = np.triu_indices(len(bodies.mass), 1)
-    x, v = bodies.centre[other] - bodies.centre[one], bodies.velocity[other] - bodies.velocity[one]
-    distance, approach = np.linalg.norm(x, axis=1), (x * v).sum(axis=1)
-    reach = (1.0 + MARGIN) * (bodies.radius[one] + bodies.radius[other])
+    bodies = bodies_of(grains, labels, forces)
     if not forces:
-        with np.errstate(invalid="ignore", divide="ignore"):  # at rest, where no time is needed
-            later = np.where(approach < 0.0, -approach / (v * v).sum(axis=1), 0.0)
-        closest = np.linalg.norm(x + later[:, None] * v, axis=1)
-        return "the paths of the bodies are straight and do not meet" if (closest > reach).all() else ""
-    if (approach <= 0.0).any() or (distance <= reach).any():
-        return ""
-    recede = approach / distance
-    pairs = zip(one.tolist(), other.tolist(), distance.tolist(), strict=True)
-    work = np.array([math.fsum(bodies.work(force, a, b, d) for force in forces) for a, b, d in pairs])
-    mass = bodies.mass
-    if len(mass) == 2:
-        parts = bool((0.5 * mass[0] * mass[1] / mass.sum() * recede**2 > work).all())
-    else:
-        momentum = 2.0 * work / recede
-        given = np.bincount(one, momentum, len(mass)) + np.bincount(other, momentum, len(mass))
-        parts = bool((given[one] / mass[one] + given[other] / mass[other] <= 0.5 * recede).all())
-    return "the bodies recede too fast for their attraction" if parts else ""
+        return "the paths of the bodies are straight and do not meet" if stay_apart(bodies, MARGIN) else ""
+    return "the bodies recede too fast for their attraction" if recede_for_ever(bodies, MARGIN) else ""
 
 
-class _Bodies:
-    """Masses (K,), centres and velocities (K, 3), radii (K,) of bodies, and distances of grains from the centres."""
-
-    def __init__(self, grains: Grains, labels: np.ndarray):
-        mass = np.asarray(grains.mass)
-        self.mass = np.bincount(labels, mass)
-        self.centre, self.velocity = (
-            np.column_stack([np.bincount(labels, mass * each) for each in np.asarray(values).T]) / self.mass[:, None]
-            for values in (grains.position, grains.velocity)
-        )
-        self.distance = np.linalg.norm(grains.position - self.centre[labels], axis=1)
-        self.radius = np.zeros(len(self.mass))
-        np.maximum.at(self.radius, labels, self.distance + grains.radius)
-        self.grains, self.labels = grains, labels
-
-    def work(self, force: Any, one: int, other: int, distance: float) -> float:
-        """Largest work [J] of the attraction between two bodies from a distance [m] to infinity."""
-        power, strength = WORK[force.name]
-        found, first, second = strength(self.grains), self.labels == one, self.labels == other
-        product = np.multiply.outer(found[first], found[second])
-        nearest = distance - (1.0 + MARGIN) * np.add.outer(self.distance[first], self.distance[second])
-        if not product.any():
-            return 0.0
-        return math.inf if nearest.min() <= 0.0 else float((product / nearest**power).sum())
+def bodies_of(grains: Grains, labels: np.ndarray, forces: Sequence[Any]) -> FreeBodies:
+    """The bodies with these labels of grains (N,), for the loops over their pairs."""
+    mass = np.asarray(grains.mass)
+    total = np.bincount(labels, mass)
+    centre, velocity = (
+        np.array([np.bincount(labels, mass * each) for each in np.asarray(values).T]) / total
+        for values in (grains.position, grains.velocity)
+    )
+    distance = np.linalg.norm(grains.position - centre.T[labels], axis=1)
+    radius = np.zeros(len(total))
+    np.maximum.at(radius, labels, distance + grains.radius)
+    order, first = np.argsort(labels, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(labels))])
+    strengths = np.array([WORK[force.name][1](grains)[order] for force in forces]).reshape(len(forces), len(order))
+    powers = np.array([WORK[force.name][0] for force in forces], float)
+    return FreeBodies(total, centre, velocity, radius, first, distance[order], strengths, powers, 0.0 * total)
