@@ -29,7 +29,7 @@ from ..basics.grains import Grains
 from ..contact.model import Contact
 from ..forces.base import Force
 from ..simulation.simulation import Simulation
-from .parting_loops import FreeBodies, recede_for_ever, stay_apart
+from .scattering.free_bodies import FreeBodies, recede_for_ever, stay_apart
 
 MARGIN = 0.01
 """Allowance for vibrations of the bodies, in units of R₁ + R₂."""

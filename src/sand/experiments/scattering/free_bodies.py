@@ -1,14 +1,13 @@
-"""Loops over pairs of free bodies, for `parting`: thousands of fragments have millions of pairs."""
+"""Loops over pairs of free bodies, for `experiments.parting`: thousands of fragments have millions of pairs."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.jit import kernel, loop
-from ..numerics.vec import axpy, dot, load, norm, sub
+from ...compiler.jit import kernel, loop
+from ...numerics.vec import axpy, dot, load, norm, sub
 
 
 class FreeBodies(NamedTuple):
@@ -25,7 +24,7 @@ class FreeBodies(NamedTuple):
     distance : ndarray
         Of grains from the centre of mass of their body, (N,) [m].
     strength : ndarray
-        (F, N), of each force s with w = s s'/r^power, see `parting`.
+        (F, N), of each force s with w = s s'/r^power, see `experiments.parting`.
     power : ndarray
         (F,).
     momentum : ndarray
@@ -66,7 +65,7 @@ def stay_apart(bodies, margin):
 
 @loop
 def work_of_attraction(bodies, one, other, distance, margin):
-    """Largest work [J] of the attraction between two bodies from a distance [m] to infinity; infinite if they overlap.
+    """Largest work [J] of the attraction between two bodies from a distance [m] beyond their reach to infinity.
 
     Σ s s'/(distance − (1 + margin)(ρ + ρ'))^power over pairs of their grains and forces.
     """
@@ -75,15 +74,13 @@ def work_of_attraction(bodies, one, other, distance, margin):
         strength = bodies.strength[force]
         for i in range(bodies.first[one], bodies.first[one + 1]):
             for j in range(bodies.first[other], bodies.first[other + 1]):
-                product = strength[i] * strength[j]
-                if product > 0.0:
-                    gap = distance - (1.0 + margin) * (bodies.distance[i] + bodies.distance[j])
-                    work += product / gap ** bodies.power[force] if gap > 0.0 else math.inf
+                gap = distance - (1.0 + margin) * (bodies.distance[i] + bodies.distance[j])
+                work += strength[i] * strength[j] / gap ** bodies.power[force]
     return work
 
 
 def recede_for_ever(bodies, margin):
-    """Whether all bodies recede from each other faster than their attraction can turn back, see `parting`."""
+    """Whether all bodies recede faster than their attraction can turn them back, see `experiments.parting`."""
     count = bodies.mass.size
     for one in range(1, count):  # all pairs, before any work is computed
         for other in range(one):
