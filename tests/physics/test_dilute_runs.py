@@ -72,16 +72,19 @@ def test_a_population_that_is_killed_ends_with_the_same_bits(population, tmp_pat
     assert files_of(place) == files_of(population.folder)
 
 
-def test_observers_see_hits_and_every_thousandth_draw(monkeypatch, tmp_path):
-    """Every fifth draw here: flights = 5, 10, … and those of the hits; the ledger has the rows of hits alone."""
+@pytest.mark.parametrize("between", ["thermal", "own"])
+def test_observers_see_hits_and_every_thousandth_draw(monkeypatch, tmp_path, between):
+    """Every fifth draw: flights = 5, 10, … and those of hits, with the columns of the ledger, which has hits only."""
     monkeypatch.setattr(dilute_growth, "SEEN_EVERY", 5)
     seen = []
-    observer = types.SimpleNamespace(see=lambda simulation, row: seen.append((row["flights"], row["hits"])))
-    how = {**NUMBERS, "stop": "mean_cluster_size >= 1.5", "seed": 3, "hits": "stick"}
+    observer = types.SimpleNamespace(see=lambda simulation, row: seen.append(row))
+    how = {**NUMBERS, "stop": "mean_cluster_size >= 1.5", "seed": 3, "hits": "stick", "between": between}
     grown = dilute_growth.grow(grains(), FORCES, **how, out=tmp_path / "one", observers=[observer])
     hits = np.cumsum(grown.encounters["end"] == 0)
     expected = [(k, n) for k, n in enumerate(hits, 1) if k % 5 == 0 or grown.encounters["end"][k - 1] == 0]
-    assert seen == expected and len(seen) > hits[-1] == len(grown.ledger["time"]) - 1
+    assert [(row["flights"], row["hits"]) for row in seen] == expected
+    assert len(seen) > hits[-1] == len(grown.ledger["time"]) - 1
+    assert {tuple(row) for row in seen} == {tuple(grown.ledger)}
 
 
 def test_the_ledger_and_the_table_of_encounters_agree(population):

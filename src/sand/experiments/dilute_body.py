@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,6 +22,9 @@ from .scattering.two_aggregates import ANGULAR1, ANGULAR2, TURN1, TURN2
 NO_CONTACTS = StrainedContacts(np.zeros((0, 2), np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 VECTORS = ("position", "velocity", "spin", "moment", "body_moment")
 """Quantities of grains that turn with their body."""
+
+MOST_GAPS = 10**6
+"""Gaps between grains of two bodies that are in memory at a time."""
 
 
 class Motion(NamedTuple):
@@ -168,6 +172,11 @@ def momenta_of(grains: GrainArrays) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def closest_pair(a: int, grains: GrainArrays) -> tuple[int, int, float]:
     """The two grains of the first `a` and of the others with the smallest gap, and this gap [m]."""
     x, radius = grains.position.T, grains.radius
-    gaps = cdist(x[:a], x[a:]) - radius[:a, None] - radius[None, a:]
-    i, j = np.unravel_index(np.argmin(gaps), gaps.shape)
-    return int(i), a + int(j), float(gaps[i, j])
+    found, rows = (0, a, math.inf), 1 + MOST_GAPS // (len(radius) - a)
+    for first in range(0, a, rows):
+        part = slice(first, min(first + rows, a))
+        gaps = cdist(x[part], x[a:]) - radius[part, None] - radius[None, a:]
+        i, j = np.unravel_index(np.argmin(gaps), gaps.shape)
+        if gaps[i, j] < found[2]:
+            found = first + int(i), a + int(j), float(gaps[i, j])
+    return found

@@ -122,13 +122,17 @@ class PopulationFiles:
     def begin(self, now: Encounters, start: float) -> None:
         """The first row, frame and checkpoint of a new population."""
         if not self.rows:
-            self.add_row(ledger_row(now, start, {}, None))
+            self.add_row(self.row(now, start))
             self.frame(now)
             self.save(now)
 
+    def row(self, now: Encounters, start: float, hit: Encounter | None = None) -> dict[str, Any]:
+        """The row of the ledger after a hit, or of the present state."""
+        row = ledger_row(now, start, self.rows[-1] if self.rows else {}, hit)
+        return {name: row[name] for name in self.columns}
+
     def add_row(self, row: dict[str, Any]) -> None:
         """A row of the ledger."""
-        row = {name: row[name] for name in self.columns}
         self.rows.append(row)
         self.ledger.append(row)
 
@@ -137,7 +141,7 @@ class PopulationFiles:
         self.waiting.append(encounter_row(encounter))
         if encounter.end == "hit":
             before = self.rows[-1]
-            self.add_row(ledger_row(now, start, before, encounter))
+            self.add_row(self.row(now, start, encounter))
             if _frames_until(self.rows[-1]["mean_cluster_size"]) > _frames_until(before["mean_cluster_size"]):
                 self.frame(now)
         if monotonic() - self.saved > CHECKPOINT_EVERY:

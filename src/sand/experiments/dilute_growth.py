@@ -40,7 +40,7 @@ from .dilute_conditions import (
     field_of,
 )
 from .dilute_encounters import RECENT, Encounters
-from .dilute_files import PopulationFiles, kept_population, ledger_columns, ledger_row
+from .dilute_files import PopulationFiles, kept_population, ledger_columns
 from .dilute_flight import RigidFlights
 from .dilute_hits import HitRule, Resolve, Stick
 from .dilute_kernel import Kernel, kernel_of
@@ -168,7 +168,8 @@ def grow(
     overwrite : bool, optional
         Whether files of an earlier run may be replaced.
     observers : sequence, optional
-        Called with each row of the ledger, and with the numbers at every thousandth draw: `observer.see(None, row)`.
+        Called with each row of the ledger, and with one of the same columns at every thousandth draw, which the ledger
+        does not have: `observer.see(None, row)`.
     case : dict or None, optional
         Settings for case.toml, by default those of these arguments.
 
@@ -239,7 +240,7 @@ def _advance(
         record.add(now, encounter, start)
         if encounter.end != "hit" and now.event % SEEN_EVERY:
             continue
-        row = record.rows[-1] if encounter.end == "hit" else ledger_row(now, start, record.rows[-1], None)
+        row = record.rows[-1] if encounter.end == "hit" else record.row(now, start)
         for each in observers:
             each.see(None, row)
 

@@ -6,14 +6,18 @@ the centres, straight paths stay apart by d = |x + v t|, t = max(−x·v/v², 0)
 With forces between the bodies that fall off at least as a power of the distance, the work of the attraction of two of
 them from now to infinity is at most W = Σ_ij w_ij(|x| − ρ_i − ρ_j), summed over pairs of grains at distances ρ from
 their centres of mass, with w = 2 k μ μ'/r³ for dipoles in any orientation (the work of the largest force 6 k μ μ'/r⁴),
-|k q q'|/r for charges and G m m'/r for masses.  Since the tangential motion only adds a centrifugal force, two bodies
-that recede at u = x·v/|x| with ½ m̄ u² > W recede for ever.
+|k q q'|/r for charges and G m m'/r for masses; cut-offs make it smaller.  Since the tangential motion only adds a
+centrifugal force, two bodies that recede at u = x·v/|x| with ½ m̄ u² > W recede for ever.
 
-Of more bodies, each pair has to recede at u > 0.  As long as forces have changed no relative velocity by more than u/2,
-the distance of each pair is at least |x| + u t/2, so that the force between them has given at most the momentum
-∫ F dt ≤ W/(u/2).  The bodies recede for ever if these momenta, 2W/u, change no relative velocity by more than u/2:
+Of more bodies, each pair has to recede at u > 0.  As long as forces have changed no relative velocity v by more than
+u/2, all its later values, and so the way that they make, are within 30° of v.  The separation is that of now plus this
+way, and its unit vector n has n·v ≥ u cos 30°: the distance grows at s = (cos 30° − ½) u or faster, and the force
+between the two has given at most the momentum ∫ F dt ≤ ∫ F dr/s ≤ W/s.  The bodies recede for ever if these momenta
+change no relative velocity by more than u/2:
 
-    p_ij (1/M_i + 1/M_j) + Σ_k (p_ik/M_i + p_jk/M_j) ≤ u_ij/2,   p = 2W/u,   k other than i and j.
+    p_ij (1/M_i + 1/M_j) + Σ_k (p_ik/M_i + p_jk/M_j) ≤ u_ij/2,   p = W/s,   k other than i and j.
+
+R₁ + R₂ and ρ_i + ρ_j are taken 1 % larger, for vibrations.
 """
 
 from __future__ import annotations
@@ -32,7 +36,7 @@ from ..simulation.simulation import Simulation
 from .scattering.free_bodies import FreeBodies, recede_for_ever, stay_apart
 
 MARGIN = 0.01
-"""Allowance for vibrations of the bodies, in units of R₁ + R₂."""
+"""Allowance for vibrations of the bodies, in units of R₁ + R₂, and of ρ_i + ρ_j."""
 WORK = {
     "dipoles": (3, lambda grains: math.sqrt(2.0 * MAGNETIC) * np.linalg.norm(grains.moment, axis=1)),
     "charges": (1, lambda grains: math.sqrt(COULOMB) * np.abs(grains.charge)),
@@ -68,11 +72,11 @@ def cannot_touch(simulation: Simulation, labels: np.ndarray) -> str:
         return ""
     if not labels.any():
         return "one body is left"
-    grains, forces = simulation.grains, forces_at_distance(simulation)
-    bodies = bodies_of(grains, labels, forces)
-    if not forces:
+    bodies = bodies_of(simulation.grains, labels, forces_at_distance(simulation))
+    if not bodies.strength.any():
         return "the paths of the bodies are straight and do not meet" if stay_apart(bodies, MARGIN) else ""
-    return "the bodies recede too fast for their attraction" if recede_for_ever(bodies, MARGIN) else ""
+    momentum = np.zeros(len(bodies.mass))
+    return "the bodies recede too fast for their attraction" if recede_for_ever(bodies, momentum, MARGIN) else ""
 
 
 def bodies_of(grains: Grains, labels: np.ndarray, forces: Sequence[Any]) -> FreeBodies:
@@ -89,4 +93,4 @@ def bodies_of(grains: Grains, labels: np.ndarray, forces: Sequence[Any]) -> Free
     order, first = np.argsort(labels, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(labels))])
     strengths = np.array([WORK[force.name][1](grains)[order] for force in forces]).reshape(len(forces), len(order))
     powers = np.array([WORK[force.name][0] for force in forces], float)
-    return FreeBodies(total, centre, velocity, radius, first, distance[order], strengths, powers, 0.0 * total)
+    return FreeBodies(total, centre, velocity, radius, first, distance[order], strengths, powers)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...compiler.jit import kernel, loop
 from ...numerics.vec import axpy, dot, load, norm, sub
+
+SLOWEST = 0.5 * (math.sqrt(3.0) - 1.0)
+"""Least rate at which two bodies recede while their relative velocity is within u/2 of the first one, over u."""
 
 
 class FreeBodies(NamedTuple):
@@ -27,8 +31,6 @@ class FreeBodies(NamedTuple):
         (F, N), of each force s with w = s s'/r^power, see `experiments.parting`.
     power : ndarray
         (F,).
-    momentum : ndarray
-        (K,) [kg m/s], which `recede_for_ever` fills: Σ_k 2W/u.
     """
 
     mass: np.ndarray
@@ -39,7 +41,6 @@ class FreeBodies(NamedTuple):
     distance: np.ndarray
     strength: np.ndarray
     power: np.ndarray
-    momentum: np.ndarray
 
 
 @loop
@@ -56,7 +57,7 @@ def stay_apart(bodies, margin):
         for other in range(one):
             x, v, reach = relative(bodies, one, other, margin)
             approach = dot(x, v)
-            if approach < 0.0:
+            if not approach >= 0.0:  # NaN is no reason to part
                 x = axpy(-approach / dot(v, v), v, x)
             if not norm(x) > reach:
                 return False
@@ -79,31 +80,33 @@ def work_of_attraction(bodies, one, other, distance, margin):
     return work
 
 
-def recede_for_ever(bodies, margin):
-    """Whether all bodies recede faster than their attraction can turn them back, see `experiments.parting`."""
+def recede_for_ever(bodies, momentum, margin):
+    """Whether all bodies recede faster than their attraction can turn them back, see `experiments.parting`.
+
+    `momentum` (K,) is filled with the largest momenta p that the attraction may still give to each body.
+    """
     count = bodies.mass.size
     for one in range(1, count):  # all pairs, before any work is computed
         for other in range(one):
             x, v, reach = relative(bodies, one, other, margin)
             if not (dot(x, v) > 0.0 and norm(x) > reach):
                 return False
-    momentum = bodies.momentum
     momentum[:] = 0.0
     for one in range(1, count):
         for other in range(one):
             x, v, _ = relative(bodies, one, other, margin)
             distance = norm(x)
-            work, recession = work_of_attraction(bodies, one, other, distance, margin), dot(x, v) / distance
+            given, recession = work_of_attraction(bodies, one, other, distance, margin), dot(x, v) / distance
             if count == 2:
-                reduced = bodies.mass[0] * bodies.mass[1] / (bodies.mass[0] + bodies.mass[1])
-                return 0.5 * reduced * recession**2 > work
-            momentum[one] += 2.0 * work / recession
-            momentum[other] += 2.0 * work / recession
+                mass = bodies.mass[0] * bodies.mass[1] / (bodies.mass[0] + bodies.mass[1])
+                return 0.5 * mass * recession**2 > given
+            momentum[one] += given / (SLOWEST * recession)
+            momentum[other] += given / (SLOWEST * recession)
     for one in range(1, count):
         for other in range(one):
             x, v, _ = relative(bodies, one, other, margin)
-            given = momentum[one] / bodies.mass[one] + momentum[other] / bodies.mass[other]
-            if not given <= 0.5 * dot(x, v) / norm(x):
+            change = momentum[one] / bodies.mass[one] + momentum[other] / bodies.mass[other]
+            if not change <= 0.5 * dot(x, v) / norm(x):
                 return False
     return True
 

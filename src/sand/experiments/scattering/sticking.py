@@ -7,7 +7,7 @@ import warnings
 from typing import Any
 
 import numpy as np
-from scipy.spatial.distance import cdist
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ...basics.grains import Grains
@@ -127,5 +127,5 @@ def _escapes(grains: Grains, first: int, setup: Flight) -> bool:
     """Whether the bodies recede with a kinetic energy above the largest possible magnetic energy at their distance."""
     separation, velocity = _relative(grains, first)
     kinetic = 0.5 * setup.scales.reduced * float(velocity @ velocity)
-    closest = float(cdist(grains.position[:first], grains.position[first:]).min())
+    closest = float(cKDTree(grains.position[:first]).query(grains.position[first:])[0].min())
     return float(separation @ velocity) > 0.0 and kinetic > setup.scales.alpha / closest**3
