@@ -12,6 +12,7 @@ from scipy.stats import kstest
 import sand
 from sand.basics.constants import BOLTZMANN, COULOMB, MAGNETIC
 from sand.basics.initial_pairs import StrainedContacts
+from sand.experiments import dilute_body
 from sand.experiments.dilute_body import NO_CONTACTS, body_of, in_space
 from sand.experiments.dilute_charges import attraction_of, multipoles_of
 from sand.experiments.dilute_conditions import check_gas, check_moments
@@ -55,6 +56,19 @@ def tree(count, seed=0):
             places.append(place)
     axes = rng.normal(size=(count, 3))
     return aggregate(places, axes / np.linalg.norm(axes, axis=1)[:, None])
+
+
+@pytest.mark.parametrize("most", [1, 20, 1000])
+def test_the_closest_pair_is_that_of_all_gaps(monkeypatch, most):
+    """Grains with radii between 0.5 and 1.5, few gaps in memory at a time: the least |x − x'| − r − r'."""
+    monkeypatch.setattr(dilute_body, "MOST_GAPS", most)
+    rng = np.random.default_rng(4)
+    for first in (1, 3, 7, 12):
+        x, radius = rng.normal(size=(13, 3)) + 9.0 * (np.arange(13) < first)[:, None], rng.uniform(0.5, 1.5, 13)
+        grains = sand.Grains(x, radius, "iron").arrays
+        gaps = {(i, j): math.dist(x[i], x[j]) - radius[i] - radius[j] for i in range(first) for j in range(first, 13)}
+        i, j, gap = dilute_body.closest_pair(first, grains)
+        assert (i, j) == min(gaps, key=gaps.get) and gap == pytest.approx(gaps[i, j], rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 5, 17, 70])
