@@ -261,17 +261,17 @@ def figures(groups: dict[tuple[str, str, float], list[dict[str, Any]]], out: Pat
     for (name, _, _), rows in sorted(groups.items(), key=lambda each: each[0][2]):
         last[name] = rows
     sizes, degrees, radii, moments, factors = (list[Curve]() for _ in range(5))
-    for name, rows in last.items():
+    for look, (name, rows) in enumerate(last.items()):
         found = intervals(rows)
         label = f"{name}, {rows[0]['hits']}"
         levels = [level for level in LEVELS if found.get(f"t_{level:g}", (0, 0))[1] == len(rows)]
         if levels:
             times = [found[f"t_{level:g}"][0] for level in levels]
-            sizes.append(Curve(label, np.array([each.value for each in times]), np.array(levels, float)))
-        degrees += local_curve(label, rows, levels)
+            sizes.append(Curve(label, np.array([each.value for each in times]), np.array(levels, float), look=look))
+        degrees += local_curve(label, rows, levels, look)
         for curves, quantity in ((radii, "gyration"), (moments, "moment")):
-            curves += class_curve(label, found, "number", quantity)
-        factors += class_curve(label, found, "larger", "c")
+            curves += class_curve(label, found, "number", quantity, look)
+        factors += class_curve(label, found, "larger", "c", look)
     number = np.array([2.0, 300.0])
     grains = "grains N"
     first = [Panel("n₀t (s/m³)", "S", sizes, log="xy"), Panel("S", "λ = d ln Ṡ/d ln S", degrees)]
@@ -282,7 +282,7 @@ def figures(groups: dict[tuple[str, str, float], list[dict[str, Any]]], out: Pat
         save(panels_figure(panels, "growth in dilute dust, one encounter at a time"), out / f"{name}.png")
 
 
-def class_curve(label: str, found: dict[str, tuple[Interval, int]], x: str, y: str) -> list[Curve]:
+def class_curve(label: str, found: dict[str, tuple[Interval, int]], x: str, y: str, look: int) -> list[Curve]:
     """A curve over classes of N that more than half of the populations have; none if there are fewer than two."""
     most = max(number for _, number in found.values())
     least = [k for k in CLASSES[:-1] if 2 * found.get(f"{y}_{k}", (0, 0))[1] > max(most, 2) and f"{x}_{k}" in found]
@@ -290,10 +290,10 @@ def class_curve(label: str, found: dict[str, tuple[Interval, int]], x: str, y: s
     if len(least) < 2:
         return []
     values = np.array([found[f"{y}_{k}"][0] for k in least])
-    return [Curve(label, np.array([found[f"{x}_{k}"][0].value for k in least]), *values.T)]
+    return [Curve(label, np.array([found[f"{x}_{k}"][0].value for k in least]), *values.T, look=look)]
 
 
-def local_curve(label: str, rows: Sequence[dict[str, Any]], levels: Sequence[float]) -> list[Curve]:
+def local_curve(label: str, rows: Sequence[dict[str, Any]], levels: Sequence[float], look: int) -> list[Curve]:
     """Local degrees of the mean S(t) of populations, in windows of S with a ratio of 4; none if S is too small."""
     if len(levels) < 4:
         return []
@@ -308,7 +308,7 @@ def local_curve(label: str, rows: Sequence[dict[str, Any]], levels: Sequence[flo
         return []
     x = np.array([math.sqrt(each.low_size * each.high_size) for each in found])
     low, value, high = np.array([(each.low, each.degree, each.high) for each in found]).T
-    return [Curve(label, x, value, low, high)]
+    return [Curve(label, x, value, low, high, look=look)]
 
 
 def summarise(out: Path) -> None:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from .figure_format import format_width
 from .run_figure import LETTERS, figure_with_panels
 from .style import (
-    LARGEST_COLOURS,
+    LINE_COLOURS,
     MARKERS,
     MUTED,
     figure_title,
@@ -74,7 +74,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
     for k, curve in enumerate(panel.curves):
         number = k if curve.look is None else curve.look
-        colour, marker = LARGEST_COLOURS[number % len(LARGEST_COLOURS)], MARKERS[number % len(MARKERS)]
+        colour, marker = LINE_COLOURS[number % len(LINE_COLOURS)], MARKERS[number % len(MARKERS)]
         weak = np.zeros(len(curve.x), bool) if curve.weak is None else curve.weak
         look: dict[str, Any] = {"marker": marker, "color": colour, "markersize": 4.0, "linewidth": 1.0}
         axes.plot(curve.x, np.where(weak, np.nan, curve.y), label=curve.label, **look)

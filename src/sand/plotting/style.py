@@ -35,6 +35,8 @@ MARKERS = "osD^vP*X<>"
 """Markers of lines."""
 LARGEST_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
 """Colours of the largest clusters, largest first."""
+LINE_COLOURS = (*LARGEST_COLOURS, INDIGO, BROWN, PLUM)
+"""Colours of lines, one for each marker."""
 OTHER_COLOURS = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
 """Colours of all other clusters, used cyclically."""
 SINGLE_COLOUR = "#B9BDC3"
