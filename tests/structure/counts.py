@@ -62,7 +62,8 @@ CAPABILITIES = {
     "the rigid motion of clusters, in one place (less)": -35,
     "charged bodies of dilute dust: bound of their attraction, groups of charges, starts where net charges act, bound "
     "orbits": 181,
-    "paths and attraction of fragments by loops over their pairs, observers of populations at each thousandth draw": 57,
+    "paths and attraction of fragments by loops over their pairs, observers of populations at each thousandth draw, "
+    "a colour for each of ten curves": 58,
 }
 """Code lines of capabilities that the source has gained since its count was 35,381."""
 MOST_PARAMETERS = 8

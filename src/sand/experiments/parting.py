@@ -75,8 +75,8 @@ def cannot_touch(simulation: Simulation, labels: np.ndarray) -> str:
     bodies = bodies_of(simulation.grains, labels, forces_at_distance(simulation))
     if not bodies.strength.any():
         return "the paths of the bodies are straight and do not meet" if stay_apart(bodies, MARGIN) else ""
-    momentum = np.zeros(len(bodies.mass))
-    return "the bodies recede too fast for their attraction" if recede_for_ever(bodies, momentum, MARGIN) else ""
+    recede = recede_for_ever(bodies, np.zeros(len(bodies.mass)), MARGIN)
+    return "the bodies recede too fast for their attraction" if recede else ""
 
 
 def bodies_of(grains: Grains, labels: np.ndarray, forces: Sequence[Any]) -> FreeBodies:
