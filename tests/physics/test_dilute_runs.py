@@ -11,7 +11,7 @@ import sand
 from sand.analysis.clusters import cluster_labels
 from sand.basics.errors import BadInput
 from sand.cli.main import main
-from sand.experiments import dilute_files, dilute_flight, dilute_growth, dilute_state
+from sand.experiments import dilute_encounters, dilute_files, dilute_flight, dilute_growth, dilute_state
 from sand.experiments.dilute_encounters import RECENT
 from sand.experiments.dilute_kernel import kernel_of
 from sand.experiments.growth import growth_of, read_box
@@ -196,8 +196,24 @@ def test_charges_that_turn_around_before_their_flight_are_no_misses(tmp_path):
     assert repelled.any() and (found.encounters["flight_steps"][repelled] == 0).all()
     flown = found.encounters["flight_steps"] > 0
     assert found.ledger["flights"][-1] == flown.sum() and not (flown & repelled).any()
-    # bodies without a net charge, or with opposite ones, that pass far away are misses without a flight
-    assert set(ends[~flown]) <= {1.0, 3.0} and set(ends[flown]) == {0.0, 1.0}
+    assert set(ends[flown]) == {0.0, 1.0}
+    single = (found.encounters["grains1"] == 1) & (found.encounters["grains2"] == 1) & ~flown
+    assert single.sum() > 10 and (repelled == have_like_charges(found.encounters))[single].all()
+
+
+def have_like_charges(encounters):
+    """Which pairs of single grains have charges of one sign, where those of even and odd numbers have opposite ones."""
+    return (encounters["body1"] + encounters["body2"]) % 2 == 0
+
+
+def test_pairs_without_a_flight_are_repelled_or_miss(monkeypatch, tmp_path):
+    """If all orbits stay outside of the start of flights: like charges are repelled, opposite ones miss each other."""
+    monkeypatch.setattr(dilute_encounters, "kepler_start", lambda *of_a_pair: None)
+    own = grains(moment=None, charge=np.resize([1.0, -1.0], 100) * 1.602176634e-19)
+    found = dilute_growth.grow(own, [FORCES[0], sand.Charges()], **STICK, until="2e6 s", out=tmp_path / "one")
+    like = have_like_charges(found.encounters)
+    assert 10 < like.sum() < len(like) - 10 and found.ledger["flights"][-1] == found.ledger["hits"][-1] == 0
+    assert (found.encounters["end"] == np.where(like, 3.0, 1.0)).all()
 
 
 def test_a_checkpoint_of_an_earlier_version_is_refused(tmp_path, monkeypatch):

@@ -96,12 +96,12 @@ def recede_for_ever(bodies, momentum, margin):
         for other in range(one):
             x, v, _ = relative(bodies, one, other, margin)
             distance = norm(x)
-            given, recession = work_of_attraction(bodies, one, other, distance, margin), dot(x, v) / distance
+            work, recession = work_of_attraction(bodies, one, other, distance, margin), dot(x, v) / distance
             if count == 2:
-                mass = bodies.mass[0] * bodies.mass[1] / (bodies.mass[0] + bodies.mass[1])
-                return 0.5 * mass * recession**2 > given
-            momentum[one] += given / (SLOWEST * recession)
-            momentum[other] += given / (SLOWEST * recession)
+                reduced = bodies.mass[0] * bodies.mass[1] / (bodies.mass[0] + bodies.mass[1])
+                return 0.5 * reduced * recession**2 > work
+            momentum[one] += work / (SLOWEST * recession)
+            momentum[other] += work / (SLOWEST * recession)
     for one in range(1, count):
         for other in range(one):
             x, v, _ = relative(bodies, one, other, margin)
